@@ -126,6 +126,21 @@ def reading_noise(record: Record, sensor: SensorProperties) -> float:
     return _as_stated(*_scattered(record), floor, sensor)
 
 
+def slow_power(values: Array, block: int) -> tuple[float, int]:
+    """Power of the slow part of a residual, by its means over blocks.
+
+    Args:
+        values: shape (n,), rad.
+        block: number of samples in a block, such as `eighth_of_a_cycle`.
+
+    Returns:
+        The power, rad², and the number of blocks. The power of white noise is its variance times that number.
+    """
+    blocks = values.size // block
+    means = values[: blocks * block].reshape(blocks, block).mean(axis=1)
+    return float(means @ means) * block, blocks
+
+
 def _as_stated(fast: float, degrees: float, floor: float, sensor: SensorProperties) -> float:
     """The stated noise where the measured one agrees with it, else the measured one."""
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
@@ -172,9 +187,8 @@ def _slow_part(
     # Power of the block means relative to white noise of the reference level, and the verdict by F.
     power, degrees = 0.0, 0
     for residual in residuals:
-        blocks = residual.values.size // residual.block
-        means = residual.values[: blocks * residual.block].reshape(blocks, residual.block).mean(axis=1)
-        power += float(means @ means) * residual.block
+        own, blocks = slow_power(residual.values, residual.block)
+        power += own
         degrees += blocks - residual.unknowns
     if degrees < 3:
         return 1.0, False

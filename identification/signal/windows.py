@@ -23,7 +23,7 @@ from identification.signal.decay_fit import (
 )
 from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay
-from identification.signal.noise import eighth_of_a_cycle
+from identification.signal.noise import eighth_of_a_cycle, slow_power
 from identification.statistics import determined, inverse
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -121,10 +121,8 @@ def _window_estimate(
     duration = count * interval
     decay = run.decay
     amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
-    block = eighth_of_a_cycle(decay.omega_n, interval)
-    blocks = run.residual.size // block
-    means = run.residual[: blocks * block].reshape(blocks, block).mean(axis=1)
-    variance = noise.std**2 * max(1.0, float(means @ means) * block / max(blocks - 4, 1) / noise.std**2)
+    power, blocks = slow_power(run.residual, eighth_of_a_cycle(decay.omega_n, interval))
+    variance = noise.std**2 * max(1.0, power / max(blocks - 4, 1) / noise.std**2)
     if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < LEAST_WINDOW_ENERGY * variance:
         return None
     order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
