@@ -128,7 +128,7 @@ def test_every_element_is_named() -> None:
 
 
 def test_rig_xml_repeats_no_number_of_the_rig_description() -> None:
-    text = (Path(__file__).parents[2] / "mjcf" / "rig.xml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "mjcf" / "rig.xml").read_text(encoding="utf-8")
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     body, section = RIG.body, RIG.working_section
     owned = {body.length, body.width, body.height, body.ground_clearance, body.mass, body.frontal_area}

@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def record(zeta, omega_n, *, cycles=12.0, noise=0.0, rng=None, rate=1000.0, held=0.0, release=0.35):
