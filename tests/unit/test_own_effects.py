@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 
@@ -31,7 +32,6 @@ from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary import plugins
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -102,7 +102,9 @@ def test_installed_packages_add_effects(monkeypatch: pytest.MonkeyPatch) -> None
     good = EntryPoint("cubic", "tests.unit.own_effects:OwnCubic", registry.ENTRY_POINTS)
     bad = EntryPoint("gone", "tests.unit.own_effects:Gone", registry.ENTRY_POINTS)
     for points, fails in (((good,), False), ((bad,), True)):
-        monkeypatch.setattr(plugins, "entry_points", lambda points=points, **_: EntryPoints(points))
+        monkeypatch.setattr(
+            importlib.metadata, "entry_points", lambda points=points, **_: EntryPoints(points)
+        )
         registry._load_entry_points.cache_clear()
         if fails:
             with pytest.raises(TunnelError, match="gone: cannot be loaded"):

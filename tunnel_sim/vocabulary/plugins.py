@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 
 def added_to(group: str) -> dict[str, EntryPoint]:
@@ -15,6 +18,8 @@ def added_to(group: str) -> dict[str, EntryPoint]:
     Args:
         group: such as ``tunnel.effects``.
     """
+    from importlib.metadata import entry_points  # only here: every command would wait for it
+
     return {point.name: point for point in entry_points(group=group)}
 
 

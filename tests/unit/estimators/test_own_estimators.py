@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 from importlib.metadata import EntryPoint, EntryPoints
 from typing import ClassVar
 
@@ -12,7 +13,6 @@ from identification.datasets import measured_campaign
 from identification.estimators import ALL_ESTIMATORS, ENTRY_POINTS, known_estimators, make_estimator
 from tunnel_lab.terminal.options import known_estimator
 from tunnel_sim import Campaign, TunnelError
-from tunnel_sim.vocabulary import plugins
 
 
 class Idle:
@@ -30,7 +30,7 @@ def _plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
         EntryPoint(name, f"{__name__}:{place}", ENTRY_POINTS)
         for name, place in (("idle", "Idle"), ("gone", "Gone"), ("misnamed", "Idle"))
     )
-    monkeypatch.setattr(plugins, "entry_points", lambda group: points.select(group=group))
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: points.select(group=group))
 
 
 @pytest.mark.usefixtures("_plugged_in")

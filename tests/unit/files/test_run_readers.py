@@ -1,5 +1,6 @@
 """A further kind of file needs one reader and one line of the registry, or an entry point; it is planted here."""
 
+import importlib.metadata
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -15,7 +16,6 @@ from tunnel_sim.files.importing.source import read_source
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.readers import FileTable, Reader
 from tunnel_sim.files.run_files import read_table
-from tunnel_sim.vocabulary import plugins
 
 
 def angles(content: bytes) -> list[float]:
@@ -53,7 +53,7 @@ def _reader_of_lines(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureReq
 def plug_in(monkeypatch: pytest.MonkeyPatch, ending: str, place: str) -> None:
     """Install a package that adds a reader."""
     points = EntryPoints((EntryPoint(ending, place, readers.ENTRY_POINTS),))
-    monkeypatch.setattr(plugins, "entry_points", lambda group: points.select(group=group))
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: points.select(group=group))
     readers._added_places.cache_clear()
 
 
