@@ -81,6 +81,10 @@ READERS: Mapping[str, str] = {
 """Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
 
 
+RUN_ENDINGS = (".csv", ".parquet")
+"""The endings of `READERS` whose readers read run files, known without loading them."""
+
+
 def reader_place(ending: str) -> str | None:
     """Where the reader of an ending is, ``module:name``.
 
@@ -119,7 +123,7 @@ def load_reader(ending: str) -> Reader | None:
 
 
 def run_endings() -> list[str]:
-    """The endings of a campaign's run files, with their dots."""
+    """The endings of a campaign's run files, with their dots, those of installed packages included."""
     endings = (*READERS, *(ending for ending in _added_places() if ending not in READERS))
     readers = {ending: load_reader(ending) for ending in endings}
     return [

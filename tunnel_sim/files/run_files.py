@@ -10,7 +10,15 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.readers import COLUMNS, USED_COLUMNS, FileTable, Reader, load_reader, run_endings
+from tunnel_sim.files.readers import (
+    COLUMNS,
+    RUN_ENDINGS,
+    USED_COLUMNS,
+    FileTable,
+    Reader,
+    load_reader,
+    run_endings,
+)
 from tunnel_sim.files.reading import check_count, decoded, read_regular
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
@@ -46,9 +54,9 @@ def read_table(
         TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
             value that is missing or not a number.
     """
-    kinds = " or ".join(run_endings())
     reader = load_reader(path.suffix.lower())
     if reader is None or reader.read_run is None:
+        kinds = " or ".join(run_endings())
         raise TunnelError(
             f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy=f"use {kinds}"
         )
@@ -57,7 +65,7 @@ def read_table(
         reader.limit,
         where=where,
         missing="put the file there or correct 'file' in campaign.toml",
-        readable=f"name a readable {kinds} file",
+        readable=f"name a readable {' or '.join(RUN_ENDINGS)} file",
     )
     if not content.strip():
         raise TunnelError(

@@ -75,6 +75,11 @@ def test_its_limit_holds(tmp_path: Path) -> None:
         read_table(tmp_path / "r.lines", "here")
 
 
+def test_the_endings_of_run_files_are_those_of_their_readers() -> None:
+    found = [ending for ending in readers.run_endings() if ending != ".lines"]
+    assert found == list(readers.RUN_ENDINGS)
+
+
 def test_messages_name_it(tmp_path: Path) -> None:
     with pytest.raises(TunnelError, match=r"use \.csv or \.parquet or \.lines"):
         read_table(tmp_path / "r.txt", "here")
