@@ -60,8 +60,6 @@ SWELL_FALSE_ALARM_RATE = 1e-6
 HUM_LEFT = 0.02
 #: A reading's step beyond this multiple of the stated resolution is coarser than stated. Judgement.
 COARSER_STEP = 1.5
-#: Power that a coarse step's error may leave outside the noise, in step²/12. At most all of it, and chance.
-COARSE_STEP_POWER = 1.2
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1

@@ -246,10 +246,12 @@ def sets_with_one_more(
         progress: called with the names of each set.
 
     Returns:
-        One for every set of effects, the better fit where two sets lead to it.
+        One for every set of effects: that of more weight where two sets lead to it, so that a freed form of one
+        does not take the place of the other.
     """
     found: dict[tuple[str, ...], Hypothesis] = {}
     for parent in (*level, *_in_textbook_form(level)):
+        gap = misfit(parent.fit)
         others = [kind for kind in kinds if kind.name not in parent.effects]
         for kind, starts in _worth_fitting(parent, others):
             if progress is not None:
@@ -258,8 +260,8 @@ def sets_with_one_more(
             if best is None:
                 continue
             child = Hypothesis((*parent.effects, kind.name), best)
-            if child.names not in found or best.total < found[child.names].fit.total:
-                found[child.names] = child
+            other = found.get(child.names, child)
+            found[child.names] = max(other, child, key=Scale.of((other, child), gap).weight)
     return list(found.values())
 
 
