@@ -13,7 +13,11 @@ from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed, weigh
 from diagnosis.attribution.grow import exchange, grow, prune, second_mode_alone
 from diagnosis.attribution.grow_in_stretches import InStretches, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis, polish, with_forms
-from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
+from diagnosis.attribution.random_moments import (
+    RandomAnswer,
+    weigh_random_moments,
+    without_the_random_moment,
+)
 from diagnosis.detection.gap import judge
 from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
@@ -164,7 +168,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress, first)))
     with clock.step("random moments"):
         random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
-    found = replace(found, random=tuple(random))
+        sets = without_the_random_moment(random, found.hypotheses, misfit(found.nominal))
+    found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
     if weighed[0].effects != UNKNOWN:
@@ -223,7 +228,7 @@ def _with_forms(found: Study, base: Fit) -> Study:
         return found
     rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
     others = [h for h in found.hypotheses if not any(h is rival for rival in rivals)]
-    return replace(found, hypotheses=(*others, *with_forms(rivals, 0.0, len(rivals))))
+    return replace(found, hypotheses=(*others, *with_forms(rivals, misfit(base), 0.0, len(rivals))))
 
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:

@@ -125,8 +125,8 @@ NEEDLESS_SPRING = 0.05
 #: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
 #: weight was wrong, where something was at work that neither fits nor rivals know.
 EVEN_SHARE = 0.03
-#: A freed form must leave less than this share of the excess that is left without it. Tuned.
-FORM_SHARE = 0.80
+#: Of several forms those are freed without which χ² would rise by more than this share of the excess. Tuned.
+FORM_SHARE = 0.2
 
 # ---- Random moments (0009) ------------------------------------------------------------------------------------
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.attribution.decide import FittedSet, log_weight
-from diagnosis.attribution.grow import Scale, grow, sets_with_one_more
-from diagnosis.attribution.hypothesis import Hypothesis, restricted
+from diagnosis.attribution.grow import grow, sets_with_one_more
+from diagnosis.attribution.hypothesis import Hypothesis, Scale, restricted
 from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import ProcessNoise, random_moments, with_response
-from diagnosis.fitting.channels import misfit
+from diagnosis.fitting.channels import Misfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
 from diagnosis.fitting.normal_equations import by_run
 from diagnosis.fitting.problem import Point, Problem
@@ -56,8 +56,8 @@ class RandomAnswer:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects, sorted."""
-        return tuple(sorted((self.kind.name, *(() if self.beside is None else self.beside.effects))))
+        """Names of the effects, sorted; once where an effect acts steadily and at random."""
+        return tuple(sorted({self.kind.name, *(() if self.beside is None else self.beside.effects)}))
 
 
 def weigh_random_moments(
@@ -88,11 +88,32 @@ def weigh_random_moments(
         if process is not None:
             kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
-            left = FittedSet(
-                (kind.name, *seen.effects), share, share * misfit(nominal).excess, seen.further_numbers
-            )
+            names = tuple(dict.fromkeys((kind.name, *seen.effects)))
+            left = FittedSet(names, share, share * misfit(nominal).excess, seen.further_numbers)
             return [RandomAnswer(kind, process, seen if seen.effects else None, left)]
     return []
+
+
+def without_the_random_moment(
+    answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: Misfit
+) -> list[Hypothesis]:
+    """The sets beside random moments fitted with the sensor's noise alone: what they leave may be no random moment.
+
+    Args:
+        known: fitted sets.
+        gap: what the nominal model leaves.
+
+    Returns:
+        All sets; of two with the same effects that of more weight.
+    """
+    found = {hypothesis.names: hypothesis for hypothesis in known}
+    for answer in answers:
+        if answer.beside is not None:
+            with suppress(FitError, np.linalg.LinAlgError):
+                alone = replace(answer.beside, fit=fit(answer.beside.fit.problem, answer.beside.fit.point))
+                both = [alone] if alone.names not in found else [found[alone.names], alone]
+                found[alone.names] = max(both, key=Scale.of(both, gap).weight)
+    return list(found.values())
 
 
 def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
