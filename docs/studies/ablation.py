@@ -8,8 +8,8 @@ Every number that decides is moved by a factor of two either way, or switched of
     python -m docs.studies.ablation SET [--count N] [--rerun NAME ...] [--odds] [--search]
 
 ``--odds`` fits the constants of the odds against ``unknown`` to the same fits: it maximises the probability of the
-truth, and of ``unknown`` where a true effect is withheld. ``--search`` says of every wrong answer whether the search
-missed the truth or the answer weighs more: the true set is fitted alone.
+truth, and of ``unknown`` where a true effect is withheld. ``--search`` says of every wrong answer whether the
+search missed the truth or the answer weighs more: the true set is fitted alone.
 
 SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how
 many answers are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how
