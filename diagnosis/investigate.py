@@ -13,11 +13,23 @@ from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed, weigh
 from diagnosis.attribution.grow import exchange, grow, prune, second_mode_alone
 from diagnosis.attribution.grow_in_stretches import InStretches, grow_in_stretches
 from diagnosis.attribution.hypothesis import Hypothesis, polish, with_forms
-from diagnosis.attribution.random_moments import RandomAnswer, weigh_random_moments
+from diagnosis.attribution.random_moments import (
+    RandomAnswer,
+    weigh_random_moments,
+    without_the_random_moment,
+)
 from diagnosis.detection.gap import judge
 from diagnosis.detection.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.detection.refusal import refuse_indefinite
-from diagnosis.detection.sensor_noise import Noise, campaign_noise, noise_trend, reading_step
+from diagnosis.detection.rounding import rounding_errors
+from diagnosis.detection.sensor_noise import (
+    Noise,
+    campaign_noise,
+    noise_trend,
+    reading_levels,
+    reading_step,
+    typical_step,
+)
 from diagnosis.fitting.channels import CHANNELS, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
@@ -27,7 +39,6 @@ from diagnosis.fitting.similarity import Similarity, similar_campaign
 from diagnosis.fitting.spectra import mains_interval
 from diagnosis.fitting.starting_points import decays_start, is_gross, nominal_start
 from diagnosis.policy import (
-    COARSE_STEP_POWER,
     COARSER_STEP,
     HUM_LEFT,
     NOISE_EXPLAINS_UP_TO,
@@ -38,8 +49,11 @@ from diagnosis.study import COARSE_STEP, HUM, Study, located
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 Progress = Callable[[str], None]
+
+_IN_HARMONICS = np.eye(len(CHANNELS))[CHANNELS.index("harmonics")]
 
 
 def investigate(
@@ -154,19 +168,17 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress, first)))
     with clock.step("random moments"):
         random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
-    found = replace(found, random=tuple(random))
+        sets = without_the_random_moment(random, found.hypotheses, misfit(found.nominal))
+    found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
-    if weighed[0].effects == UNKNOWN and _read_off_explains(found):
-        weighed = []  # what is left belongs to the cause read off the records
-    elif weighed[0].effects != UNKNOWN:
+    if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
-    if weighed and _noise_explains(found, weighed) and _read_off_explains(found):
-        weighed = []
-    elif weighed and _noise_explains(found, weighed):
-        named = [replace(w, probability=0.0) for w in weighed if w.effects != UNKNOWN]
-        weighed = [Weighed(UNKNOWN, 1.0, 1.0), *named]
+    if _noise_explains(found, weighed):
+        answer = Weighed((), 1.0, 1.0) if found.read_off else Weighed(UNKNOWN, 1.0, 1.0)
+        others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
+        weighed = [answer, *others]
     return replace(found, weighed=tuple(weighed))
 
 
@@ -216,20 +228,45 @@ def _with_forms(found: Study, base: Fit) -> Study:
         return found
     rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
     others = [h for h in found.hypotheses if not any(h is rival for rival in rivals)]
-    return replace(found, hypotheses=(*others, *with_forms(rivals, 0.0, len(rivals))))
+    return replace(found, hypotheses=(*others, *with_forms(rivals, misfit(base), 0.0, len(rivals))))
 
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
     """The answers with their probabilities, the answer first; shares of the gap that ``base`` leaves."""
-    nominal = misfit(base)
+    nominal, own = misfit(base), _of_read_off(found, base)
     sets = [h.fitted_set(base) for h in found.hypotheses]
     sets += [answer.left for answer in found.random]
-    if found.hum is not None:  # it may be the only cause, and is part of the gap
+    if found.read_off:  # it may be the only cause, and is part of the gap
         sets.append(FittedSet((), 1.0, nominal.excess))
-        removed = np.zeros(len(CHANNELS))
-        removed[CHANNELS.index("harmonics")] = found.hum.excess * base.count
+    if found.hum is not None:
+        removed = found.hum.excess * base.count * _IN_HARMONICS
         nominal = replace(nominal, chi2=nominal.chi2 + removed)
-    return weigh(sets, nominal)
+    return weigh([replace(one, excess=one.excess - own) for one in sets], nominal)
+
+
+def _of_read_off(found: Study, base: Fit) -> Array:
+    """χ² by channel that causes read off the records leave under any set of effects, shape (6,).
+
+    The error of a coarse step is not white, and follows a slow motion. A hum that is not a pure line leaves a small
+    share of itself.
+    """
+    left = np.zeros(len(CHANNELS))
+    if found.hum is not None:
+        left += HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
+    errors = None
+    if found.coarse:
+        levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
+        white = found.noise.white(typical_step(levels))
+        # a coarse step hides the noise, so that what is stated of it is the better guess
+        white = dict.fromkeys(white, stated) if stated else white
+        errors = rounding_errors(base, white, found.step, levels)
+    if errors is not None:
+        tries = [
+            misfit(base, [run.scaled(e[k]) for run, e in zip(base.problem.data.runs, errors, strict=True)])
+            for k in range(len(errors[0]))
+        ]
+        left += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
+    return left
 
 
 def _polished(
@@ -239,19 +276,6 @@ def _polished(
     if any(moment.effects == answer.effects for moment in random):
         return tuple(hypotheses)
     return tuple(polish(h) if h.names == answer.effects else h for h in hypotheses)
-
-
-def _read_off_explains(found: Study) -> bool:
-    """Whether what is left is no more than a coarse step or a removed hum leaves by itself.
-
-    The error of a coarse step is not white: its power is step²/12, wherever in the spectrum it lies. A hum that
-    is not a pure line leaves a small share of itself.
-    """
-    left = found.nominal.excess / found.nominal.problem.data.runs[0].block
-    variance = float(np.mean(list(found.noise.variance.values())))
-    if found.coarse and left * variance < COARSE_STEP_POWER * found.step**2 / 12.0:
-        return True
-    return found.hum is not None and left < HUM_LEFT * found.hum.excess
 
 
 def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:

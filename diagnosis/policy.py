@@ -60,8 +60,6 @@ SWELL_FALSE_ALARM_RATE = 1e-6
 HUM_LEFT = 0.02
 #: A reading's step beyond this multiple of the stated resolution is coarser than stated. Judgement.
 COARSER_STEP = 1.5
-#: Power that a coarse step's error may leave outside the noise, in step²/12. At most all of it, and chance.
-COARSE_STEP_POWER = 1.2
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
@@ -119,7 +117,7 @@ CHANCE_STDS = 2.0
 #: Logarithm of the odds that the effects of a set are the causes: a number, and by how much it rises with the
 #: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
 #: logistic regression on fits with and without the true effects, simulated and measured (0007).
-UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = -0.3, 0.21, 2.0, 2.0
+UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = 0.2, 0.21, 2.0, 2.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
 #: then counts as one with two numbers less: a spring would have to soften by chance, and as much as gravity does.
 #: Judgement, made when three simulated pendulums and a measured one had been given a cubic spring (0018).
@@ -127,8 +125,8 @@ NEEDLESS_SPRING = 0.05
 #: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
 #: weight was wrong, where something was at work that neither fits nor rivals know.
 EVEN_SHARE = 0.03
-#: A freed form must leave less than this share of the excess that is left without it. Tuned.
-FORM_SHARE = 0.80
+#: Of several forms those are freed without which χ² would rise by more than this share of the excess. Tuned.
+FORM_SHARE = 0.2
 
 # ---- Random moments (0009) ------------------------------------------------------------------------------------
 

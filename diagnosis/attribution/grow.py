@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.attribution.decide import least_excess, log_misfit, log_weight, misfit_scale
+from diagnosis.attribution.decide import log_misfit, misfit_scale
 from diagnosis.attribution.hypothesis import (
     Hypothesis,
+    Scale,
     is_plausible,
     own_gain,
     restricted,
@@ -33,7 +34,6 @@ from diagnosis.policy import (
     SAME_CHANGE,
 )
 from tunnel_sim.effects import Effect
-from tunnel_sim.vocabulary.record import Array
 
 _ITERATIONS = 12  # of a fit on the way; the answer's own is polished
 
@@ -65,7 +65,7 @@ def grow(
         scale = Scale.of(children, gap)
         if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
             count = FREED_HYPOTHESES if not level[0].effects else 1
-            children = with_forms(children, FREED_FROM * level[0].fit.excess, count)
+            children = with_forms(children, gap, FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
         going = going_on(children, level, gap)
         level = _distinct(going, nominal)[:GROWN_FROM]
@@ -100,33 +100,6 @@ def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     """Whether two fits differ by less than `SAME_CHANGE` of the power by which they change the nominal one."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
     return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
-
-
-@dataclass(frozen=True, eq=False)
-class Scale:
-    """What sets are compared by: the misfit by channel that needs no cause, and the least that any of them leaves.
-
-    Args:
-        misfit: χ² by channel, shape (6,).
-        least: χ² by channel, shape (6,), 0 or less.
-    """
-
-    misfit: Array
-    least: Array
-
-    @classmethod
-    def of(cls, sets: Sequence[Hypothesis], gap: Misfit) -> Scale:
-        """The scale of some sets, from what the nominal model leaves."""
-        return cls(misfit_scale(gap), least_excess([h.excess for h in sets]))
-
-    def weight(self, hypothesis: Hypothesis) -> float:
-        """Logarithm of the weight of a set."""
-        left = hypothesis.excess - self.least
-        return log_weight(left, self.misfit, len(hypothesis.effects), hypothesis.further_numbers)
-
-    def greatest(self, hypothesis: Hypothesis) -> float:
-        """The same of the set with one more effect that leaves nothing."""
-        return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
 
 
 def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: Misfit) -> list[Hypothesis]:
@@ -246,7 +219,8 @@ def sets_with_one_more(
         progress: called with the names of each set.
 
     Returns:
-        One for every set of effects, the better fit where two sets lead to it.
+        One for every set of effects: that of more weight where two sets lead to it, so that a freed form of one
+        does not take the place of the other.
     """
     found: dict[tuple[str, ...], Hypothesis] = {}
     for parent in (*level, *_in_textbook_form(level)):
@@ -258,8 +232,8 @@ def sets_with_one_more(
             if best is None:
                 continue
             child = Hypothesis((*parent.effects, kind.name), best)
-            if child.names not in found or best.total < found[child.names].fit.total:
-                found[child.names] = child
+            both = [child] if child.names not in found else [found[child.names], child]
+            found[child.names] = max(both, key=Scale.of(both, misfit(parent.fit)).weight)
     return list(found.values())
 
 

@@ -83,7 +83,7 @@ def grow_in_stretches(
     while level:
         grown = _longer_sets(level, short, data, able, progress)
         least = min(FREED_FROM * level[0].long.fit.excess, MODEL_ERROR**2 * gap.motion / nominal.count)
-        children = with_forms([child.long for child in grown.values()], least)
+        children = with_forms([child.long for child in grown.values()], gap, least)
         found += children
         parents = [g.long for g in level]
         going = _of_each(parents, going_on(children, parents, gap))

@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnosis.attribution.decide import FittedSet
-from diagnosis.fitting.channels import CHANNELS, misfit
+from diagnosis.attribution.decide import FittedSet, least_excess, log_weight, misfit_scale
+from diagnosis.fitting.channels import CHANNELS, Misfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import linear_coefficients, resonance
@@ -94,6 +94,33 @@ class Hypothesis:
         return FittedSet(self.effects, self.share_left(nominal), self.excess, self.further_numbers)
 
 
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What sets are compared by: the misfit by channel that needs no cause, and the least that any of them leaves.
+
+    Args:
+        misfit: χ² by channel, shape (6,).
+        least: χ² by channel, shape (6,), 0 or less.
+    """
+
+    misfit: Array
+    least: Array
+
+    @classmethod
+    def of(cls, sets: Sequence[Hypothesis], gap: Misfit) -> Scale:
+        """The scale of some sets, from what the nominal model leaves."""
+        return cls(misfit_scale(gap), least_excess([h.excess for h in sets]))
+
+    def weight(self, hypothesis: Hypothesis) -> float:
+        """Logarithm of the weight of a set."""
+        left = hypothesis.excess - self.least
+        return log_weight(left, self.misfit, len(hypothesis.effects), hypothesis.further_numbers)
+
+    def greatest(self, hypothesis: Hypothesis) -> float:
+        """The same of the set with one more effect that leaves nothing."""
+        return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
+
+
 def own_gain(problem: Problem, point: Point) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
     return float(OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
@@ -167,11 +194,14 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
     )
 
 
-def with_forms(found: Sequence[Hypothesis], least: float, count: int = FREED_HYPOTHESES) -> list[Hypothesis]:
+def with_forms(
+    found: Sequence[Hypothesis], gap: Misfit, least: float, count: int = FREED_HYPOTHESES
+) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a good part open.
 
     Args:
         found: fitted hypotheses.
+        gap: what the nominal model leaves.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
         count: how many of the best are tried with free forms.
 
@@ -179,21 +209,21 @@ def with_forms(found: Sequence[Hypothesis], least: float, count: int = FREED_HYP
         All hypotheses, best first.
     """
     ranked = sorted(found, key=lambda h: h.fit.total)
-    freed = [_freed_if_it_pays(h, least) for h in ranked[:count]]
+    freed = [_freed_if_it_pays(h, gap, least) for h in ranked[:count]]
     return sorted([*freed, *ranked[count:]], key=lambda h: h.fit.total)
 
 
-def _freed_if_it_pays(hypothesis: Hypothesis, least: float) -> Hypothesis:
-    """The hypothesis with its forms free, where they close enough; else as it is."""
+def _freed_if_it_pays(hypothesis: Hypothesis, gap: Misfit, least: float) -> Hypothesis:
+    """The hypothesis with its forms free where it then has more weight; else as it is."""
     fitted = hypothesis.fit
     freed = _free_forms(fitted) if fitted.excess > least else None
     if freed is None:
         return hypothesis
-    needed = _forms_that_matter(freed, (1.0 - FORM_SHARE) * fitted.excess * fitted.count)
+    needed = _forms_that_matter(freed, FORM_SHARE * fitted.excess * fitted.count)
     if needed and needed != freed.problem.free_forms:
         freed = _free_forms(fitted, only=needed) or freed
     found = Hypothesis(hypothesis.effects, freed, fitted)
-    return found if freed.excess < FORM_SHARE**found.forms * fitted.excess else hypothesis
+    return max(hypothesis, found, key=Scale.of((hypothesis, found), gap).weight)
 
 
 def _forms_that_matter(freed: Fit, least: float) -> tuple[str, ...]:

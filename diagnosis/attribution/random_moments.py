@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.attribution.decide import FittedSet, log_weight
-from diagnosis.attribution.grow import Scale, grow, sets_with_one_more
-from diagnosis.attribution.hypothesis import Hypothesis, restricted
+from diagnosis.attribution.grow import grow, sets_with_one_more
+from diagnosis.attribution.hypothesis import Hypothesis, Scale, restricted
 from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import ProcessNoise, random_moments, with_response
-from diagnosis.fitting.channels import misfit
+from diagnosis.fitting.channels import Misfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
+from diagnosis.fitting.normal_equations import by_run
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import starting_points
@@ -55,8 +56,8 @@ class RandomAnswer:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects, sorted."""
-        return tuple(sorted((self.kind.name, *(() if self.beside is None else self.beside.effects))))
+        """Names of the effects, sorted; once where an effect acts steadily and at random."""
+        return tuple(sorted({self.kind.name, *(() if self.beside is None else self.beside.effects)}))
 
 
 def weigh_random_moments(
@@ -87,11 +88,32 @@ def weigh_random_moments(
         if process is not None:
             kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
-            left = FittedSet(
-                (kind.name, *seen.effects), share, share * misfit(nominal).excess, seen.further_numbers
-            )
+            names = tuple(dict.fromkeys((kind.name, *seen.effects)))
+            left = FittedSet(names, share, share * misfit(nominal).excess, seen.further_numbers)
             return [RandomAnswer(kind, process, seen if seen.effects else None, left)]
     return []
+
+
+def without_the_random_moment(
+    answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: Misfit
+) -> list[Hypothesis]:
+    """The sets beside random moments fitted with the sensor's noise alone: what they leave may be no random moment.
+
+    Args:
+        known: fitted sets.
+        gap: what the nominal model leaves.
+
+    Returns:
+        All sets; of two with the same effects that of more weight.
+    """
+    found = {hypothesis.names: hypothesis for hypothesis in known}
+    for answer in answers:
+        if answer.beside is not None:
+            with suppress(FitError, np.linalg.LinAlgError):
+                alone = replace(answer.beside, fit=fit(answer.beside.fit.problem, answer.beside.fit.point))
+                both = [alone] if alone.names not in found else [found[alone.names], alone]
+                found[alone.names] = max(both, key=Scale.of(both, gap).weight)
+    return list(found.values())
 
 
 def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
@@ -101,12 +123,26 @@ def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) ->
     """
     yield _seen_in(top, data)
     for _ in range(_FURTHER):
-        larger = sets_with_one_more([top], [kind for kind in kinds if not kind.line], None)
-        best = min(larger, key=lambda h: h.fit.total, default=top)
-        if top.fit.total - best.fit.total < NEEDLESS_CHI2 or len(top.effects) >= MOST_CAUSES:
+        further = _evident(top, kinds)
+        if not further:
             return
-        top = best
+        top = further[0]
         yield _seen_in(top, data)
+
+
+def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
+    """The set with one more effect that is evident beside the random moment, the most evident first.
+
+    The noise is estimated from the residuals themselves, and no real spectrum has its form. So the scatter between
+    the runs says how much of a fall of χ² is chance.
+    """
+    if len(top.effects) >= MOST_CAUSES:
+        return []
+    able = {kind.name: kind for kind in kinds if not kind.line}
+    larger = sets_with_one_more([top], list(able.values()), None)
+    gains = [(top.fit.total - h.fit.total) / overdispersion(h.fit, able[h.effects[-1]]) for h in larger]
+    order = sorted(range(len(larger)), key=lambda i: -gains[i])
+    return [larger[i] for i in order if gains[i] > NEEDLESS_CHI2]
 
 
 def _may_act(best: Hypothesis, scale: Scale, spectra: Collection[str]) -> bool:
@@ -133,6 +169,27 @@ def wind_off_excess(fit: Fit) -> float:
         if not run.wind_on
     ]
     return float(np.mean(off)) if off else 0.0
+
+
+def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
+    """Variance of an effect's parameters over what independent noise would give, 1 or more.
+
+    Args:
+        fitted: with the effect.
+
+    Returns:
+        From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs
+        as clusters; Liang and Zeger, Biometrika 73 (1986) 13), the mean over the parameters.
+    """
+    matrices, gradients, _ = by_run(fitted.jacobian, fitted.residuals, products=fitted.products)
+    own = [i for i, name in enumerate(fitted.problem.names) if name.split(".")[0] == kind.name]
+    total = matrices.sum(axis=0)
+    size = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    inverse = np.linalg.pinv(total / np.outer(size, size), rcond=1e-12)
+    scatter = (gradients / size).T @ (gradients / size) * len(gradients) / max(len(gradients) - 1, 1)
+    robust = (inverse @ scatter @ inverse)[np.ix_(own, own)]
+    naive = inverse[np.ix_(own, own)]
+    return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
 def _likeliest(tried: Sequence[ProcessNoise]) -> ProcessNoise | None:
@@ -178,18 +235,16 @@ def _settled(
 def _with_more_of_the_wind(top: Hypothesis, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
     """The set, and those with one, two, … more effects, as long as one of the wind is evident in the noise.
 
-    A random moment leaves little of a gap in the wind for effects to be compared there. Of all effects the one that
-    lowers χ² most is added, so that none of the wind mops up what another leaves.
+    A random moment leaves little of a gap in the wind for effects to be compared there. Of all effects the most
+    evident one is added, so that none of the wind mops up what another leaves.
     """
-    able = [kind for kind in kinds if not kind.line]
-    windy = {kind.name for kind in able if kind.condition == "wind_on"}
+    windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
     while True:
         yield top
-        larger = sorted(sets_with_one_more([top], able, None), key=lambda h: h.fit.total)
-        evident = [h for h in larger if top.fit.total - h.fit.total > NEEDLESS_CHI2]
-        if len(top.effects) >= MOST_CAUSES or not any(h.effects[-1] in windy for h in evident):
+        further = _evident(top, kinds)
+        if not any(h.effects[-1] in windy for h in further):
             return
-        top = evident[0]
+        top = further[0]
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:

@@ -35,7 +35,7 @@ def samples(fit: Fit) -> int:
 
 
 def repeated(
-    fit: Fit, white: Mapping[str, float], step: float, count: int
+    fit: Fit, white: Mapping[str, float], step: float, count: int, levels: Array | None = None
 ) -> Iterator[tuple[RunData, Array, Array]]:
     """Read the fitted motion again, with white noise and a lattice of unknown origin.
 
@@ -43,6 +43,8 @@ def repeated(
         white: standard deviation of a sample's noise before rounding, rad, by run id.
         step: of the lattice, rad; 0 where there is none.
         count: of the repetitions.
+        levels: readings that occur where steps are of unequal width, increasing, shape (levels,), rad; None: the
+            step is the same everywhere.
 
     Yields:
         Every run with the samples of its motion, shape (n,), and of the readings, shape (count, n), rad.
@@ -52,10 +54,16 @@ def repeated(
         motion = _motion(run.reading - run.unscaled(residual), run)
         reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
         if step > 0.0:
-            shift = step * rng.uniform(size=(count, 1))
+            shift = step * rng.uniform(size=(count, 1)) if levels is None else 0.0
             # back to the angle: the origin belongs to the lattice, not to the motion
-            reading = step * np.round((reading + shift) / step) - shift
+            reading = _rounded(reading + shift, step, levels) - shift
         yield run, motion, reading
+
+
+def _rounded(values: Array, step: float, levels: Array | None) -> Array:
+    if levels is None:
+        return np.asarray(step * np.round(values / step), np.float64)
+    return np.asarray(levels[np.searchsorted(0.5 * (levels[1:] + levels[:-1]), values)], np.float64)
 
 
 def _motion(blocks: Array, run: RunData) -> Array:
@@ -66,13 +74,16 @@ def _motion(blocks: Array, run: RunData) -> Array:
     return np.asarray(CubicSpline(run.times[seen], blocks[seen])(run.sample_times), np.float64)
 
 
-def rounding_errors(fit: Fit, white: Mapping[str, float], step: float) -> list[Array] | None:
+def rounding_errors(
+    fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None
+) -> list[Array] | None:
     """What noise and rounding alone leave in the block means.
 
     Args:
         fit: gives the motion.
         white: standard deviation of a sample's noise before rounding, rad, by run id.
         step: of the lattice, rad.
+        levels: as `repeated` takes them.
 
     Returns:
         By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
@@ -81,7 +92,7 @@ def rounding_errors(fit: Fit, white: Mapping[str, float], step: float) -> list[A
     if min(white.values()) > _BLURS * step:
         return None
     count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
-    return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count)]
+    return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count, levels)]
 
 
 def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:

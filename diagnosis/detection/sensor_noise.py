@@ -260,6 +260,23 @@ def lattice_step(campaign: Campaign) -> float:
     return step if np.median(np.abs(multiples - np.round(multiples))) < _OFF_LATTICE else 0.0
 
 
+def reading_levels(campaign: Campaign) -> Array:
+    """The readings that occur, in increasing order, shape (levels,), rad; those a rounding error apart are one."""
+    found = np.unique(np.concatenate([run.record.yaw_rad for run in campaign.runs]))
+    apart = np.diff(found) > _OFF_LATTICE * reading_step(campaign)
+    return np.asarray(found[np.concatenate([[True], apart])], np.float64)
+
+
+def typical_step(levels: Array) -> float:
+    """The step of equal width whose rounding has the same power, rad.
+
+    Args:
+        levels: as `reading_levels` gives them, two or more.
+    """
+    widths = np.diff(levels)
+    return float(np.sqrt(np.sum(widths**3) / np.sum(widths)))
+
+
 def _gaps(campaign: Campaign) -> list[Array]:
     """Differences between neighbouring distinct readings, by run, rad; runs of a single reading are left out."""
     gaps = [np.diff(np.unique(run.record.yaw_rad)) for run in campaign.runs]

@@ -52,6 +52,17 @@ def normal_equations(
         Matrix (common, common), gradient (common,), and the (runs, own, common + 1) solutions that give the
         releases' steps: release = solution[:, -1] − solution[:, :-1] @ common step.
     """
+    matrices, gradients, solutions = by_run(jacobian, residuals, damping, products)
+    return matrices.sum(axis=0), gradients.sum(axis=0), solutions
+
+
+def by_run(
+    jacobian: list[tuple[Array, Array]],
+    residuals: list[Array],
+    damping: float = 0.0,
+    products: Products | None = None,
+) -> tuple[Array, Array, Array]:
+    """As `normal_equations`, before the sum over the runs: shapes (runs, common, common) and (runs, common)."""
     known = Products.of(jacobian) if products is None else products
     columns = list(zip(jacobian, residuals, strict=True))
     seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
@@ -60,9 +71,8 @@ def normal_equations(
     ridge = known.own / (size[:, :, None] * size[:, None, :]) + (1e-12 + damping) * np.eye(size.shape[1])
     solutions = np.linalg.solve(ridge, cross / size[:, :, None]) / size[:, :, None]
     absorbed = np.swapaxes(cross[:, :, :-1], 1, 2) @ solutions
-    matrix = np.sum(known.common - absorbed[:, :, :-1], axis=0)
-    gradient = np.sum(np.stack([common.T @ r for (common, _), r in columns]) - absorbed[:, :, -1], axis=0)
-    return matrix, gradient, solutions
+    seen_common = np.stack([common.T @ r for (common, _), r in columns])
+    return known.common - absorbed[:, :, :-1], seen_common - absorbed[:, :, -1], solutions
 
 
 def damped_step(

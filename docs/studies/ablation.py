@@ -5,7 +5,11 @@ Every number that decides is moved by a factor of two either way, or switched of
 - the constants of the weighing (decision 0007) on the fits that are there: the sets are only weighed again;
 - any other constant of `diagnosis.policy` by whole diagnoses, which takes as long as they do.
 
-    python -m docs.studies.ablation SET [--count N] [--rerun NAME ...]
+    python -m docs.studies.ablation SET [--count N] [--rerun NAME ...] [--odds] [--search]
+
+``--odds`` fits the constants of the odds against ``unknown`` to the same fits: it maximises the probability of the
+truth, and of ``unknown`` where a true effect is withheld. ``--search`` says of every wrong answer whether the
+search missed the truth or the answer weighs more: the true set is fitted alone.
 
 SET is made by ``tunnel blind make``; its key is opened, so that it is no blind test any more. The table says how
 many answers are exact, how many causes named are false, the mean logarithm of the probability of the truth, and how
@@ -18,11 +22,12 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import minimize
 
 from diagnosis import diagnose, policy
 from diagnosis import investigate as investigation
@@ -30,8 +35,10 @@ from diagnosis.attribution import decide
 from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
 from diagnosis.fitting.channels import Misfit
 from diagnosis.policy import DECIDED_FROM
+from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 WEIGHING = (
     "STEEPNESS",
@@ -50,6 +57,9 @@ WEIGHING = (
 """Constants that only weigh fits."""
 FACTORS = (0.0, 0.5, 2.0)
 """By which each is multiplied; 0 switches it off."""
+
+ODDS = ("UNKNOWN_AT", "UNKNOWN_GAP", "UNKNOWN_LEFT", "UNKNOWN_CLOSED")
+_LEAST = 0.02  # of a probability: what is certain and wrong must not decide alone
 
 Names = tuple[str, ...]
 
@@ -165,29 +175,41 @@ def changed(name: str, factor: float) -> Iterator[None]:
             setattr(module, name, value)
 
 
-def read_case(folder: Path, truth: Sequence[str], small: Sequence[str]) -> Case:
-    """Diagnose a campaign, and keep the sets that are weighed last.
-
-    Args:
-        folder: of the campaign.
-        truth: names of the effects that act and matter.
-        small: names of those that act and need not be found.
-    """
-    seen: list[tuple[Sequence[FittedSet], Misfit]] = []
+@contextmanager
+def _weighings(seen: list[tuple[Sequence[FittedSet], Misfit]]) -> Iterator[None]:
+    """Keep what is weighed meanwhile."""
     weigh = decide.weigh
 
     def kept(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
         seen.append((sets, nominal))
         return weigh(sets, nominal)
 
-    given = Case(tuple(sorted(truth)), frozenset(small))
     investigation.weigh = kept  # type: ignore[attr-defined]
     try:
-        found = diagnose(read_campaign(folder))
-    except TunnelError:
-        return replace(given, causes=("refused",))
+        yield
     finally:
         investigation.weigh = weigh  # type: ignore[attr-defined]
+
+
+def read_case(
+    folder: Path, truth: Sequence[str], small: Sequence[str], only: Sequence[str] | None = None
+) -> Case:
+    """Diagnose a campaign, and keep the sets that are weighed last.
+
+    Args:
+        folder: of the campaign.
+        truth: names of the effects that act and matter.
+        small: names of those that act and need not be found.
+        only: names of the effects to try; None: all.
+    """
+    seen: list[tuple[Sequence[FittedSet], Misfit]] = []
+    given = Case(tuple(sorted(truth)), frozenset(small))
+    kinds = None if only is None else [effect_class(name) for name in only]
+    try:
+        with _weighings(seen):
+            found = diagnose(read_campaign(folder), kinds=kinds)
+    except TunnelError:
+        return replace(given, causes=("refused",))
     read_off = tuple(set(found.causes) & {"mains_hum", "sensor_quantisation"})
     if not seen or (found.causes == UNKNOWN and found.candidates[0].probability > 0.99):
         return replace(given, causes=tuple(found.causes), read_off=read_off)
@@ -202,9 +224,60 @@ def read_cases(folder: Path, count: int) -> list[Case]:
         folder: of the set, with its key.
         count: of campaigns.
     """
+    return [read_case(folder / name, effects, small) for name, effects, small in _truths(folder, count)]
+
+
+def _truths(folder: Path, count: int) -> list[tuple[str, list[str], list[str]]]:
+    """Name, effects and small effects of the first campaigns."""
     truths = json.loads((folder / "key.json").read_text("utf-8"))["truths"]
-    folders = sorted(path.parent for path in folder.glob("*/campaign.toml"))[:count]
-    return [read_case(f, truths[f.name]["effects"], truths[f.name]["small"]) for f in folders]
+    names = sorted(path.parent.name for path in folder.glob("*/campaign.toml"))[:count]
+    return [(name, truths[name]["effects"], truths[name]["small"]) for name in names]
+
+
+def fitted_odds(cases: Sequence[Case]) -> dict[str, float]:
+    """The constants of the odds against ``unknown`` under which the truth is most probable.
+
+    Args:
+        cases: whose sets are weighed again, with all effects and without each true one in turn.
+    """
+    start = [getattr(policy, name) for name in ODDS]
+
+    def loss(values: Array) -> float:
+        with ExitStack() as stack:
+            for name, value, before in zip(ODDS, values, start, strict=True):
+                stack.enter_context(changed(name, float(value) / before))
+            return -sum(_log_probability(case) for case in cases if case.nominal is not None)
+
+    found = minimize(loss, start, method="Nelder-Mead", options={"xatol": 0.01, "fatol": 0.01})
+    return dict(zip(ODDS, found.x.tolist(), strict=True))
+
+
+def _log_probability(case: Case) -> float:
+    """Of the truth, and half of that of ``unknown`` with every true effect withheld in turn."""
+    right = sum(p for names, p in case.answers() if case.right(names))
+    total = float(np.log(max(right, _LEAST)))
+    if case.truth != UNKNOWN:
+        for effect in set(case.truth) - set(case.read_off):
+            total += 0.5 * float(np.log(max(dict(case.answers(effect))[UNKNOWN], _LEAST)))
+    return total
+
+
+def misses(folder: Path, count: int) -> Iterator[str]:
+    """A line for every wrong answer: whether the search or the weighing missed the truth.
+
+    Args:
+        folder: of the set.
+        count: of campaigns.
+    """
+    for name, effects, small in _truths(folder, count):
+        case = read_case(folder / name, effects, small)
+        answer = case.answers()[0][0]
+        if case.right(answer) or case.truth == UNKNOWN or case.nominal is None or not case.truth:
+            continue
+        alone = read_case(folder / name, effects, small, only=case.truth)
+        both = replace(case, sets=(*case.sets, *alone.sets))
+        why = "the search missed it" if both.right(both.answers()[0][0]) else "the answer weighs more"
+        yield f"{name}: {' + '.join(case.truth)}; answered {' + '.join(answer) or 'none'}; {why}"
 
 
 def table(folder: Path, count: int, rerun: Sequence[str]) -> Iterator[str]:
@@ -234,7 +307,19 @@ def main() -> None:
     reader.add_argument("set", type=Path, help="folder made by tunnel blind make")
     reader.add_argument("--count", type=int, default=100, help="campaigns, from the first")
     reader.add_argument("--rerun", nargs="*", default=(), help="further constants, by whole diagnoses")
+    reader.add_argument("--odds", action="store_true", help="fit the odds against unknown instead")
+    reader.add_argument(
+        "--search", action="store_true", help="say of wrong answers what missed the truth instead"
+    )
     given = reader.parse_args()
+    if given.odds:
+        print(
+            *(f"{n} = {v:.3g}" for n, v in fitted_odds(read_cases(given.set, given.count)).items()), sep="\n"
+        )
+        return
+    if given.search:
+        print(*misses(given.set, given.count), sep="\n")
+        return
     for line in table(given.set, given.count, given.rerun):
         print(line, flush=True)
 

@@ -232,13 +232,13 @@ def test_a_second_mode_near_the_motion_of_one_spring_is_found_beside_that_of_the
 def test_of_several_forms_only_those_that_matter_are_freed() -> None:
     """The friction is the textbook's, though it has a form too."""
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
-    spring = effect_from("asymmetric_stiffness", {"coefficient": -0.05, "exponent": 1.2})
+    spring = effect_from("asymmetric_stiffness", {"coefficient": -0.2, "exponent": 1.2})
     base = nominal(campaign(friction, spring))
     whole = grow(base, [type(friction), type(spring)])[0]
     kept = Hypothesis(
         whole.effects, fit(replace(whole.fit.problem, free_forms=()), textbook_point(whole.fit))
     )
-    (freed,) = with_forms([kept], 0.0)
+    (freed,) = with_forms([kept], misfit(base), 0.0)
     assert freed.fit.problem.free_forms == ("asymmetric_stiffness",)
     assert freed.textbook is kept.fit
     assert within_noise(freed.fit)

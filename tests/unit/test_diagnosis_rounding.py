@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from diagnosis.detection.rounding import rounding_errors, with_rounding
-from diagnosis.detection.sensor_noise import campaign_noise, lattice_step, reading_step
+from diagnosis.detection.sensor_noise import (
+    campaign_noise,
+    lattice_step,
+    reading_levels,
+    reading_step,
+    typical_step,
+)
+from diagnosis.fitting.channels import misfit
 from diagnosis.fitting.prepare import prepare
-from diagnosis.investigate import fit_nominal
+from diagnosis.investigate import fit_nominal, investigate
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 from tests.unit.gap_campaigns import judged
@@ -79,3 +86,31 @@ def test_only_readings_on_a_lattice_have_its_step(step):
     assert lattice_step(printed) == pytest.approx(DEGREE, rel=0.06)
     assert lattice_step(decays(200.0, None, noise=4e-4)) == 0.0
     assert lattice_step(decays(200.0, None, noise=0.0)) == 0.0
+
+
+def coarse(rate=500.0, noise=4e-4):
+    """A lattice with steps of 0.8 and 1.6 degrees in turn, far coarser than stated."""
+
+    def readings(_time, yaw):
+        levels = DEGREE * np.cumsum(np.tile([0.8, 1.6], 60))
+        levels -= levels.mean()
+        return levels[np.searchsorted(0.5 * (levels[1:] + levels[:-1]), yaw)]
+
+    return with_records(decays(rate, 4e-4, noise=noise, duration=6.0), readings)
+
+
+def test_the_typical_step_has_the_power_of_the_uneven_ones():
+    """Truth: an angle anywhere is off by w²/12 in a step of width w, and is there in proportion to w."""
+    levels = reading_levels(coarse(noise=1e-6))
+    anywhere = np.linspace(levels[0], levels[-1], 100_001)
+    nearest = levels[np.argmin(np.abs(anywhere[:, None] - levels), axis=1)]
+    assert np.mean((anywhere - nearest) ** 2) == pytest.approx(typical_step(levels) ** 2 / 12.0, rel=0.02)
+
+
+def test_a_coarse_lattice_of_uneven_steps_is_the_only_cause():
+    """What the lattice leaves by itself in each channel does not count against it."""
+    found = investigate(coarse())
+    assert found.causes == ("sensor_quantisation",)
+    assert found.weighed[0].probability > 0.5
+    nominal = misfit(found.nominal)
+    assert nominal.excess.max() > 10.0 * np.sqrt(2.0 * nominal.count.max())  # it is a gap

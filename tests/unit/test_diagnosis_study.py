@@ -14,8 +14,7 @@ from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.detection.mains import Hum
-from diagnosis.investigate import _noise_explains, _polished, _read_off_explains
-from diagnosis.policy import COARSE_STEP_POWER, HUM_LEFT
+from diagnosis.investigate import _noise_explains, _polished
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -130,16 +129,3 @@ def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
     left = _left(excess, block, test=SimpleNamespace(noisy=noisy))
     assert _noise_explains(left, OPEN) is explains
     assert not _noise_explains(left, [*OPEN, Weighed(("dropped_samples",), 0.02, 0.9)])
-
-
-@pytest.mark.parametrize("block", [1, 4])
-def test_what_is_read_off_explains_no_more_than_it_leaves_by_itself(block: int) -> None:
-    """The power of a coarse step's error is step²/12: 0.75 noise variances here."""
-    step = 3e-3
-    power = step**2 / 12.0 / LEVEL
-    assert _read_off_explains(_left(0.9 * COARSE_STEP_POWER * power, block, coarse=True, step=step))
-    assert not _read_off_explains(_left(1.1 * COARSE_STEP_POWER * power, block, coarse=True, step=step))
-    assert not _read_off_explains(_left(0.1 * power, block, step=step))  # a step as fine as stated
-    hum = Hum(50.0, 1e-4, 1e-6, None, 2.0)
-    assert _read_off_explains(_left(0.9 * HUM_LEFT * 2.0, block, hum=hum))
-    assert not _read_off_explains(_left(1.1 * HUM_LEFT * 2.0, block, hum=hum))

@@ -1,0 +1,52 @@
+"""How much of an effect's evidence the scatter between the runs leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.attribution.random_moments import overdispersion
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.problem import Problem
+from diagnosis.fitting.starting_points import starting_points
+from tests.unit.gap_campaigns import campaign, nominal
+from tunnel_sim.effects import effect_class, effect_from
+
+KIND = effect_class("quadratic_damping")
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """Six runs with quadratic damping, and the effect fitted."""
+    base = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
+    start = starting_points(base, KIND)[0]
+    assert isinstance(start.problem, Problem)
+    return fit(start.problem, start.point)
+
+
+def drawn(fitted, rng, share):
+    """Residuals of white noise, and of a coefficient that scatters between the runs.
+
+    Args:
+        share: standard deviation of a run's own coefficient over that which the noise gives it in one run.
+    """
+    place = fitted.problem.names.index("quadratic_damping.coefficient")
+    residuals = []
+    for common, release in fitted.jacobian:
+        column = common[:, place]
+        alone = column - release @ np.linalg.lstsq(release, column, rcond=None)[0]
+        own = share * rng.normal() / np.sqrt(alone @ alone)
+        residuals.append(rng.normal(size=column.size) + own * column)
+    return replace(fitted, residuals=residuals)
+
+
+@pytest.mark.parametrize("share", [0.0, 5.0])
+def test_the_scatter_between_runs_is_told_from_that_of_the_noise(fitted, share):
+    """Truth: the variance is 1 + share² times that of the noise where one coefficient is free.
+
+    The model's own four coefficients take part of it, and six runs know it badly: a factor of two either way.
+    """
+    rng = np.random.default_rng(11)
+    found = [overdispersion(drawn(fitted, rng, share), KIND) for _ in range(200)]
+    assert 0.5 < np.mean(found) / (1.0 + share**2) < 2.0
+    assert min(found) >= 1.0
