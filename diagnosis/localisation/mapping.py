@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.similarity import Similarity
+from diagnosis.fitting.spectra import resonance
 from diagnosis.localisation.backbone import backbones
 from diagnosis.localisation.excess import (
     Profile,
@@ -29,8 +30,10 @@ _TIME_BINS = 60
 _AMPLITUDE_BINS = 40
 _FREQUENCY_BINS = 110  # of equal ratio, for the picture
 _FINE_BINS = 1500  # of equal width, for the interval
-_TRACES = 16  # runs
-_TRACE_POINTS = 600
+_TRACE_POINTS = 20_000  # of all runs together
+_LEAST_POINTS = 200  # of a run
+_CYCLE_POINTS = 24  # of a cycle
+_SHOWN_CYCLES = 6  # in which the models differ most
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         backbones=tuple(backbones(nominal, [run.start for run in nominal.problem.data.runs])),
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, None, excesses),
+        unit=similarity.reading,
     )
     interval = _frequency_interval(excesses)
     if interval is not None:
@@ -265,13 +269,16 @@ def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None
 
 def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
     times = _times(nominal)
-    order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)[:_TRACES]
-    return tuple(_trace(nominal, best, i, times[i]) for i in order)
+    order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)
+    most = max(_LEAST_POINTS, _TRACE_POINTS // len(order))
+    return tuple(_trace(nominal, best, i, times[i], most) for i in order)
 
 
-def _trace(nominal: Fit, best: Fit | None, index: int, times: Array) -> Trace:
+def _trace(nominal: Fit, best: Fit | None, index: int, times: Array, most: int) -> Trace:
     run = nominal.problem.data.runs[index]
-    group = max(1, -(-run.reading.size // _TRACE_POINTS))
+    frequency = resonance(nominal, index)
+    enough = int(1.0 / (_CYCLE_POINTS * frequency * run.interval))  # more points show no more of a cycle
+    group = max(1, min(enough, run.reading.size // _LEAST_POINTS), -(-run.reading.size // most))
     count = run.reading.size // group
     std = run.noise_std
 
@@ -279,8 +286,31 @@ def _trace(nominal: Fit, best: Fit | None, index: int, times: Array) -> Trace:
         grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
         return grouped
 
-    time = means(times)
-    after = None if best is None else means(run.unscaled(best.residuals[index]))
-    return Trace(
-        run.id, time, means(run.unscaled(nominal.residuals[index])), after, std / float(np.sqrt(group))
+    filled = (
+        np.full(count, True) if run.samples is None else means(run.samples.count.astype(np.float64)) > 0.0
     )
+    time, reading, before = (
+        means(values)[filled] for values in (times, run.reading, run.unscaled(nominal.residuals[index]))
+    )
+    after = None if best is None else means(run.unscaled(best.residuals[index]))[filled]
+    return Trace(
+        run.id,
+        time,
+        reading,
+        before,
+        after,
+        std / float(np.sqrt(group)),
+        _most_energy(time, before if after is None else before - after, _SHOWN_CYCLES / frequency),
+    )
+
+
+def _most_energy(time: Array, difference: Array, length: float) -> tuple[float, float]:
+    """The stretch of a length, s, that holds the most of a difference's energy; the whole where that is shorter."""
+    first, last = float(time[0]), float(time[-1])
+    if last - first <= length:
+        return first, last
+    energy = np.concatenate([[0.0], np.cumsum(difference**2)])
+    ends = np.searchsorted(time, time + length, side="right")
+    whole = time <= last - length
+    start = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
+    return start, start + length

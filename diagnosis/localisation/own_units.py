@@ -62,9 +62,11 @@ def trace_in_own_units(trace: Trace, similarity: Similarity) -> Trace:
     return replace(
         trace,
         time=_times(trace.time, similarity),
+        reading=trace.reading * factor + similarity.rest,
         before=trace.before * factor,
         after=None if trace.after is None else trace.after * factor,
         noise_std=trace.noise_std * factor,
+        differ=(similarity.own(trace.differ[0], "s"), similarity.own(trace.differ[1], "s")),
     )
 
 

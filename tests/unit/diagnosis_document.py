@@ -157,10 +157,13 @@ def maps() -> dict[str, Any]:
             "unit": "N m",
             "runs": ["alpha", "gamma"],
         },
+        "unit": "rad",
         "traces": [
-            {"id": "alpha", "time_s": [0.0, 1.0, 2.0], "before_rad": [0.004, -0.003, 0.002],
+            {"id": "alpha", "time_s": [0.0, 1.0, 2.0], "reading_rad": [0.31, -0.26, 0.21],
+             "differ_s": [0.5, 2.0], "before_rad": [0.004, -0.003, 0.002],
              "after_rad": [0.0004, -0.0005, 0.0006], "noise_std_rad": 1e-4},
-            {"id": "gamma", "time_s": [0.0, 1.5, 3.0], "before_rad": [0.007, -0.006, 0.005],
+            {"id": "gamma", "time_s": [0.0, 1.5, 3.0], "reading_rad": [-0.29, 0.24, -0.19],
+             "differ_s": [0.0, 1.5], "before_rad": [0.007, -0.006, 0.005],
              "after_rad": None, "noise_std_rad": 1e-4},
         ],
     }  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
+from tests.unit.diagnosis_document import CONDITIONS, IDS, document
 from tests.unit.shown_numbers import assert_shows, numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
@@ -134,36 +134,6 @@ def test_closure_without_maps_and_without_causes(given: Document) -> None:
     noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
     assert noise.x1 == pytest.approx(0.03)
     assert len(axes.lines) == 1
-
-
-def test_traces(given: Document) -> None:
-    given["maps"]["traces"].append(given["maps"]["traces"][0] | {"id": "not there"})
-    fig = answer.traces_figure(given, campaign())
-    assert fig is not None
-    top, bottom = fig.axes[:2], fig.axes[2:]
-    runs = {run.id: run.record for run in campaign().runs}
-    for reading, residual, trace in zip(top, bottom, given["maps"]["traces"][:2], strict=True):
-        assert trace["id"] in reading.get_title(loc="left")
-        record, (line,) = runs[trace["id"]], reading.lines
-        shown = np.array(curve(line))
-        assert 700 < len(shown) <= 3000
-        assert np.allclose(np.interp(shown[:, 0], record.time_s, record.yaw_rad), shown[:, 1])
-        drawn = [np.array(curve(line)) for line in residual.lines]
-        wanted = [trace[key] for key in ("before_rad", "after_rad") if trace[key] is not None]
-        assert len(drawn) == len(wanted)
-        for values, rows in zip(wanted, drawn, strict=True):
-            assert rows[:, 0].tolist() == trace["time_s"]
-            assert rows[:, 1] == pytest.approx([1e3 * value for value in values])
-    given["maps"]["traces"] = []
-    assert answer.traces_figure(given, campaign()) is None
-
-
-def test_a_trace_starts_at_zero(given: Document) -> None:
-    data = campaign()
-    object.__setattr__(data.runs[0].record, "time_s", data.runs[0].record.time_s + 5.0)
-    fig = answer.traces_figure(given, data)
-    assert fig is not None
-    assert fig.axes[0].lines[0].get_xdata()[0] == 0.0
 
 
 def test_intervals_of_the_coefficients(given: Document) -> None:

@@ -256,10 +256,10 @@ def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
         write_report(document | {"maps": None}, data, tmp_path / "nowhere" / "report.html")
 
 
-def test_every_figure_is_described(document, data):
-    without_maps = diagnosis_figures(document | {"maps": None}, data)
+def test_every_figure_is_described(document):
+    without_maps = diagnosis_figures(document | {"maps": None})
     assert list(without_maps) == ["waterfall", "which", "how-far", "law", "coefficients"]
-    assert list(diagnosis_figures(document, data)) == list(DESCRIPTIONS)
+    assert list(diagnosis_figures(document)) == list(DESCRIPTIONS)
 
 
 def test_figures_take_the_colours_of_the_theme(page):

@@ -87,9 +87,22 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     Raises:
         TunnelError: when it is missing, is not JSON, or is not a diagnosis.
     """
+    return validate(Document, read_document(path), path).model_dump()
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """Read the whole document of a diagnosis, of which only the fields that are compared are checked.
+
+    Args:
+        path: a file that ``tunnel diagnose --json`` wrote.
+
+    Raises:
+        TunnelError: as for `read_diagnosis`.
+    """
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
-    return validate(Document, document, path).model_dump()
+    validate(Document, document, path)
+    return document
 
 
 class DiagnosisDocument(Document):

@@ -135,16 +135,23 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     text = buffer.getvalue()
     for pattern in _NOT_HTML:
         text = pattern.sub("", text)
-    text = _TAG.sub(lambda match: _in_page(match[0], name), text)
+    ids: dict[
+        str, str
+    ] = {}  # numbered: matplotlib's are hashes of places, which the layout finds to rounding only
+    text = _TAG.sub(lambda match: _in_page(match[0], name, ids), text)
     text = _OPENING.sub(lambda match: _SIZE.sub("", match[0]), text, count=1)
     label = description.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
     return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
 
 
-def _in_page(tag: str, name: str) -> str:
-    """A tag with ids that are unique in the page, and with colours of the theme."""
-    tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
-    tag = _REFERENCE.sub(rf"\1{name}-\2", tag)
+def _in_page(tag: str, name: str, ids: dict[str, str]) -> str:
+    """A tag with ids that are unique in the page, by matplotlib's in ``ids``, and with colours of the theme."""
+
+    def own(given: str) -> str:
+        return ids.setdefault(given, f"{name}-{len(ids)}")
+
+    tag = _ID.sub(lambda match: f'id="{own(match[1])}"', _NAMES.sub("", tag))
+    tag = _REFERENCE.sub(lambda match: match[1] + own(match[2]), tag)
     return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", tag)
 
 

@@ -23,7 +23,6 @@ from tunnel_lab.plotting.style import (
     limit_to_known,
     log_axis,
     styled,
-    with_breaks,
 )
 from tunnel_lab.report import where
 from tunnel_lab.report.drawing import (
@@ -36,14 +35,13 @@ from tunnel_lab.report.drawing import (
     PAPER,
     QUIET,
     SIGMAS,
-    SOFT,
     Document,
     array,
     drawn_label,
     faded,
     noise_axis,
 )
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_lab.report.fit import fit_figure
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -52,7 +50,6 @@ if TYPE_CHECKING:
 
 SHOWN = 8
 """Most answers drawn."""
-_DRAWN_TRACES = 2
 _LABEL = 40  # characters in a line of a label
 _LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
 _MOST_CURVES = len(COLOURS)
@@ -62,7 +59,7 @@ _STEP_LABEL = 20  # characters in a line of a label
 _LEAST_STEP_NOISE = 1e-3  # noise powers: where the document has no maps, and so no noise of an excess
 
 
-def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figure]:
+def diagnosis_figures(document: Document) -> dict[str, Figure]:
     """All figures of a diagnosis.
 
     Args:
@@ -73,6 +70,7 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
     """
     figures: dict[str, Figure | None] = {"waterfall": waterfall_figure(document)}
     if document.get("maps"):
+        figures["fit"] = fit_figure(document)
         figures["where-runs"] = where.runs_figure(document)
         figures["where-profiles"] = where.profiles_figure(document)
         figures["where-spectrum"] = where.spectrum_figure(document)
@@ -81,8 +79,6 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
         figures["where-moment"] = where.moment_figure(document)
     figures["which"] = candidates_figure(document)
     figures["how-far"] = closure_figure(document)
-    if document.get("maps"):
-        figures["residuals"] = traces_figure(document, campaign)
     figures["law"] = law_figure(document)
     figures["coefficients"] = coefficients_figure(document)
     return {name: figure for name, figure in figures.items() if figure is not None}
@@ -145,46 +141,6 @@ def closure_figure(document: Document) -> Figure:
     axes.invert_yaxis()
     fig.legend(loc="outside upper left", ncols=4)
     grid(axes)
-    return fig
-
-
-@styled
-def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
-    """Reading and residuals of the runs with the largest gap.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        A column per run: the reading above, the residual before and after below; None without traces.
-    """
-    traces = document["maps"]["traces"]
-    records = {run.id: run.record for run in campaign.runs}
-    traces = [trace for trace in traces if trace["id"] in records][:_DRAWN_TRACES]
-    if not traces:
-        return None
-    fig = figure(WIDTH, 3.8)
-    panels = fig.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.2))
-    for column, trace in enumerate(traces):
-        top, bottom = panels[0, column], panels[1, column]
-        record = records[trace["id"]]
-        thin = slice(None, None, max(1, record.yaw_rad.size // 1500))
-        time, reading = with_breaks(record.time_s[thin] - record.time_s[0], record.yaw_rad[thin])
-        top.plot(time, reading, color=SOFT, linewidth=0.7)
-        top.set_title(f"{figure_text(trace['id'])}: reading [rad]")
-        for name, colour, label in (
-            ("before_rad", BEFORE, "nominal model"), ("after_rad", AFTER, "with the causes")
-        ):  # fmt: skip
-            if trace[name] is not None:
-                when, residual = with_breaks(array(trace["time_s"]), 1e3 * array(trace[name]))
-                bottom.plot(when, residual, color=colour, linewidth=0.8, label=label)
-        bottom.set_title("residual [10⁻³ rad]")
-        bottom.set_xlabel("time since the start of the record [s]")
-        bottom.margins(x=0.01)
-        grid(top)
-        grid(bottom)
-    handles, labels = panels[1, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=2)
     return fig
 
 

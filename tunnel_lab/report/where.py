@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, grid, styled, with_breaks
+from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import (
     AFTER,
     BEFORE,
@@ -22,7 +22,6 @@ from tunnel_lab.report.drawing import (
     run_label,
     shade,
 )
-from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 _ANGLE, _RATE = "angle β [rad]", "rate β̇/ω [rad]"
 _UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 Chart = dict[str, Any]
-_POINTS = 1000  # of a reading: more than a screen shows
 _LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
 _ALL = "all runs together"
 
@@ -269,7 +267,7 @@ def _readable(plane: Document, size: Array) -> tuple[str, float]:
     return (f"10⁻³ {unit}", 1e3) if greatest < 0.1 else (unit, 1.0)
 
 
-def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
+def charts(document: Document) -> dict[str, list[Chart]]:
     """The charts of a diagnosis.
 
     Args:
@@ -284,8 +282,6 @@ def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
     by_figure = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
     if maps["phase_plane"] is not None:
         by_figure["where-phase-plane"] = [_plane(maps["phase_plane"])]
-    if traces := _traces(maps, campaign):
-        by_figure["residuals"] = traces
     return by_figure
 
 
@@ -298,7 +294,7 @@ def _runs(maps: Document) -> Chart:
         "x": {"label": "time since the start of the record [s]", "edges": maps["time"]["edges_s"]},
         "y": {"label": "run", "edges": np.arange(len(ids) + 1).tolist(), "names": ids},
         "labels": [run_label(run) for run in maps["runs"]],
-        "values": [_rounded(row) for row in cells],
+        "values": [rounded(row) for row in cells],
         "unit": "noise variances",
         "range": [low, high],
         "log": True,
@@ -313,7 +309,7 @@ def _plane(plane: Document) -> Chart:
         "title": "Missing moment",
         "x": {"label": "angle β [rad]", "edges": edges},
         "y": {"label": "rate β̇/ω [rad]", "edges": edges},
-        "values": [_rounded(row) for row in cells],
+        "values": [rounded(row) for row in cells],
         "unit": unit,
         "range": [-reach, reach],
         "log": False,
@@ -348,55 +344,15 @@ def _spectrum(maps: Document) -> Chart:
 def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
     """A view of the bins that hold a value; the others are empty, and a null there would break the curves."""
     filled = np.any(np.isfinite(excesses), axis=0)
-    power = (_rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
-    return _view(label, _rounded(centre[filled]), *power, run=run)
+    power = (rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
+    return view(label, rounded(centre[filled]), *power, run=run)
 
 
-def _traces(maps: Document, campaign: Campaign) -> list[Chart]:
-    """The reading and, below it on the same axis of time, the residuals."""
-    labels = {run["id"]: run_label(run) for run in maps["runs"]}
-    records = {run.id: run.record for run in campaign.runs}
-    readings, residuals = [], []
-    for trace in maps["traces"]:
-        if trace["id"] not in records:
-            continue
-        name, label = trace["id"], labels.get(trace["id"], str(trace["id"]))
-        record = records[name]
-        thin = slice(None, None, max(1, record.yaw_rad.size // _POINTS))
-        readings.append(
-            _broken(label, record.time_s[thin] - record.time_s[0], record.yaw_rad[thin], run=name)
-        )
-        before = 1e3 * array(trace["before_rad"])
-        after = (
-            np.full(before.size, np.nan) if trace["after_rad"] is None else 1e3 * array(trace["after_rad"])
-        )
-        residuals.append(_broken(label, array(trace["time_s"]), before, after, run=name))
-    if not readings:
-        return []
-    unit = campaign.sensor.unit
-    time_axis = {"label": "time since the start of the record [s]", "log": False}
-    series = [{"label": "nominal model", "role": "before"}, {"label": "with the causes", "role": "after"}]
-    return [
-        _lines("Reading", time_axis, unit, [{"label": "reading", "role": "soft"}], readings),
-        _lines("Residual", time_axis, f"10⁻³ {unit}", series, residuals),
-    ]
-
-
-def _lines(title: str, x: Chart, unit: str, series: list[Chart], views: list[Chart]) -> Chart:
-    y = {"label": f"{title.lower()} [{unit}]", "log": False}
-    return {"kind": "lines", "title": title, "x": x, "y": y, "series": series, "views": views}
-
-
-def _view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
+def view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
+    """The curves of a chart of lines that are shown together; ``run`` is the run they belong to."""
     return {"label": label, "run": run, "data": list(data)}
 
 
-def _broken(label: str, time: Array, *curves: Array, run: str) -> Chart:
-    """A view of curves over time, which break where samples are missing."""
-    when, *values = with_breaks(time, *curves)
-    return _view(label, _rounded(when, 6), *map(_rounded, values), run=run)
-
-
-def _rounded(values: Array, digits: int = 4) -> list[float | None]:
+def rounded(values: Array, digits: int = 4) -> list[float | None]:
     """Numbers for JSON, as many digits as a screen shows; null where a value is not known."""
     return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]

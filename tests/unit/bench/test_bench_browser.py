@@ -241,6 +241,18 @@ def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
             assert opened.page.get_by_label("reference length l [m]").input_value() == text
 
 
+def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench) -> None:
+    shutil.copytree(served.folder / "two", served.folder / "fitted")
+    session = Session(served.folder, "fitted")
+    _diagnosed(session)
+    with tab(browser, served) as one:
+        one.open("/fitted/diagnose")
+        fit = one.page.frame_locator('iframe[title="The fit over the data"]')
+        fit.locator(".uplot").nth(1).wait_for()
+        shown = fit.locator("select option").all_inner_texts()
+    assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
+
+
 PAGES = ("/", "/try", "/two/records", "/two/conditions", "/two/identify", "/two/diagnose", "/two/next-run")
 
 
