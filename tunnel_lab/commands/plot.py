@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -74,7 +75,7 @@ def run(
         raise typer.Exit(1)
 
 
-def _fit(path: Path, ids: list[str]) -> dict[str, Figure]:
+def _fit(path: Path, ids: Sequence[str]) -> dict[str, Figure]:
     """The pages of a diagnosis' fit, by name."""
     from tunnel_lab.report.diagnosis_file import read_document
     from tunnel_lab.report.fit import fit_pages

@@ -27,8 +27,11 @@ class _Estimate(Part):
     unit: OneLine
     bound: OneLine | None = None
     determined: bool = True
-    interval: tuple[float, float] | None = Field(
-        default=None, description="ends of the central interval of 0.95, where it is not value ± 1.96 std"
+    interval: list[float] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=2,
+        description="ends of the central interval of 0.95, where it is not value ± 1.96 std",
     )
 
 
