@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.answer.assemble import assemble
+from diagnosis.answer.cause_sizes import cause_sizes
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
 from diagnosis.answer.other_modes import second_modes
 from diagnosis.answer.own_units import in_own_units
@@ -117,7 +118,8 @@ def _diagnose(
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
     patched, unpatched = (None, ()) if model is None else _patched(study, model)
     assembled = assemble(study, where, maps, (*left_out, *unpatched), patched, known)
-    answer = in_own_units(replace(assembled, remarks=remarks), study.similarity)
+    sized = replace(assembled, remarks=remarks, sizes=cause_sizes(study) if study.named else ())
+    answer = in_own_units(sized, study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
     if progress is not None:

@@ -11,6 +11,7 @@ import polars as pl
 from diagnosis.closable import Closable
 from diagnosis.closure import Rest, Waterfall
 from diagnosis.decision import Decision, decision
+from diagnosis.misfit import Misfit
 from diagnosis.patch import PatchedModel
 from diagnosis.printing import diagnosis_parts
 from identification.printing.frames import wide_frame
@@ -22,7 +23,7 @@ SCHEMA_VERSION = 1
 HELD_OUT = "on runs held out of the fit"
 FITTED = "in the fitted runs (none could be held out)"
 _LAST = (
-    "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
+    "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
     "blind_spots", "cautions", "remarks", "seconds", "maps", "provenance",
 )  # fmt: skip
 
@@ -67,9 +68,10 @@ class RunGap:
 
     Args:
         id: of the run.
-        before: ratio of mean squared residual to noise variance, minus one, of the nominal model.
-        after: likewise with the causes added, predicted from the other runs where it could be held out.
-        held_out: whether it could; else ``after`` is that of the fit of all runs.
+        before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
+            the other runs where it could be held out.
+        after: likewise with the causes added.
+        held_out: whether it could; else both are those of the fits of all runs.
     """
 
     id: str
@@ -84,15 +86,16 @@ class GapSummary:
 
     Args:
         detected: whether the gap is beyond chance.
-        excess_before: of the nominal model, all runs, in units of the noise variance.
-        excess_after: with the causes added, on runs not used for the fit, as far as runs could be held out, in
-            units of the noise variance.
+        excess_before: of the nominal model, in units of the noise variance, on readings that are held out of the
+            fits; where nothing is found, in the fitted runs.
+        excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap closed, 0 to 1.
-        closed_on: what that was measured on, in words: runs held out; stretches of time where no run could be.
+        closed_on: what these are measured on, in words.
         runs: by run.
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
+        misfit: what turns an excess into a misfit of the readings.
     """
 
     detected: bool
@@ -104,23 +107,15 @@ class GapSummary:
     false_alarm_rate: float
     p_value: float
     tests: Mapping[str, float] = field(default_factory=dict)
+    misfit: Misfit | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name, and ``after_on`` before ``closed_on``."""
-        found: dict[str, Any] = {}
-        for name in self.__dataclass_fields__:
-            if name == "closed_on":
-                found["after_on"] = self.after_on
-            found[name] = as_json(getattr(self, name))
+        """Fields by name, and in ``misfit`` those of `Misfit` and the root mean squares before and after."""
+        found = {name: as_json(getattr(self, name)) for name in self.__dataclass_fields__}
+        if self.misfit is not None:
+            before, after = self.misfit.rms(self.excess_before), self.misfit.rms(self.excess_after)
+            found["misfit"] |= {"before": before, "after": after}
         return found
-
-    @property
-    def after_on(self) -> str:
-        """The runs that ``excess_after`` was measured on, in words."""
-        count = sum(run.held_out for run in self.runs)
-        if 0 < count < len(self.runs):
-            return f"in all runs, {count} of {len(self.runs)} held out of the fit"
-        return HELD_OUT if count else FITTED
 
 
 @dataclass(frozen=True)
@@ -164,6 +159,38 @@ class Candidate:
     excess_after: float
     closed: float
     parameters: Mapping[str, ParameterEstimate] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CauseSize:
+    """What a cause does to three cycles of a swing, by the fitted model with it and without it.
+
+    Args:
+        effect: its name.
+        run: id of the run whose conditions are taken.
+        amplitude: of the release, rad.
+        damping_ratio: with the cause, dimensionless.
+        damping_ratio_without: with every cause but this one, dimensionless.
+        frequency_change: of the natural frequency by the cause, a fraction.
+        zero_change: of the middle of the swing by the cause, in the unit of the readings.
+        reading_change: root mean square of the change of the reading, in its unit.
+        stands: angle from rest within which the cause holds a body that has stopped, rad; 0 where it holds none.
+    """
+
+    effect: str
+    run: str
+    amplitude: float
+    damping_ratio: float
+    damping_ratio_without: float
+    frequency_change: float
+    zero_change: float
+    reading_change: float
+    stands: float = 0.0
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields, with the units of angles in their names."""
+        found = dict(vars(self))
+        return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
 
 
 @dataclass(frozen=True)
@@ -259,6 +286,7 @@ class Diagnosis:
         rest: what remains after the causes.
         model: the model given, with the causes written into it; None where none was given.
         closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
+        sizes: what each fitted cause does to a swing.
     """
 
     campaign: str
@@ -283,6 +311,7 @@ class Diagnosis:
     rest: Rest | None = None
     model: PatchedModel | None = None
     closable: Closable | None = None
+    sizes: tuple[CauseSize, ...] = ()
 
     @property
     def decision(self) -> Decision:

@@ -20,7 +20,7 @@ from diagnosis.localisation.excess import (
     within_bands,
 )
 from diagnosis.localisation.lines import residual_lines
-from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
+from diagnosis.localisation.maps import Grid, GroupExcess, Maps, RunMap, Trace
 from diagnosis.localisation.own_units import maps_in_own_units, trace_in_own_units
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -30,6 +30,7 @@ _TIME_BINS = 60
 _AMPLITUDE_BINS = 40
 _FREQUENCY_BINS = 110  # of equal ratio, for the picture
 _FINE_BINS = 1500  # of equal width, for the interval
+_GRID_ROWS, _GRID_COLUMNS = 6, 8
 _TRACE_POINTS = 20_000  # of all runs together
 _LEAST_POINTS = 200  # of a run
 _CYCLE_POINTS = 24  # of a cycle
@@ -91,6 +92,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         backbones=tuple(backbones(nominal, [run.start for run in nominal.problem.data.runs])),
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, None, excesses),
+        grid=_grid(scaled, inside, times),
         unit=similarity.reading,
     )
     interval = _frequency_interval(excesses)
@@ -215,6 +217,40 @@ def _amplitude_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
     place = [amplitudes(fit, i) for i in range(len(inside))]
     edges = np.linspace(0.0, 1.0001 * max(float(p.max()) for p in place), _AMPLITUDE_BINS + 1)
     return profile(edges, place, *_by_sample(fit, inside))
+
+
+def _grid(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Grid:
+    """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
+    amplitude = [amplitudes(fit, i) for i in range(len(inside))]
+    rows = np.linspace(0.0, 1.0001 * max(float(a.max()) for a in amplitude), _GRID_ROWS + 1)
+    power, expected, variance = _by_sample(fit, inside)
+    speeds = sorted({run.wind_speed for run in fit.problem.data.runs})
+    shared = len(speeds) == 1
+    longest = max(float(time[-1]) for time in times)
+    edges = np.linspace(0.0, 1.0001 * longest, _GRID_COLUMNS + 1)
+    places = [
+        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(run.wind_speed))
+        for run, time in zip(fit.problem.data.runs, times, strict=True)
+    ]
+    columns = []
+    for column in range(_GRID_COLUMNS if shared else len(speeds)):
+        inside_column = [place == column for place in places]
+        columns.append(
+            profile(
+                rows,
+                [a[keep] for a, keep in zip(amplitude, inside_column, strict=True)],
+                [p[keep] for p, keep in zip(power, inside_column, strict=True)],
+                expected,
+                variance,
+            )
+        )
+    return Grid(
+        rows,
+        None if shared else np.array(speeds),
+        edges if shared else None,
+        np.stack([column.mean for column in columns], axis=1),
+        np.stack([column.std for column in columns], axis=1),
+    )
 
 
 def _time_by_run(fit: Fit, times: list[Array], edges: Array) -> Array:

@@ -89,6 +89,25 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
+class Grid:
+    """Excess by amplitude and by wind speed, or by time where the runs have one speed.
+
+    Args:
+        amplitude: edges of the rows, rad, shape (m + 1,).
+        speeds: of the columns, m/s, shape (n,); None where the columns are times.
+        time: edges of the columns since the start of the record, s, shape (n + 1,); None where they are speeds.
+        excess: mean by cell, shape (m, n), in noise variances of a sample; NaN where a cell is empty.
+        std: of it where there is no gap, shape (m, n).
+    """
+
+    amplitude: Array
+    speeds: Array | None
+    time: Array | None
+    excess: Array
+    std: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Maps:
     """All maps of a campaign.
 
@@ -108,6 +127,7 @@ class Maps:
         backbones: by run.
         phase_plane: missing moment by angle and rate; None where there is none.
         traces: every run against time, the largest excess first.
+        grid: excess by amplitude and speed, or amplitude and time.
         unit: of the readings and residuals.
     """
 
@@ -126,6 +146,7 @@ class Maps:
     backbones: tuple[Backbone, ...]
     phase_plane: PhasePlane | None
     traces: tuple[Trace, ...]
+    grid: Grid
     unit: str = "rad"
 
     def to_json_dict(self) -> dict[str, Any]:
@@ -160,6 +181,7 @@ class Maps:
             ],
             "backbones": [_backbone(curve) for curve in self.backbones],
             "phase_plane": None if self.phase_plane is None else _plane(self.phase_plane),
+            "grid": _grid(self.grid),
             "unit": self.unit,
             "traces": [_trace(trace) for trace in self.traces],
         }
@@ -223,6 +245,16 @@ def _plane(plane: PhasePlane) -> dict[str, Any]:
         "by_rate_std": numbers(plane.by_rate_std),
         "unit": plane.unit,
         "runs": list(plane.runs),
+    }
+
+
+def _grid(grid: Grid) -> dict[str, Any]:
+    return {
+        "amplitude_edges_rad": numbers(grid.amplitude),
+        "wind_speeds": None if grid.speeds is None else numbers(grid.speeds),
+        "time_edges_s": None if grid.time is None else numbers(grid.time),
+        "excess": [numbers(row) for row in grid.excess],
+        "std": [numbers(row) for row in grid.std],
     }
 
 

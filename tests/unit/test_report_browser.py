@@ -96,6 +96,7 @@ def test_a_chart_begins_at_the_largest_difference_and_zooms_by_dragging_and_by_b
     def ends() -> list[float]:
         """Times of the samples nearest the left and right edge of the residuals, which follow the reading."""
         found = []
+        figure.locator(".u-over").nth(1).scroll_into_view_if_needed()
         box = figure.locator(".u-over").nth(1).bounding_box()
         for share in (0.002, 0.998):
             opened.page.mouse.move(box["x"] + share * box["width"], box["y"] + 20)
@@ -105,6 +106,7 @@ def test_a_chart_begins_at_the_largest_difference_and_zooms_by_dragging_and_by_b
     assert ends() == [1.0, 2.0]  # of the times 0, 1, 2 from 0.5 to 2 s
     figure.get_by_label("Show the whole chart").click()
     assert ends() == [0.0, 2.0]
+    over.scroll_into_view_if_needed()
     box = over.bounding_box()
     opened.page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 60)
     opened.page.mouse.down()

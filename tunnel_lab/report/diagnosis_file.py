@@ -132,6 +132,10 @@ class DiagnosisDocument(Document):
     ]
     waterfall_on: Annotated[str, Field(description="what was held out of the fits for it")]
     without: Annotated[dict[str, float], Field(description="by cause, the excess when it alone is taken out")]
+    sizes: Annotated[
+        list[dict[str, Any]],
+        Field(description="what each fitted cause does to a swing of a stated amplitude"),
+    ]
     rest: Annotated[dict[str, Any] | None, Field(description="what remains after the causes")]
     closable: Annotated[
         dict[str, Any] | None, Field(description="how much of what remains could be closed, and by what")

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DESCRIPTIONS = {
+    "place": "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
     "waterfall": "What is left of the gap as the causes are added one after another.",
     "fit": "What was measured and what both models predict against time, and below it their residuals.",
     "where-runs": "Heat map of the excess of every run over time.",
@@ -38,7 +39,7 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
-    "how-far": "Excess of every run with the nominal model and with the causes added.",
+    "how-far": "Misfit of every run with the nominal model and with the causes added.",
     "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
@@ -118,6 +119,7 @@ def render_report(document: Document, campaign: Campaign, byline: Byline | None 
         "kind": kind,
         "named": kind in ("open", "found"),
         "facts": view.facts(document),
+        "found": view.causes_found(document),
         "coefficients": view.coefficient_rows(document),
         "next_steps": view.next_steps(document),
     } | _detail(document, campaign)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, grid, styled
+from tunnel_lab.plotting.style import INTERVAL, figure, grid, styled
 from tunnel_lab.report.drawing import (
     AFTER,
     BEFORE,
@@ -19,6 +19,7 @@ from tunnel_lab.report.drawing import (
     array,
     drawn_label,
     faded,
+    misfit_scale,
     run_label,
     shade,
 )
@@ -37,6 +38,42 @@ _ALL = "all runs together"
 
 
 @styled
+def place_figure(document: Document) -> Figure | None:
+    """Where the gap is: misfit by amplitude and by wind speed, or by amplitude and time where there is one speed.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        A map small enough for a phone, in which cells within the noise stay empty; None for maps without it.
+    """
+    grid_of = document["maps"].get("grid")
+    if grid_of is None:
+        return None
+    unit, size = misfit_scale(document)
+    excess, std = (np.stack([array(row) for row in grid_of[name]]) for name in ("excess", "std"))
+    rows = np.degrees(array(grid_of["amplitude_edges_rad"]))
+    speeds = grid_of["wind_speeds"]
+    columns = np.arange(len(speeds) + 1) - 0.5 if speeds else array(grid_of["time_edges_s"])
+    cells = np.vectorize(size, otypes=[float])(np.nan_to_num(excess))
+    shown = np.where(excess > SIGMAS * std, cells, np.nan)
+    fig = figure(NARROW, 2.7)
+    axes = fig.add_subplot()
+    top = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
+    mesh = axes.pcolormesh(columns, rows, shown, cmap=faded(BEFORE), vmin=0.0, vmax=top)
+    axes.set_ylabel("amplitude [°]")
+    if speeds:
+        axes.set_xticks(range(len(speeds)), [f"{speed:g}" if speed else "off" for speed in speeds])
+        axes.set_xlabel("wind speed [m/s]")
+    else:
+        axes.set_xlabel("time since the start of the record [s]")
+    axes.set_ylim(0.0, float(rows[-1]))
+    axes.set_xlim(float(columns[0]), float(columns[-1]))
+    fig.colorbar(mesh, ax=axes, label=f"root mean square misfit [{unit}]")
+    return fig
+
+
+@styled
 def runs_figure(document: Document) -> Figure:
     """Excess of every run over time.
 
@@ -50,7 +87,7 @@ def runs_figure(document: Document) -> Figure:
 
     maps = document["maps"]
     runs = maps["runs"]
-    fig = figure(WIDTH, 1.4 + 0.24 * max(len(runs), 4))
+    fig = figure(NARROW, 1.4 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
     edges = array(maps["time"]["edges_s"])
     cells, floor, top = run_cells(maps)
@@ -93,8 +130,8 @@ def profiles_figure(document: Document) -> Figure:
         Three panels; the shaded intervals hold four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
-    fig = figure(WIDTH, 3.4)
-    axes = fig.subplot_mosaic([["time", "amplitude"], ["moment", "amplitude"]], height_ratios=(1.3, 0.8))
+    fig = figure(NARROW, 6.0)
+    axes = fig.subplot_mosaic([["time"], ["moment"], ["amplitude"]], height_ratios=(1.3, 0.8, 1.3))
     _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
     axes["time"].tick_params(labelbottom=False)
     _moment(axes["moment"], maps["time"])
@@ -136,7 +173,7 @@ def spectrum_figure(document: Document) -> Figure:
         One panel with logarithmic axes; the shaded interval holds four fifths of the gap.
     """
     values = document["maps"]["frequency"]
-    fig = figure(WIDTH, 2.7)
+    fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
     edges, centre = spectrum_axis(values)
     before, std = array(values["excess"]) + 1.0, array(values["std"])
@@ -227,9 +264,9 @@ def moment_figure(document: Document) -> Figure | None:
         return None
     edges = array(plane["edges_rad"])
     _, _, unit, factor = plane_cells(plane)
-    fig = figure(WIDTH, 2.6)
+    fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
-    for axes, name, label in zip(fig.subplots(1, 2), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
+    for axes, name, label in zip(fig.subplots(2, 1), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
         mean, spread = factor * array(plane[name]), factor * array(plane[f"{name}_std"])
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
         axes.fill_between(
@@ -354,5 +391,10 @@ def view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
 
 
 def rounded(values: Array, digits: int = 4) -> list[float | None]:
-    """Numbers for JSON, as many digits as a screen shows; null where a value is not known."""
+    """Numbers for JSON, as many digits as a screen shows; null where a value is not known.
+
+    Args:
+        values: of any unit and shape, flattened, shape (n,).
+        digits: significant ones (count).
+    """
     return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]
