@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnosis.closable import closable_table, closable_words
-from diagnosis.misfit import misfit_of, rms_shown
+from diagnosis.misfit import misfit_of, of_swing, rms_shown
+from diagnosis.names import plain
 from diagnosis.patch import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing.numbers import coefficient_label, estimated, significant, unit_mark
@@ -45,6 +46,27 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         *patch_lines(document),
         *closing_lines(document),
     ]
+
+
+def diagnosis_brief(document: Document) -> str:
+    """An answer in three lines: its causes, its gap, and where to go from here."""
+    gap, first = document["gap"], document["candidates"][0]
+    causes = document["causes"]
+    named = plain(*causes) if causes else "no gap"
+    undecided = "" if document.get("decided", True) else "undecided, most probably "
+    misfit, excess = misfit_of(document), gap["excess_before"]
+    size = f"{held_out_excess(excess)} noise powers"
+    if misfit is not None:
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
+    closed = (
+        f", {share(gap['closed'])} of it closed {gap['closed_on']}" if causes not in ([], ["unknown"]) else ""
+    )
+    likely = probability(first["probability"])
+    return (
+        f"Diagnosis of {document['campaign']!r}: {undecided}{named} (probability {likely})\n"
+        f"  gap {size}{closed}\n"
+        "  print() shows all; .plot(), .write_report(path), .to_frame()"
+    )
 
 
 def candidates_table(document: Document) -> TextTable:

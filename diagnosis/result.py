@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
@@ -13,11 +15,17 @@ from diagnosis.closure import Rest, Waterfall
 from diagnosis.decision import Decision, decision
 from diagnosis.misfit import Misfit
 from diagnosis.patch import PatchedModel
-from diagnosis.printing import diagnosis_parts
-from identification.printing.frames import wide_frame
+from diagnosis.printing import diagnosis_brief, diagnosis_parts
+from identification.printing.frames import as_pandas, wide_frame
 from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 from tunnel_sim.files.json_text import as_json
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 SCHEMA_VERSION = 1
 HELD_OUT = "on runs held out of the fit"
@@ -287,6 +295,7 @@ class Diagnosis:
         model: the model given, with the causes written into it; None where none was given.
         closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
         sizes: what each fitted cause does to a swing.
+        data: the runs, which are no part of the JSON; None for an answer that was not made by `diagnose`.
     """
 
     campaign: str
@@ -312,6 +321,7 @@ class Diagnosis:
     model: PatchedModel | None = None
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()
+    data: Campaign | None = field(default=None, compare=False)
 
     @property
     def decision(self) -> Decision:
@@ -338,9 +348,75 @@ class Diagnosis:
         """The verdict, the answers weighed and the coefficients as short tables, and the caveats."""
         return as_text(diagnosis_parts(self.to_json_dict()))
 
+    def __repr__(self) -> str:
+        """The answer, the gap, and where to go from here, in three lines."""
+        return diagnosis_brief(self.to_json_dict())
+
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The same as `__str__` for notebooks."""
         return as_html(diagnosis_parts(self.to_json_dict()))
+
+    def plot(self, what: str = "fit", runs: Sequence[str] = ()) -> Figure:
+        """Draw one figure of the report.
+
+        Args:
+            what: ``fit`` (the fit over the data) or the name of another figure, such as ``waterfall`` or ``place``.
+            runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+
+        Returns:
+            A matplotlib figure, made without pyplot.
+
+        Raises:
+            TunnelError: for a figure or a run that this diagnosis does not have.
+        """
+        from tunnel_lab.report import draw  # the one way up (decision 0001); matplotlib is slow to load
+
+        return draw(self.to_json_dict(), what, runs)
+
+    def write_report(self, path: Path | str, *, author: str = "", notes: str = "") -> Path:
+        """Write the report, one HTML page.
+
+        Args:
+            path: of the page; replaced when it exists.
+            author: who made the diagnosis.
+            notes: for the head of the page.
+
+        Raises:
+            TunnelError: when the page cannot be written, or the answer does not hold its runs.
+        """
+        from tunnel_lab.report import Byline, write_report  # as in `plot`
+
+        if self.data is None:
+            raise TunnelError("the answer does not hold its runs", remedy="diagnose the campaign again")
+        today = datetime.now().astimezone().date().isoformat()
+        return write_report(self.to_json_dict(), self.data, Path(path), Byline(today, author, notes))
+
+    def to_frame(self) -> pl.DataFrame:
+        """The answer in one table: a row for each size of the gap, parameter and coefficient.
+
+        Returns:
+            ``part`` (``gap``, a cause, ``before`` or ``after``), ``quantity``, ``value``, ``std``, ``unit``.
+        """
+        gap = self.gap
+        rows: list[tuple[str, str, float, float | None, str]] = []
+        for name in ("excess_before", "excess_after", "closed"):
+            rows.append(("gap", name, getattr(gap, name), None, "1"))
+        if gap.misfit is not None:
+            for name, excess in (("rms_before", gap.excess_before), ("rms_after", gap.excess_after)):
+                rows.append(("gap", name, gap.misfit.rms(excess), None, gap.misfit.unit))
+        first = self.candidates[0]
+        for name, given in first.parameters.items():
+            owner, _, parameter = name.rpartition(".")
+            rows.append((owner or first.effect, parameter, given.value, given.std, given.unit))
+        for part, found in (("before", self.coefficients.before), ("after", self.coefficients.after)):
+            rows += [(part, name, given.value, given.std, given.unit) for name, given in found.items()]
+        kinds = {"value": pl.Float64, "std": pl.Float64}
+        names = ("part", "quantity", "value", "std", "unit")
+        return pl.DataFrame(rows, schema={name: kinds.get(name, pl.String) for name in names}, orient="row")
+
+    def to_pandas(self) -> DataFrame:
+        """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
+        return as_pandas(self.to_frame())
 
     def candidates_frame(self) -> pl.DataFrame:
         """A row for each answer weighed: effect, probability, excess_after and closed, as in `Candidate`."""

@@ -10,14 +10,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import polars as pl
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
-from identification.printing.estimate_tables import estimate_parts
-from identification.printing.frames import long_frame, wide_frame
+from identification.printing.estimate_tables import estimate_brief, estimate_parts
+from identification.printing.frames import as_pandas, long_frame, wide_frame
 from identification.printing.table import as_html, as_text
 from identification.remark import Remark
 from identification.status import Status as Status
@@ -25,6 +25,9 @@ from identification.status import by_gravity as by_gravity
 from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 UNITS: Mapping[str, str] = {
@@ -229,14 +232,27 @@ class Estimate:
         """The coefficients and the first runs as short tables, and the notes on them."""
         return as_text(estimate_parts(self.to_json_dict()))
 
+    def __repr__(self) -> str:
+        """The coefficients, the number of runs, and where to go from here, in three lines."""
+        return estimate_brief(self.to_json_dict())
+
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The same as `__str__` for notebooks."""
         return as_html(estimate_parts(self.to_json_dict()))
 
     def coefficients_frame(self) -> pl.DataFrame:
         """A row for each coefficient: value, std, unit, and the ends low and high of its 95 % interval."""
         document = self.to_json_dict()
         return long_frame({name: document[name] for name in _CAMPAIGN_QUANTITIES})
+
+    def to_frame(self) -> pl.DataFrame:
+        """`coefficients_frame`, or `runs_frame` where the runs give no coefficients."""
+        known = any(getattr(self, name) is not None for name in _CAMPAIGN_QUANTITIES)
+        return self.coefficients_frame() if known else self.runs_frame()
+
+    def to_pandas(self) -> DataFrame:
+        """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
+        return as_pandas(self.to_frame())
 
     def runs_frame(self) -> pl.DataFrame:
         """A row for each run: its id and status, and the quantities of `RunEstimate` with each ``_std``."""

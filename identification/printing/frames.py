@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
+
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Document = Mapping[str, Any]
 
@@ -17,6 +22,20 @@ _LONG = {
     "low": pl.Float64,
     "high": pl.Float64,
 }
+
+
+def as_pandas(frame: pl.DataFrame) -> DataFrame:
+    """A frame for pandas, by its columns: Polars' own way needs pyarrow.
+
+    Raises:
+        TunnelError: where pandas is not installed.
+    """
+    try:
+        from pandas import DataFrame  # only here: an extra
+    except ModuleNotFoundError as error:
+        remedy = "pip install 'virtual-wind-tunnel[frames]'"
+        raise TunnelError("pandas is not installed", remedy=remedy) from error
+    return DataFrame(frame.to_dict(as_series=False))
 
 
 def long_frame(quantities: Mapping[str, Document | None]) -> pl.DataFrame:

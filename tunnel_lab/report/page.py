@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -24,6 +24,7 @@ from tunnel_lab.report.view import Document
 from tunnel_lab.report.where import Chart, charts
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -139,6 +140,27 @@ def render_fit(document: Document) -> str:
     drawn = fit_figure(document)
     parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
     return _rendered("fit.html.j2", {"campaign": document["campaign"]} | parts)
+
+
+def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
+    """One figure of the report.
+
+    Args:
+        document: as for `write_report`.
+        what: name of the figure, as in `DESCRIPTIONS`.
+        runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+
+    Raises:
+        TunnelError: for a figure or a run that the diagnosis does not have.
+    """
+    if what == "fit" and (drawn := fit_figure(document, runs)) is not None:
+        return drawn
+    figures = diagnosis_figures(document)
+    if what not in figures:
+        raise TunnelError(
+            f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {', '.join(figures)}"
+        )
+    return figures[what]
 
 
 def _rendered(name: str, context: dict[str, Any]) -> str:
