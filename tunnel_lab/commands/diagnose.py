@@ -18,47 +18,76 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "diagnose"
+OUTPUT, CAUSES, MODEL = "Output", "Effects", "A model of your own"
 
 
 def run(
     campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
     json: Annotated[
         Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
+        typer.Option(
+            "--json",
+            metavar="FILE",
+            rich_help_panel=OUTPUT,
+            help="Write the answer as JSON; - for standard output.",
+        ),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE.html", help="Write a report, one HTML page.")
+        Path | None,
+        typer.Option(
+            "--report", metavar="FILE.html", rich_help_panel=OUTPUT, help="Write a report, one HTML page."
+        ),
     ] = None,
     author: Annotated[
-        str, typer.Option("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
+        str,
+        typer.Option(
+            "--author", metavar="NAME", rich_help_panel=OUTPUT, help="Who made the diagnosis, for the report."
+        ),
     ] = "",
     notes: Annotated[
-        str, typer.Option("--notes", metavar="TEXT", help="Notes for the head of the report.")
+        str,
+        typer.Option(
+            "--notes", metavar="TEXT", rich_help_panel=OUTPUT, help="Notes for the head of the report."
+        ),
     ] = "",
     effects: Annotated[
         list[str] | None,
-        typer.Option("--effects", metavar="A,B", help="Consider these effects only."),
+        typer.Option("--effects", metavar="A,B", rich_help_panel=CAUSES, help="Consider these effects only."),
     ] = None,
     exclude: Annotated[
         list[str] | None,
-        typer.Option("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
+        typer.Option(
+            "--exclude",
+            metavar="C",
+            rich_help_panel=CAUSES,
+            help="Leave these effects out; tunnel effects lists all.",
+        ),
     ] = None,
     effects_file: EffectsFileOption = None,
     model: Annotated[
         Path | None,
         typer.Option(
-            "--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."
+            "--model",
+            metavar="FILE.xml",
+            rich_help_panel=MODEL,
+            help="A model of your own, MJCF or URDF, as the nominal model.",
         ),
     ] = None,
     joint: Annotated[
         str | None,
-        typer.Option("--joint", metavar="NAME", help="Joint of the model that was recorded; for --model."),
+        typer.Option(
+            "--joint",
+            metavar="NAME",
+            rich_help_panel=MODEL,
+            help="Joint of the model that was recorded; for --model.",
+        ),
     ] = None,
     free: Annotated[
         list[str] | None,
         typer.Option(
             "--free",
             metavar="A,B",
+            rich_help_panel=MODEL,
             help="Parameters of the model to fit: inertia, damping, stiffness, rest. Default: those that the "
             "runs can determine.",
         ),
@@ -68,19 +97,26 @@ def run(
         typer.Option(
             "--asset-dir",
             metavar="DIR",
+            rich_help_panel=MODEL,
             help="Folder of the model's includes and meshes, where they are not in or below its own.",
         ),
     ] = None,
     patch: Annotated[
         Path | None,
         typer.Option(
-            "--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."
+            "--patch",
+            metavar="OUT.xml",
+            rich_help_panel=MODEL,
+            help="Write the model with the causes in it; for --model.",
         ),
     ] = None,
     propose: Annotated[
         Path | None,
         typer.Option(
-            "--propose", metavar="LAW.toml", help="Write the formula proposed for what no effect explains."
+            "--propose",
+            metavar="LAW.toml",
+            rich_help_panel=OUTPUT,
+            help="Write the formula proposed for what no effect explains.",
         ),
     ] = None,
 ) -> None:
