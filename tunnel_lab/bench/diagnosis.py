@@ -379,6 +379,17 @@ def show_run(run: dict[str, float]) -> None:
             with ui.element("div"):
                 ui.label(value).classes("value")
                 ui.label(label).classes("soft")
+    with ui.element("p").classes("buttons"):
+        button("Download the plan", lambda: ui.download(run_table(run).encode(), "next-run.toml"))
+
+
+def run_table(run: dict[str, float]) -> str:
+    """A run to make, as the table that ``campaign.toml`` takes once its record is there."""
+    import tomli_w
+
+    stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
+    head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
+    return head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
 
 
 def build_report(session: Session, frame: Frame) -> None:

@@ -19,6 +19,7 @@ from nicegui import app, background_tasks, core, events, ui
 
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep, too_large
+from tunnel_lab.bench.words import page_words
 from tunnel_lab.bench.workspace import (
     STAGES,
     Session,
@@ -252,7 +253,7 @@ def add_pages(folder: Path) -> None:
                     module, _, build = opened.builder.partition(".")
                     getattr(import_module(f"tunnel_lab.bench.{module}"), build)(session, frame)
         except TunnelError as error:
-            ui.label(f"tunnel: {error}").classes("fault")
+            ui.label(page_words(str(error))).classes("fault")
             ui.link("All campaigns", "/")
 
 
