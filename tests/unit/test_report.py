@@ -23,7 +23,7 @@ from diagnosis.result import (
     RunGap,
 )
 from tests.unit.gap_campaigns import campaign, nominal, studied
-from tunnel_lab.report import Byline, render_report, write_report
+from tunnel_lab.report import Byline, render_report, write_report, write_summary
 from tunnel_lab.report.drawing import THEMED
 from tunnel_lab.report.figures import diagnosis_figures
 from tunnel_lab.report.page import DESCRIPTIONS
@@ -277,3 +277,18 @@ def test_hashes_and_versions_are_on_the_page(document, written):
     text = Page(written(document | {"provenance": provenance, "maps": None})).text
     for part in ("9.8.7", "runs/a.csv", "ab" * 32):
         assert part in text
+
+
+def test_without_a_browser_the_summary_is_refused(document, data, tmp_path, monkeypatch):
+    monkeypatch.setattr("tunnel_lab.report.summary.shutil.which", lambda _: None)
+    with pytest.raises(TunnelError, match=r"no Chromium to print with.*--report"):
+        write_summary(document, data, tmp_path / "summary.pdf")
+    assert not (tmp_path / "summary.pdf").exists()
+
+
+def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypatch):
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
+    monkeypatch.setattr("tunnel_lab.report.summary.find_browser", lambda: "false")
+    with pytest.raises(TunnelError, match="Chromium could not print"):
+        write_summary(document, data, tmp_path / "summary.pdf")
+    assert not (tmp_path / "summary.pdf").exists()

@@ -17,7 +17,7 @@ import pytest
 
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
-from tunnel_lab.report import Byline, write_report
+from tunnel_lab.report import Byline, render_report, write_report, write_summary
 
 pytestmark = IN_A_BROWSER
 
@@ -308,3 +308,27 @@ def test_every_curve_and_cell_is_drawn_as_in_the_document(browser: Any, tmp_path
         said for said in tab.complaints if "willReadFrequently" not in said
     ] == []  # the test's own readings
     tab.context.close()
+
+
+def pages(printed: bytes) -> int:
+    """Number of pages of a PDF by Chromium."""
+    return len(re.findall(rb"/Type\s*/Page\b", printed))
+
+
+def test_the_summary_is_one_printed_page(browser: Any, tmp_path: Path) -> None:
+    given = document()
+    given["verdict"] = "The gap comes from quadratic damping. " * 8
+    given["waterfall"] += [{"effect": name, "excess": 0.1} for name in ("free_play", "mains_hum")]
+    (tmp_path / "summary.html").write_text(render_report(given, campaign(), summary=True))
+    page = browser.new_page()
+    page.goto((tmp_path / "summary.html").as_uri())
+    margins = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
+    for paper in ("A4", "Letter"):
+        assert pages(page.pdf(format=paper, margin=margins)) == 1
+    page.emulate_media(media="print")
+    assert page.is_visible('figure[data-figure="fit"] svg')
+    assert not page.is_visible("text=Tests, noise and provenance")
+    page.close()
+    path = write_summary(given, campaign(), tmp_path / "summary.pdf")
+    assert path.read_bytes().startswith(b"%PDF")
+    assert pages(path.read_bytes()) == 1

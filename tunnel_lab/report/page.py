@@ -103,11 +103,14 @@ def write_report(document: Document, campaign: Campaign, path: Path, byline: Byl
     )
 
 
-def render_report(document: Document, campaign: Campaign, byline: Byline | None = None) -> str:
+def render_report(
+    document: Document, campaign: Campaign, byline: Byline | None = None, *, summary: bool = False
+) -> str:
     """The page as text.
 
     Args:
         document: as for `write_report`.
+        summary: whether only what fits one printed page is shown.
 
     Returns:
         HTML that needs no other file and no network; the same for the same document and byline.
@@ -118,6 +121,7 @@ def render_report(document: Document, campaign: Campaign, byline: Byline | None 
         "byline": (byline or Byline()),
         "answer": answer,
         "kind": kind,
+        "summary": summary,
         "named": kind in ("open", "found"),
         "facts": view.facts(document),
         "found": view.causes_found(document),
@@ -139,7 +143,7 @@ def render_fit(document: Document) -> str:
     """
     drawn = fit_figure(document)
     parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
-    return _rendered("fit.html.j2", {"campaign": document["campaign"]} | parts)
+    return _rendered("fit.html.j2", {"campaign": document["campaign"], "summary": False} | parts)
 
 
 def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
