@@ -287,7 +287,7 @@ class ChoicesPart:
         self._now = choices_of(session)
         self._changed = changed
         angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
-        with ui.element("div").classes("fields"):
+        with ui.element("div").classes("fields wide"):
             self._select("angle", "Column of the angle", columns, several=True)
             self._select("unit", "Unit of the angle", angle)
             self._select("time", "Column of the times", columns)
@@ -298,7 +298,7 @@ class ChoicesPart:
             self._number("start", "Leave out samples before [s]")
             self._number("end", "Leave out samples after [s]")
             self._number("rest", "Reading at rest of every run, to be subtracted [rad]")
-            self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
+            self._text("name", "Conditions in the file names: S{spring}_V{wind_speed}_*")
             self._text("delimiter", "Delimiter of a text file: tab, blank, ; , or |")
             self._text("decimal", "Decimal sign of a text file")
             ui.checkbox(

@@ -249,6 +249,8 @@ def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench)
         fit = one.page.frame_locator('iframe[title="The fit over the data"]')
         fit.locator(".uplot").nth(1).wait_for()
         shown = fit.locator("select option").all_inner_texts()
+        frame = one.page.locator('iframe[title="The fit over the data"]').bounding_box()
+        assert frame["height"] > 600
     assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
 
 
