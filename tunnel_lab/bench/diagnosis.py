@@ -159,7 +159,9 @@ class _Answer:
         if (document.get("maps") or {}).get("traces"):
             ui.html("The fit over the data", sanitize=False, tag="h2")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
-            ui.element("iframe").classes("fit-frame").props(f'src="{source}" title="The fit over the data"')
+            ui.element("iframe").classes("fit-frame").props(
+                f'src="{source}" title="The fit over the data" loading=lazy'
+            )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(document), once=True)
         self._words(document)
