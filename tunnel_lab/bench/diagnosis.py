@@ -213,7 +213,7 @@ class ByHandPart:
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
         from tunnel_sim.effects import known_effects
 
-        self._session = session
+        self._session, self._document = session, document
         self._waiting = self._converged = False
         ui.html("By hand", sanitize=False, tag="h2")
         ui.label(_ABOUT).classes("soft")
@@ -258,7 +258,7 @@ class ByHandPart:
             self._place.clear()
             with self._place:
                 if closure is not None:
-                    show_closure(closure)
+                    show_closure(closure, self._document)
         self._waiting = False
         self._place.classes(remove="waiting")
 
@@ -274,15 +274,19 @@ class ByHandPart:
         return closure
 
 
-def show_closure(closure: Closure) -> None:
-    """The closure with causes chosen by hand."""
-    from tunnel_lab.report.view import estimate, excess, percent
+def show_closure(closure: Closure, document: dict[str, Any]) -> None:
+    """The closure with causes chosen by hand.
+
+    Args:
+        document: of the diagnosis, whose units it is shown in.
+    """
+    from tunnel_lab.report.view import estimate, misfit_shown, percent
 
     with ui.element("div").classes("facts"):
         for value, label in (
             (percent(closure.closed), f"share closed, {closure.held_out}"),
-            (f"{excess(closure.after)} noise variances", "left of the gap"),
-            (f"{excess(closure.before)} noise variances", "with the nominal model"),
+            (misfit_shown(document, closure.after), "left of the misfit, root mean square"),
+            (misfit_shown(document, closure.before), "with the nominal model"),
         ):
             with ui.element("div"):
                 ui.label(value).classes("value")

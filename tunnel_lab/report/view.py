@@ -108,8 +108,12 @@ def misfit_fact(document: Document, label: str, value: float) -> Fact:
     return Fact(label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}")
 
 
-def _misfit(document: Document, value: float) -> str:
-    """A gap as a root mean square; in noise powers for a document without ``misfit``."""
+def misfit_shown(document: Document, value: float) -> str:
+    """A gap as a root mean square; in noise powers for a document without ``misfit``.
+
+    Args:
+        value: the gap as an excess, in noise variances, a ratio.
+    """
     misfit = misfit_of(document)
     return f"{minus(held_out_excess(value))} noise powers" if misfit is None else rms_shown(misfit, value)
 
@@ -148,7 +152,9 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
             if full.partition(".")[0] == name or len(names) == 1
         }
         old, new = steps.get(name, (None, None))
-        closes = "" if new is None else " to ".join(_misfit(document, step["excess"]) for step in (old, new))
+        closes = (
+            "" if new is None else " to ".join(misfit_shown(document, step["excess"]) for step in (old, new))
+        )
         found.append(
             {
                 "name": plain(name),
