@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.answer.assemble import assemble
+from diagnosis.answer.cause_sizes import cause_sizes
 from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
 from diagnosis.answer.other_modes import second_modes
 from diagnosis.answer.own_units import in_own_units
@@ -26,6 +27,7 @@ from diagnosis.patch import UNPATCHED
 from diagnosis.result import Diagnosis
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
+from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def diagnose(
-    campaign: Campaign,
+    campaign: Campaign | Path | str,
     *,
     kinds: Sequence[type[Effect]] | None = None,
     progress: Progress | None = None,
@@ -45,6 +47,7 @@ def diagnose(
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
     Args:
+        campaign: the runs; or their folder, or one file of a data logger.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
         model: a model of one's own, from `read_model`, which is then the nominal model.
@@ -56,6 +59,7 @@ def diagnose(
         TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
             cannot be fitted to them.
     """
+    campaign = as_campaign(campaign)
     kinds = known_effects() if kinds is None else kinds
     campaign = campaign if model is None else with_law(campaign, model.law)
     with answering_with(kinds):
@@ -117,7 +121,9 @@ def _diagnose(
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
     patched, unpatched = (None, ()) if model is None else _patched(study, model)
     assembled = assemble(study, where, maps, (*left_out, *unpatched), patched, known)
-    answer = in_own_units(replace(assembled, remarks=remarks), study.similarity)
+    sized = replace(assembled, remarks=remarks, sizes=cause_sizes(study) if study.named else ())
+    sized = replace(sized, data=found.campaign)
+    answer = in_own_units(sized, study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
     if progress is not None:

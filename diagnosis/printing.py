@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnosis.closable import closable_table, closable_words
+from diagnosis.misfit import misfit_of, of_swing, rms_shown
+from diagnosis.names import plain
 from diagnosis.patch import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
@@ -43,6 +45,27 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         *patch_lines(document),
         *closing_lines(document),
     ]
+
+
+def diagnosis_brief(document: Document) -> str:
+    """An answer in three lines: its causes, its gap, and where to go from here."""
+    gap, first = document["gap"], document["candidates"][0]
+    causes = document["causes"]
+    named = plain(*causes) if causes else "no gap"
+    undecided = "" if document.get("decided", True) else "undecided, most probably "
+    misfit, excess = misfit_of(document), gap["excess_before"]
+    size = f"{held_out_excess(excess)} noise powers"
+    if misfit is not None:
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)} ({size})"
+    closed = (
+        f", {share(gap['closed'])} of it closed {gap['closed_on']}" if causes not in ([], ["unknown"]) else ""
+    )
+    likely = probability(first["probability"])
+    return (
+        f"Diagnosis of {document['campaign']!r}: {undecided}{named} (probability {likely})\n"
+        f"  gap {size}{closed}\n"
+        "  print() shows all; .plot(), .write_report(path), .to_frame()"
+    )
 
 
 def candidates_table(document: Document) -> TextTable:
@@ -94,18 +117,33 @@ def gap_table(document: Document) -> TextTable:
     """The gap before and after, all runs first.
 
     Returns:
-        A table of excesses in multiples of the noise power; without rows where no gap was found.
+        A table of misfits and, beside them, of excesses in multiples of the noise power; without rows where no gap
+        was found.
     """
     gap = document["gap"]
     named = document["causes"] != ["unknown"]
-    rows = []
-    if gap["detected"]:
-        rows.append(("all", _excess(gap["excess_before"]), _excess(gap["excess_after"]) if named else "–"))
-        for run in gap["runs"]:
-            left = _excess(run["after"]) + ("" if run["held_out"] else " (fitted)")
-            rows.append((run["id"], _excess(run["before"]), left if named else "–"))
-    after = "after, held out" if any(run["held_out"] for run in gap["runs"]) else "after"
-    return TextTable("Gap (× noise power)", ("run", "before", after), tuple(rows), right=("before", after))
+    listed = [("all", gap["excess_before"], gap["excess_after"])]
+    for run in gap["runs"]:
+        listed.append((run["id"] + ("" if run["held_out"] else " (fitted)"), run["before"], run["after"]))
+    rows = [
+        (name, misfit_text(document, before), misfit_text(document, after) if named else "–")
+        for name, before, after in (listed if gap["detected"] else ())
+    ]
+    head = "Gap, root mean square (× noise power)"
+    return TextTable(head, ("run", "before", "after"), tuple(rows), right=("before", "after"))
+
+
+def misfit_text(document: Document, excess: float) -> str:
+    """A gap in the units that people use, and in multiples of the noise power.
+
+    Args:
+        excess: in noise powers, a ratio.
+
+    Returns:
+        Text such as ``0.134° (19.34)``; the multiple alone for a document without ``misfit``.
+    """
+    misfit, times = misfit_of(document), held_out_excess(excess)
+    return times if misfit is None else f"{rms_shown(misfit, excess)} ({times})"
 
 
 def inclusion_line(document: Document) -> str:
@@ -123,18 +161,20 @@ def waterfall_table(document: Document) -> TextTable:
     """How far the gap closes with each cause, and without each.
 
     Returns:
-        A table of excesses in multiples of the noise power; without rows where no cause is named.
+        A table of misfits and of excesses in multiples of the noise power; without rows where no cause is named.
     """
     steps, without = document.get("waterfall", ()), document.get("without", {})
     rows = [
         (
             step["effect"] or "nominal model",
-            held_out_excess(step["excess"]),
-            held_out_excess(without[step["effect"]]) if step["effect"] in without else "",
+            misfit_text(document, step["excess"]),
+            misfit_text(document, without[step["effect"]]) if step["effect"] in without else "",
         )
         for step in (steps if len(steps) > 1 else ())
     ]
-    title = f"Gap as the causes are added (× noise power), {document.get('waterfall_on', '')}"
+    title = (
+        f"Gap as the causes are added, root mean square (× noise power), {document.get('waterfall_on', '')}"
+    )
     return TextTable(title, ("added", "left", "left without it alone"), tuple(rows), _LEFT)
 
 
@@ -156,12 +196,7 @@ def held_out_excess(value: float) -> str:
     Returns:
         Three decimals where it is small, or four significant digits.
     """
-    return f"{value:.3f}" if abs(value) < 10.0 else significant(value, 4)
-
-
-def _excess(value: float) -> str:
-    """An excess to three decimals, without a sign of zero."""
-    return f"{round(value, 3) + 0.0:+.3f}"
+    return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
 
 
 def coefficients_table(document: Document) -> TextTable:

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from diagnosis.closable import Closable
 from diagnosis.closure import Rest, Waterfall
 from diagnosis.decision import Decision, decision
+from diagnosis.misfit import Misfit
 from diagnosis.patch import PatchedModel
-from diagnosis.printing import diagnosis_parts
-from identification.estimate import wide_frame
+from diagnosis.printing import diagnosis_brief, diagnosis_parts
+from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text
 from identification.status import Remark
 from tunnel_sim.files.json_text import as_json
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 SCHEMA_VERSION = 1
 HELD_OUT = "on runs held out of the fit"
 FITTED = "in the fitted runs (none could be held out)"
 _LAST = (
-    "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
+    "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
     "blind_spots", "cautions", "remarks", "seconds", "maps", "provenance",
 )  # fmt: skip
 
@@ -67,9 +76,10 @@ class RunGap:
 
     Args:
         id: of the run.
-        before: ratio of mean squared residual to noise variance, minus one, of the nominal model.
-        after: likewise with the causes added, predicted from the other runs where it could be held out.
-        held_out: whether it could; else ``after`` is that of the fit of all runs.
+        before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
+            the other runs where it could be held out.
+        after: likewise with the causes added.
+        held_out: whether it could; else both are those of the fits of all runs.
     """
 
     id: str
@@ -84,15 +94,16 @@ class GapSummary:
 
     Args:
         detected: whether the gap is beyond chance.
-        excess_before: of the nominal model, all runs, in units of the noise variance.
-        excess_after: with the causes added, on runs not used for the fit, as far as runs could be held out, in
-            units of the noise variance.
+        excess_before: of the nominal model, in units of the noise variance, on readings that are held out of the
+            fits; where nothing is found, in the fitted runs.
+        excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap closed, 0 to 1.
-        closed_on: what that was measured on, in words: runs held out; stretches of time where no run could be.
+        closed_on: what these are measured on, in words.
         runs: by run.
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
+        misfit: what turns an excess into a misfit of the readings.
     """
 
     detected: bool
@@ -104,23 +115,15 @@ class GapSummary:
     false_alarm_rate: float
     p_value: float
     tests: Mapping[str, float] = field(default_factory=dict)
+    misfit: Misfit | None = None
 
     def to_json_dict(self) -> dict[str, Any]:
-        """Fields by name, and ``after_on`` before ``closed_on``."""
-        found: dict[str, Any] = {}
-        for name in self.__dataclass_fields__:
-            if name == "closed_on":
-                found["after_on"] = self.after_on
-            found[name] = as_json(getattr(self, name))
+        """Fields by name, and in ``misfit`` those of `Misfit` and the root mean squares before and after."""
+        found = {name: as_json(getattr(self, name)) for name in self.__dataclass_fields__}
+        if self.misfit is not None:
+            before, after = self.misfit.rms(self.excess_before), self.misfit.rms(self.excess_after)
+            found["misfit"] |= {"before": before, "after": after}
         return found
-
-    @property
-    def after_on(self) -> str:
-        """The runs that ``excess_after`` was measured on, in words."""
-        count = sum(run.held_out for run in self.runs)
-        if 0 < count < len(self.runs):
-            return f"in all runs, {count} of {len(self.runs)} held out of the fit"
-        return HELD_OUT if count else FITTED
 
 
 @dataclass(frozen=True)
@@ -164,6 +167,38 @@ class Candidate:
     excess_after: float
     closed: float
     parameters: Mapping[str, ParameterEstimate] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CauseSize:
+    """What a cause does to three cycles of a swing, by the fitted model with it and without it.
+
+    Args:
+        effect: its name.
+        run: id of the run whose conditions are taken.
+        amplitude: of the release, rad.
+        damping_ratio: with the cause, dimensionless.
+        damping_ratio_without: with every cause but this one, dimensionless.
+        frequency_change: of the natural frequency by the cause, a fraction.
+        zero_change: of the middle of the swing by the cause, in the unit of the readings.
+        reading_change: root mean square of the change of the reading, in its unit.
+        stands: angle from rest within which the cause holds a body that has stopped, rad; 0 where it holds none.
+    """
+
+    effect: str
+    run: str
+    amplitude: float
+    damping_ratio: float
+    damping_ratio_without: float
+    frequency_change: float
+    zero_change: float
+    reading_change: float
+    stands: float = 0.0
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields, with the units of angles in their names."""
+        found = dict(vars(self))
+        return found | {"amplitude_rad": found.pop("amplitude"), "stands_rad": found.pop("stands")}
 
 
 @dataclass(frozen=True)
@@ -259,6 +294,8 @@ class Diagnosis:
         rest: what remains after the causes.
         model: the model given, with the causes written into it; None where none was given.
         closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
+        sizes: what each fitted cause does to a swing.
+        data: the runs, which are no part of the JSON; None for an answer that was not made by `diagnose`.
     """
 
     campaign: str
@@ -283,6 +320,8 @@ class Diagnosis:
     rest: Rest | None = None
     model: PatchedModel | None = None
     closable: Closable | None = None
+    sizes: tuple[CauseSize, ...] = ()
+    data: Campaign | None = field(default=None, compare=False)
 
     @property
     def decision(self) -> Decision:
@@ -309,9 +348,75 @@ class Diagnosis:
         """The verdict, the answers weighed and the coefficients as short tables, and the caveats."""
         return as_text(diagnosis_parts(self.to_json_dict()))
 
+    def __repr__(self) -> str:
+        """The answer, the gap, and where to go from here, in three lines."""
+        return diagnosis_brief(self.to_json_dict())
+
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The same as `__str__` for notebooks."""
         return as_html(diagnosis_parts(self.to_json_dict()))
+
+    def plot(self, what: str = "fit", runs: Sequence[str] = ()) -> Figure:
+        """Draw one figure of the report.
+
+        Args:
+            what: ``fit`` (the fit over the data) or the name of another figure, such as ``waterfall`` or ``place``.
+            runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+
+        Returns:
+            A matplotlib figure, made without pyplot.
+
+        Raises:
+            TunnelError: for a figure or a run that this diagnosis does not have.
+        """
+        from tunnel_lab.report import draw  # the one way up (decision 0001); matplotlib is slow to load
+
+        return draw(self.to_json_dict(), what, runs)
+
+    def write_report(self, path: Path | str, *, author: str = "", notes: str = "") -> Path:
+        """Write the report, one HTML page.
+
+        Args:
+            path: of the page; replaced when it exists.
+            author: who made the diagnosis.
+            notes: for the head of the page.
+
+        Raises:
+            TunnelError: when the page cannot be written, or the answer does not hold its runs.
+        """
+        from tunnel_lab.report import Byline, write_report  # as in `plot`
+
+        if self.data is None:
+            raise TunnelError("the answer does not hold its runs", remedy="diagnose the campaign again")
+        today = datetime.now().astimezone().date().isoformat()
+        return write_report(self.to_json_dict(), self.data, Path(path), Byline(today, author, notes))
+
+    def to_frame(self) -> pl.DataFrame:
+        """The answer in one table: a row for each size of the gap, parameter and coefficient.
+
+        Returns:
+            ``part`` (``gap``, a cause, ``before`` or ``after``), ``quantity``, ``value``, ``std``, ``unit``.
+        """
+        gap = self.gap
+        rows: list[tuple[str, str, float, float | None, str]] = []
+        for name in ("excess_before", "excess_after", "closed"):
+            rows.append(("gap", name, getattr(gap, name), None, "1"))
+        if gap.misfit is not None:
+            for name, excess in (("rms_before", gap.excess_before), ("rms_after", gap.excess_after)):
+                rows.append(("gap", name, gap.misfit.rms(excess), None, gap.misfit.unit))
+        first = self.candidates[0]
+        for name, given in first.parameters.items():
+            owner, _, parameter = name.rpartition(".")
+            rows.append((owner or first.effect, parameter, given.value, given.std, given.unit))
+        for part, found in (("before", self.coefficients.before), ("after", self.coefficients.after)):
+            rows += [(part, name, given.value, given.std, given.unit) for name, given in found.items()]
+        kinds = {"value": pl.Float64, "std": pl.Float64}
+        names = ("part", "quantity", "value", "std", "unit")
+        return pl.DataFrame(rows, schema={name: kinds.get(name, pl.String) for name in names}, orient="row")
+
+    def to_pandas(self) -> DataFrame:
+        """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
+        return as_pandas(self.to_frame())
 
     def candidates_frame(self) -> pl.DataFrame:
         """A row for each answer weighed: effect, probability, excess_after and closed, as in `Candidate`."""

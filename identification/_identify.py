@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from identification.estimate import Estimate, RunEstimate, Status, by_severity
 from identification.estimators import Estimator, make_estimator
@@ -10,12 +11,13 @@ from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.statistics import widened_by_contradictions
 from identification.status import Examined
+from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def identify(
-    campaign: Campaign, estimator: str | Estimator = "output_error", *, throw: bool = True
+    campaign: Campaign | Path | str, estimator: str | Estimator = "output_error", *, throw: bool = True
 ) -> Estimate:
     """Identify a campaign's coefficients and each of its runs.
 
@@ -23,7 +25,8 @@ def identify(
     left out or cut.
 
     Args:
-        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s.
+        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one file
+            of a data logger.
         estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
             settings, such as ``OutputError(cycles_per_window=5)``.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
@@ -35,6 +38,7 @@ def identify(
         TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
             records that the examination refuses, and, with ``throw``, when no run could be identified.
     """
+    campaign = as_campaign(campaign)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")

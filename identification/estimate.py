@@ -10,7 +10,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import polars as pl
@@ -21,7 +21,11 @@ from identification.status import Status as Status
 from identification.status import by_severity as by_severity
 from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described, check_shape
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
 UNITS: Mapping[str, str] = {
@@ -228,8 +232,14 @@ class Estimate:
 
         return as_text(estimate_parts(self.to_json_dict()))
 
+    def __repr__(self) -> str:
+        """The coefficients, the number of runs, and where to go from here, in three lines."""
+        from identification.printing import estimate_brief
+
+        return estimate_brief(self.to_json_dict())
+
     def _repr_html_(self) -> str:
-        """The same for notebooks."""
+        """The same as `__str__` for notebooks."""
         from identification.printing import as_html, estimate_parts
 
         return as_html(estimate_parts(self.to_json_dict()))
@@ -238,6 +248,15 @@ class Estimate:
         """A row for each coefficient: value, std, unit, and the ends low and high of its 95 % interval."""
         document = self.to_json_dict()
         return long_frame({name: document[name] for name in _CAMPAIGN_QUANTITIES})
+
+    def to_frame(self) -> pl.DataFrame:
+        """`coefficients_frame`, or `runs_frame` where the runs give no coefficients."""
+        known = any(getattr(self, name) is not None for name in _CAMPAIGN_QUANTITIES)
+        return self.coefficients_frame() if known else self.runs_frame()
+
+    def to_pandas(self) -> DataFrame:
+        """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
+        return as_pandas(self.to_frame())
 
     def runs_frame(self) -> pl.DataFrame:
         """A row for each run: its id and status, and the quantities of `RunEstimate` with each ``_std``."""
@@ -302,6 +321,20 @@ _LONG = {
     "low": pl.Float64,
     "high": pl.Float64,
 }
+
+
+def as_pandas(frame: pl.DataFrame) -> DataFrame:
+    """A frame for pandas, by its columns: Polars' own way needs pyarrow.
+
+    Raises:
+        TunnelError: where pandas is not installed.
+    """
+    try:
+        from pandas import DataFrame  # only here: an extra
+    except ModuleNotFoundError as error:
+        remedy = "pip install 'virtual-wind-tunnel[frames]'"
+        raise TunnelError("pandas is not installed", remedy=remedy) from error
+    return DataFrame(frame.to_dict(as_series=False))
 
 
 def long_frame(quantities: Mapping[str, Mapping[str, Any] | None]) -> pl.DataFrame:

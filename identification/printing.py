@@ -355,6 +355,23 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
     return [coefficients_table(document), runs_table(document), more, *(f"Note: {note}" for note in notes)]
 
 
+def estimate_brief(document: Document) -> str:
+    """An estimate in three lines: its coefficients, its runs, and where to go from here."""
+    names = {**SYMBOLS, "omega_n": "ωn", "zeta": "ζ"}
+    run: Document = document["runs"][0] if document["runs"] else {}
+    whole = [(name, document[name]) for name in SYMBOLS if document[name] is not None]
+    shown = whole or [(name, run[name]) for name in ("omega_n", "zeta") if run.get(name) is not None]
+    found = [f"{names[name]} = {_with_std(given)} {unit_mark(given['unit'])}" for name, given in shown]
+    place = "" if whole or not run else f" of {run['id']}"
+    status = document["status"].replace("_", " ")
+    count = f"{len(document['runs'])} run{'' if len(document['runs']) == 1 else 's'}"
+    return (
+        f"Estimate of {document['campaign']!r} by {document['estimator']}: {status}, {count}\n"
+        f"  {', '.join(found) + place or 'no value'}\n"
+        "  print() shows all; .to_frame(), .runs_frame(), .windows_frame()"
+    )
+
+
 def coefficients_table(document: Document) -> TextTable:
     """The campaign's coefficients that could be identified.
 

@@ -18,7 +18,7 @@ from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.pulls import coefficient_move
 from diagnosis.answer.reference_sizes import size_note, sized_coefficients
-from diagnosis.answer.reported import excess_base, gap_summary, on_stretches, report_fits
+from diagnosis.answer.reported import excess_base, gap_summary, held_out_totals, report_fits
 from diagnosis.answer.rest import rest
 from diagnosis.answer.small_swings import coefficient_names
 from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
@@ -84,7 +84,7 @@ def assemble(
     data = study.nominal.problem.data
     begun = time.perf_counter()
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
-    gap = on_stretches(gap, steps)
+    gap = held_out_totals(gap, steps)
     if patched is not None and study.named:
         on = f"{patched.closure.on}, simulated with the patched model"
         gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
@@ -99,10 +99,8 @@ def assemble(
         verdict=verdict(
             study.causes,
             decision([(candidate.effect, candidate.probability) for candidate in weighed]),
-            before=gap.excess_before,
-            closed=gap.closed,
+            gap,
             rest=left,
-            closed_on=gap.closed_on,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
         ),
         gap=gap,

@@ -13,6 +13,12 @@ from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
 _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
+_STEPS = {
+    "spring_stiffness": 0.01,
+    "wind_speed": 0.1,
+    "release_angle": 0.01,
+    "duration": 1.0,
+}  # N m/rad, m/s, rad, s
 
 
 def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
@@ -116,10 +122,18 @@ def _confirmation(found: Confirmation, similarity: Similarity) -> Confirmation:
 
 
 def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
-    """A run to make (`separating_run`) in the measured campaign's units.
+    """A run to make (`separating_run`) in the measured campaign's units, rounded to what an operator can set.
 
     Args:
         run: for the similar campaign.
         similarity: how that was made.
     """
-    return {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
+    own = {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
+    return {name: _settable(value, _STEPS[name]) if name in _STEPS else value for name, value in own.items()}
+
+
+def _settable(value: float, step: float) -> float:
+    """A value that an operator can set: a whole number of steps, or two digits where it is only a few steps."""
+    if abs(value) < 10.0 * step:
+        return float(f"{value:.2g}")
+    return round(round(value / step) * step, 6)

@@ -11,6 +11,7 @@ from diagnosis.answer.confirm import Comparison, compare, confirm
 from diagnosis.answer.held_out import HeldOut
 from diagnosis.closure import Waterfall, share_closed
 from diagnosis.fitting.least_squares import Fit
+from diagnosis.misfit import Misfit
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.study import COARSE_STEP, Study
@@ -128,51 +129,60 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     ratio = base.extra + 1.0  # of the estimated noise to the base
     random = study.random_answer(study.fitted)
     explained = 0.0 if study.coarse and COARSE_STEP.name in study.causes else base.extra
-    runs, sizes = [], []
-    before_out, after_out = [], []
+    predicted = {**shown.before, **shown.before_out} if study.causes else shown.before
+    runs, sizes, powers = [], [], []
     for run in study.nominal.problem.data.runs:
-        before = _excess(shown.before[run.id]) / run.block * ratio + base.hum + base.extra
+        before = _excess(predicted[run.id]) / run.block * ratio + base.hum + base.extra
         after = _excess(shown.after[run.id]) / run.block * ratio + explained
         if random is not None and run.wind_on:
             after = random.process.excess / run.block * ratio + explained
         held_out = run.id in shown.held_out
-        if held_out and run.id in shown.before_out:
-            before_out.append(_excess(shown.before_out[run.id]) / run.block * ratio + base.hum + base.extra)
-            after_out.append(after)
-        runs.append(RunGap(run.id, before, after, held_out=held_out))
+        runs.append(RunGap(run.id, before, after if study.named else before, held_out=held_out))
         sizes.append(run.reading.size * run.block)
+        powers.append(float(np.var(run.reading)))
     weight = np.array(sizes) / np.sum(sizes)
-    total_before = float(weight @ [run.before for run in runs])
-    total_after = float(weight @ [run.after for run in runs])
-    out = sum(before_out) > 0.0  # else no run could be held out
-    closed = share_closed(sum(before_out), sum(after_out)) if out else share_closed(total_before, total_after)
+    before = float(weight @ [run.before for run in runs])
+    after = float(weight @ [run.after for run in runs])
+    own = study.similarity.own(1.0, study.similarity.reading)
     return GapSummary(
         detected=bool(study.causes),
-        excess_before=total_before,
-        excess_after=total_after if study.named else total_before,
-        closed=closed if study.named else 0.0,
-        closed_on=HELD_OUT if before_out else FITTED,
-        runs=tuple(runs) if study.named else tuple(replace(run, after=run.before) for run in runs),
+        excess_before=before,
+        excess_after=after,
+        closed=share_closed(before, after) if study.named else 0.0,
+        closed_on=HELD_OUT if shown.before_out else FITTED,
+        runs=tuple(runs),
         false_alarm_rate=GAP_FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
+        misfit=Misfit(
+            own * float(np.sqrt(base.variance)),
+            own * float(np.sqrt(weight @ powers)),
+            study.similarity.reading,
+        ),
     )
 
 
-def on_stretches(gap: GapSummary, held_out: Waterfall) -> GapSummary:
-    """The summary with the share closed measured on stretches of time, where no whole run could be held out.
+def held_out_totals(gap: GapSummary, held_out: Waterfall) -> GapSummary:
+    """The summary with the totals of the waterfall, so that every figure and sentence states the same gap.
 
     Args:
-        gap: of the fitted runs, or of runs held out.
-        held_out: excesses on what was held out.
+        gap: by run.
+        held_out: excesses on what was held out, of which no reading is fitted.
 
     Returns:
-        As it was where a run was held out, or no cause is named.
+        As it was where nothing is found.
     """
-    before, after = held_out.steps[0].excess, held_out.steps[-1].excess
-    if any(run.held_out for run in gap.runs) or len(held_out.steps) == 1 or before <= 0.0:
+    if not gap.detected:
         return gap
-    return replace(gap, closed=share_closed(before, after), closed_on=held_out.held_out)
+    before, after = held_out.steps[0].excess, held_out.steps[-1].excess
+    named = len(held_out.steps) > 1
+    return replace(
+        gap,
+        excess_before=before,
+        excess_after=after,
+        closed=share_closed(before, after) if named else 0.0,
+        closed_on=held_out.held_out,
+    )
 
 
 def _excess(residual: Array) -> float:

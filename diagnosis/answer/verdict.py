@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.closure import Rest
 from diagnosis.decision import Decision, undecided_words
+from diagnosis.misfit import of_swing, rms_shown
 from diagnosis.names import plain
 from diagnosis.printing import share
+from diagnosis.result import GapSummary
 from identification.printing import significant
 from tunnel_sim.effects import effect_class
 
@@ -24,11 +26,9 @@ _CHANNEL_WORDS = {
 def verdict(
     causes: Sequence[str],
     found: Decision,
+    gap: GapSummary,
     *,
-    before: float,
-    closed: float,
     rest: Rest,
-    closed_on: str,
     both_winds: bool,
 ) -> str:
     """The answer in one paragraph.
@@ -36,40 +36,42 @@ def verdict(
     Args:
         causes: names; empty for no gap.
         found: whether the answer is decided.
-        before: excess of the nominal model, in units of the noise variance.
-        closed: share of the gap closed, 0 to 1.
+        gap: how large it is, and how far it closes.
         rest: what remains.
-        closed_on: the runs that ``closed`` was measured on, in words (`GapSummary.closed_on`).
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
     """
     if not causes:
         return (
             f"No gap: the nominal model explains the runs down to their noise "
-            f"(mean squared residual over noise variance, minus one: {before:+.3f})."
+            f"(mean squared residual over noise variance, minus one: {gap.excess_before:+.3f})."
         )
+    size = _size(gap)
     if not found.decided:
-        said = f"There is a gap ({_times(before)} the noise power), and its cause is undecided."
-        with_first = f"With the first of them added, {share(closed)} of the gap closes {closed_on}."
+        said = f"There is a gap ({size}), and its cause is undecided."
+        with_first = f"With the first of them added, {share(gap.closed)} of the gap closes {gap.closed_on}."
         return " ".join((said, undecided_words(found), *(() if tuple(causes) == UNKNOWN else (with_first,))))
     if tuple(causes) == UNKNOWN:
-        return (
-            f"There is a gap ({_times(before)} the noise power), and no effect of the vocabulary explains it. "
-            f"{rest.words}"
-        )
+        return f"There is a gap ({size}), and no effect of the vocabulary explains it. {rest.words}"
     several = len(causes) > 1
     sources = "; ".join(
         _source(name, both_winds=both_winds) + (f" ({plain(name)})" if several else "") for name in causes
     )
     return (
-        f"The gap ({_times(before)} the noise power) comes {'only in part ' if rest.material else ''}"
+        f"The gap ({size}) comes {'only in part ' if rest.material else ''}"
         f"from {plain(*causes)} (probability {found.credible[0][1]:.2f}): "
-        f"{sources}. With {'them' if several else 'it'} added, {share(closed)} of the gap "
-        f"closes {closed_on}. {rest.words}"
+        f"{sources}. With {'them' if several else 'it'} added, {share(gap.closed)} of the gap "
+        f"closes {gap.closed_on}. {rest.words}"
     )
 
 
-def _times(excess: float) -> str:
-    return f"{excess:.2f} times" if excess < 10.0 else f"{significant(excess, 4)} times"
+def _size(gap: GapSummary) -> str:
+    """The gap, such as ``0.134° root mean square, 2.1 % of the swing, 19.34 times the noise power``."""
+    excess = gap.excess_before
+    times = f"{excess:.2f}" if excess < 10.0 else significant(excess, 4)
+    powers = f"{times} times the noise power"
+    if gap.misfit is None:
+        return powers
+    return f"{rms_shown(gap.misfit, excess)} root mean square, {of_swing(gap.misfit, excess)}, {powers}"
 
 
 def _source(name: str, *, both_winds: bool) -> str:

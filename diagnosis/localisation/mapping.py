@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnosis.fitting.least_squares import Fit
 from diagnosis.fitting.similarity import Similarity
+from diagnosis.fitting.spectra import resonance
 from diagnosis.localisation.backbone import backbones
 from diagnosis.localisation.excess import (
     Profile,
@@ -19,7 +20,7 @@ from diagnosis.localisation.excess import (
     within_bands,
 )
 from diagnosis.localisation.lines import residual_lines
-from diagnosis.localisation.maps import GroupExcess, Maps, RunMap, Trace
+from diagnosis.localisation.maps import Grid, GroupExcess, Maps, RunMap, Trace
 from diagnosis.localisation.own_units import maps_in_own_units, trace_in_own_units
 from diagnosis.localisation.phase_plane import apparent_moment, motion, phase_plane
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -29,8 +30,11 @@ _TIME_BINS = 60
 _AMPLITUDE_BINS = 40
 _FREQUENCY_BINS = 110  # of equal ratio, for the picture
 _FINE_BINS = 1500  # of equal width, for the interval
-_TRACES = 16  # runs
-_TRACE_POINTS = 600
+_GRID_ROWS, _GRID_COLUMNS = 6, 8
+_TRACE_POINTS = 20_000  # of all runs together
+_LEAST_POINTS = 200  # of a run
+_CYCLE_POINTS = 24  # of a cycle
+_SHOWN_CYCLES = 6  # in which the models differ most
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +92,8 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         backbones=tuple(backbones(nominal, [run.start for run in nominal.problem.data.runs])),
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, None, excesses),
+        grid=_grid(scaled, inside, times),
+        unit=similarity.reading,
     )
     interval = _frequency_interval(excesses)
     if interval is not None:
@@ -213,6 +219,40 @@ def _amplitude_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
     return profile(edges, place, *_by_sample(fit, inside))
 
 
+def _grid(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Grid:
+    """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
+    amplitude = [amplitudes(fit, i) for i in range(len(inside))]
+    rows = np.linspace(0.0, 1.0001 * max(float(a.max()) for a in amplitude), _GRID_ROWS + 1)
+    power, expected, variance = _by_sample(fit, inside)
+    speeds = sorted({run.wind_speed for run in fit.problem.data.runs})
+    shared = len(speeds) == 1
+    longest = max(float(time[-1]) for time in times)
+    edges = np.linspace(0.0, 1.0001 * longest, _GRID_COLUMNS + 1)
+    places = [
+        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(run.wind_speed))
+        for run, time in zip(fit.problem.data.runs, times, strict=True)
+    ]
+    columns = []
+    for column in range(_GRID_COLUMNS if shared else len(speeds)):
+        inside_column = [place == column for place in places]
+        columns.append(
+            profile(
+                rows,
+                [a[keep] for a, keep in zip(amplitude, inside_column, strict=True)],
+                [p[keep] for p, keep in zip(power, inside_column, strict=True)],
+                expected,
+                variance,
+            )
+        )
+    return Grid(
+        rows,
+        None if shared else np.array(speeds),
+        edges if shared else None,
+        np.stack([column.mean for column in columns], axis=1),
+        np.stack([column.std for column in columns], axis=1),
+    )
+
+
 def _time_by_run(fit: Fit, times: list[Array], edges: Array) -> Array:
     rows = []
     for run, time, residual in zip(fit.problem.data.runs, times, fit.residuals, strict=True):
@@ -265,13 +305,16 @@ def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None
 
 def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
     times = _times(nominal)
-    order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)[:_TRACES]
-    return tuple(_trace(nominal, best, i, times[i]) for i in order)
+    order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)
+    most = max(_LEAST_POINTS, _TRACE_POINTS // len(order))
+    return tuple(_trace(nominal, best, i, times[i], most) for i in order)
 
 
-def _trace(nominal: Fit, best: Fit | None, index: int, times: Array) -> Trace:
+def _trace(nominal: Fit, best: Fit | None, index: int, times: Array, most: int) -> Trace:
     run = nominal.problem.data.runs[index]
-    group = max(1, -(-run.reading.size // _TRACE_POINTS))
+    frequency = resonance(nominal, index)
+    enough = int(1.0 / (_CYCLE_POINTS * frequency * run.interval))  # more points show no more of a cycle
+    group = max(1, min(enough, run.reading.size // _LEAST_POINTS), -(-run.reading.size // most))
     count = run.reading.size // group
     std = run.noise_std
 
@@ -279,8 +322,31 @@ def _trace(nominal: Fit, best: Fit | None, index: int, times: Array) -> Trace:
         grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
         return grouped
 
-    time = means(times)
-    after = None if best is None else means(run.unscaled(best.residuals[index]))
-    return Trace(
-        run.id, time, means(run.unscaled(nominal.residuals[index])), after, std / float(np.sqrt(group))
+    filled = (
+        np.full(count, True) if run.samples is None else means(run.samples.count.astype(np.float64)) > 0.0
     )
+    time, reading, before = (
+        means(values)[filled] for values in (times, run.reading, run.unscaled(nominal.residuals[index]))
+    )
+    after = None if best is None else means(run.unscaled(best.residuals[index]))[filled]
+    return Trace(
+        run.id,
+        time,
+        reading,
+        before,
+        after,
+        std / float(np.sqrt(group)),
+        _most_energy(time, before if after is None else before - after, _SHOWN_CYCLES / frequency),
+    )
+
+
+def _most_energy(time: Array, difference: Array, length: float) -> tuple[float, float]:
+    """The stretch of a length, s, that holds the most of a difference's energy; the whole where that is shorter."""
+    first, last = float(time[0]), float(time[-1])
+    if last - first <= length:
+        return first, last
+    energy = np.concatenate([[0.0], np.cumsum(difference**2)])
+    ends = np.searchsorted(time, time + length, side="right")
+    whole = time <= last - length
+    start = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
+    return start, start + length

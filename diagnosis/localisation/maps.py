@@ -64,21 +64,47 @@ class GroupExcess:
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The residual of one run against time.
+    """One run against time: what was measured, and what the models leave of it.
+
+    What a model predicts is the reading minus its residual.
 
     Args:
         id: of the run.
-        time: s, shape (n,).
-        before: of the nominal model, shape (n,), rad.
-        after: with the causes added, shape (n,), rad; None where nothing was added.
+        time: s, shape (n,); without the times at which the record has no sample.
+        reading: means of the reading as it is fitted, shape (n,), rad.
+        before: residuals of the nominal model, shape (n,), rad.
+        after: residuals with the causes added, shape (n,), rad; None where nothing was added.
         noise_std: of one value, rad.
+        differ: the few cycles in which the models differ most, s; where nothing was added, in which the nominal
+            model misses most.
     """
 
     id: str
     time: Array
+    reading: Array
     before: Array
     after: Array | None
     noise_std: float
+    differ: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Excess by amplitude and by wind speed, or by time where the runs have one speed.
+
+    Args:
+        amplitude: edges of the rows, rad, shape (m + 1,).
+        speeds: of the columns, m/s, shape (n,); None where the columns are times.
+        time: edges of the columns since the start of the record, s, shape (n + 1,); None where they are speeds.
+        excess: mean by cell, shape (m, n), in noise variances of a sample; NaN where a cell is empty.
+        std: of it where there is no gap, shape (m, n).
+    """
+
+    amplitude: Array
+    speeds: Array | None
+    time: Array | None
+    excess: Array
+    std: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +126,9 @@ class Maps:
         lines: narrow lines.
         backbones: by run.
         phase_plane: missing moment by angle and rate; None where there is none.
-        traces: residuals of the runs with the largest excess.
+        traces: every run against time, the largest excess first.
+        grid: excess by amplitude and speed, or amplitude and time.
+        unit: of the readings and residuals.
     """
 
     runs: tuple[RunMap, ...]
@@ -118,6 +146,8 @@ class Maps:
     backbones: tuple[Backbone, ...]
     phase_plane: PhasePlane | None
     traces: tuple[Trace, ...]
+    grid: Grid
+    unit: str = "rad"
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name with their units, in JSON's types; null where a bin is empty."""
@@ -151,6 +181,8 @@ class Maps:
             ],
             "backbones": [_backbone(curve) for curve in self.backbones],
             "phase_plane": None if self.phase_plane is None else _plane(self.phase_plane),
+            "grid": _grid(self.grid),
+            "unit": self.unit,
             "traces": [_trace(trace) for trace in self.traces],
         }
 
@@ -216,11 +248,23 @@ def _plane(plane: PhasePlane) -> dict[str, Any]:
     }
 
 
+def _grid(grid: Grid) -> dict[str, Any]:
+    return {
+        "amplitude_edges_rad": numbers(grid.amplitude),
+        "wind_speeds": None if grid.speeds is None else numbers(grid.speeds),
+        "time_edges_s": None if grid.time is None else numbers(grid.time),
+        "excess": [numbers(row) for row in grid.excess],
+        "std": [numbers(row) for row in grid.std],
+    }
+
+
 def _trace(trace: Trace) -> dict[str, Any]:
     return {
         "id": trace.id,
         "time_s": numbers(trace.time),
+        "reading_rad": numbers(trace.reading),
         "before_rad": numbers(trace.before),
         "after_rad": None if trace.after is None else numbers(trace.after),
         "noise_std_rad": trace.noise_std,
+        "differ_s": list(trace.differ),
     }

@@ -33,7 +33,7 @@ def maps_in_own_units(maps: Maps, similarity: Similarity) -> Maps:
         replace(run, frequency=hertz(run.frequency), spring_stiffness=known(run.spring_stiffness, "N m/rad"))
         for run in maps.runs
     )
-    plane = maps.phase_plane
+    plane, grid = maps.phase_plane, maps.grid
     return replace(
         maps,
         runs=tuple(runs),
@@ -43,6 +43,7 @@ def maps_in_own_units(maps: Maps, similarity: Similarity) -> Maps:
         lines=tuple(replace(line, frequency=hertz(line.frequency)) for line in maps.lines),
         backbones=tuple(_backbone(curve, similarity) for curve in maps.backbones),
         phase_plane=None if plane is None else _plane(plane, similarity.own(1.0, plane.unit)),
+        grid=replace(grid, time=None if grid.time is None else _times(grid.time, similarity)),
         traces=tuple(trace_in_own_units(trace, similarity) for trace in maps.traces),
     )
 
@@ -62,9 +63,11 @@ def trace_in_own_units(trace: Trace, similarity: Similarity) -> Trace:
     return replace(
         trace,
         time=_times(trace.time, similarity),
+        reading=trace.reading * factor + similarity.rest,
         before=trace.before * factor,
         after=None if trace.after is None else trace.after * factor,
         noise_std=trace.noise_std * factor,
+        differ=(similarity.own(trace.differ[0], "s"), similarity.own(trace.differ[1], "s")),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import degrees
 
 from diagnosis.localisation.inference import Finding
 from diagnosis.localisation.mapping import Survey
@@ -13,6 +14,7 @@ from identification.printing import p_text
 from tunnel_sim.effects import Effect
 
 _LISTED = 12  # ids listed in a sentence at most
+_NEARLY_NOTHING = 0.02  # of the power of the other runs
 _BAND_WORDS = {
     "0": "slower than the oscillation",
     "f0": "at the oscillation itself",
@@ -99,8 +101,11 @@ def _wind_contrast(found: Survey) -> str:
     groups = {group.label: group for group in found.maps.groups if group.by == "wind"}
     if len(groups) < 2:
         return ""
-    on, off = (f"{float(f'{groups[wind].excess:.2g}'):g}" for wind in ("on", "off"))
-    return f"; mean excess {on} with the wind on, {off} with it off"
+    more, less = sorted(("on", "off"), key=lambda wind: -groups[wind].excess)
+    most, least = groups[more].excess, groups[less].excess
+    if least < _NEARLY_NOTHING * most:
+        return f"; nearly all of it with the wind {more}"
+    return f"; {most / least:.2g} times as much power with the wind {more} as with it {less}"
 
 
 def _extent(where: Where, found: Survey) -> str:
@@ -112,7 +117,7 @@ def _extent(where: Where, found: Survey) -> str:
     greatest = float(found.maps.amplitude.edges[-1])
     amplitude = where.amplitude_rad
     if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
-        places.append(f"at amplitudes from {amplitude[0]:.2f} to {amplitude[1]:.2f} rad")
+        places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
     return f"Four fifths of it lie {', '.join(places)}." if places else ""

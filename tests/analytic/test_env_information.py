@@ -29,7 +29,7 @@ LOADS = (
 def run(
     options: dict[str, Any], action: Any = 0, **arguments: Any
 ) -> tuple[Any, list[float], dict[str, Any]]:
-    env = gymnasium.make("tunnel_sim/FreeDecay-v0", **arguments)
+    env = gymnasium.make("tunnel_sim/FreeDecay-v0", **{"preset": "plain", **arguments})
     env.reset(seed=1, options={"truth": TRUTH, "air_density": RIG.air.density, **options})
     rewards, over, info = [], False, {}
     while not over:

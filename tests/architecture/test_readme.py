@@ -78,11 +78,32 @@ def sessions(text: str) -> list[tuple[str, list[str]]]:
 def test_excerpts_are_the_beginning_of_what_the_how_to_pages_show() -> None:
     whole = dict(session for page in HOW_TO.glob("*.md") for session in sessions(page.read_text("utf-8")))
     typed = [command.split()[1] for command, _ in sessions(README)]
-    assert sorted(typed) == ["demo", "diagnose", "simulate"]
+    assert sorted(typed) == ["diagnose", "simulate"]
     for command, shown in sessions(README):
         assert shown[-1] == "…" or shown == whole[command]
         shown = [line for line in shown if line != "…"]
         assert shown == whole[command][: len(shown)]
+
+
+@pytest.mark.slow
+def test_the_script_for_a_newcomer_runs_and_prints_what_is_shown(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
+    ((simulate, _), *_) = sessions(README)
+    output_of(simulate, tmp_path)
+    (script,), (shown,) = blocks("python"), blocks("text")
+    assert len(script.splitlines()) <= 10
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert_same(shown.splitlines(), done.stdout.splitlines())
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+    assert "</html>" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_the_readme_is_two_screens_long() -> None:

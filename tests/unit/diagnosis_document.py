@@ -47,6 +47,7 @@ def document() -> dict[str, Any]:
             "false_alarm_rate": 0.013,
             "p_value": 2.9e-9,
             "tests": {"white": 3.7e-8, "lines": 0.0042},
+            "misfit": {"noise": 4.5e-4, "swing": 0.0815, "unit": "rad", "before": 0.0023534, "after": 1.5808e-4},
         },
         "where": {
             "channel": "damping",
@@ -75,6 +76,11 @@ def document() -> dict[str, Any]:
         ],
         "waterfall_on": "on runs held out of the fit",
         "without": {CAUSE: 21.85, RIVAL: 2.85},
+        "sizes": [
+            {"effect": CAUSE, "run": "beta", "amplitude_rad": 0.1625, "damping_ratio": 0.01335,
+             "damping_ratio_without": 0.01115, "frequency_change": -0.00075, "zero_change": 1.5e-5,
+             "reading_change": 0.00315, "stands_rad": 0.00105},
+        ],
         "rest": {
             "significant": True,
             "excess": 0.1345,
@@ -157,10 +163,20 @@ def maps() -> dict[str, Any]:
             "unit": "N m",
             "runs": ["alpha", "gamma"],
         },
+        "grid": {
+            "amplitude_edges_rad": [0.0, 0.15, 0.32],
+            "wind_speeds": [0.0, 13.5, 21.5],
+            "time_edges_s": None,
+            "excess": [[2.25, 4.25, None], [6.25, 0.05, 9.25]],
+            "std": [[0.044, 0.045, None], [0.046, 0.047, 0.048]],
+        },
+        "unit": "rad",
         "traces": [
-            {"id": "alpha", "time_s": [0.0, 1.0, 2.0], "before_rad": [0.004, -0.003, 0.002],
+            {"id": "alpha", "time_s": [0.0, 1.0, 2.0], "reading_rad": [0.31, -0.26, 0.21],
+             "differ_s": [0.5, 2.0], "before_rad": [0.004, -0.003, 0.002],
              "after_rad": [0.0004, -0.0005, 0.0006], "noise_std_rad": 1e-4},
-            {"id": "gamma", "time_s": [0.0, 1.5, 3.0], "before_rad": [0.007, -0.006, 0.005],
+            {"id": "gamma", "time_s": [0.0, 1.5, 3.0], "reading_rad": [-0.29, 0.24, -0.19],
+             "differ_s": [0.0, 1.5], "before_rad": [0.007, -0.006, 0.005],
              "after_rad": None, "noise_std_rad": 1e-4},
         ],
     }  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.unit.diagnosis_document import IDS, campaign, document
+from tests.unit.diagnosis_document import IDS, document
 from tunnel_lab.report.drawing import run_label
 from tunnel_lab.report.where import charts
 
@@ -26,7 +26,7 @@ def given() -> Document:
 def test_the_spectrum_of_all_runs_and_of_each(given: Document) -> None:
     spectrum = given["maps"]["frequency"]
     spectrum["by_run"] = [[2.25, None, 0.5], [-0.5, 0.0, 1.0], [None, 3.0, -0.95]]
-    (chart,) = charts(given, campaign())["where-spectrum"]
+    (chart,) = charts(given)["where-spectrum"]
     centres = [0.7071, 2.0, 8.0]  # Hz, √(0.5 · 1), √(1 · 4), √(4 · 16)
     whole, *each = chart["views"]
     assert [view["run"] for view in each] == list(IDS)
@@ -55,7 +55,7 @@ def test_bins_without_a_record_are_left_out(given: Document) -> None:
     spectrum["excess"][0], spectrum["after"] = None, None
     spectrum["std"] = [None, 0.052, 0.4]
     spectrum["by_run"] = [[None, 1.0, 2.0]] * 3
-    (chart,) = charts(given, campaign())["where-spectrum"]
+    (chart,) = charts(given)["where-spectrum"]
     frequency, _, _, before, after = chart["views"][0]["data"]
     assert frequency == pytest.approx([2.0, 8.0])
     assert (before, after) == ([81.0, 0.3], [None, None])
@@ -63,7 +63,7 @@ def test_bins_without_a_record_are_left_out(given: Document) -> None:
 
 
 def test_the_cells_of_runs_over_time(given: Document) -> None:
-    (chart,) = charts(given, campaign())["where-runs"]
+    (chart,) = charts(given)["where-runs"]
     floor = 3.0 * 0.017 * np.sqrt(3.0)  # three deviations of a cell, of which there are three to a run
     assert chart["values"] == [[60.0, 21.0, None], [9.0, None, 1.5], [2.0, 0.5, None]]
     assert chart["range"] == pytest.approx([floor, 60.0])
@@ -73,38 +73,15 @@ def test_the_cells_of_runs_over_time(given: Document) -> None:
 
 
 def test_the_cells_of_the_missing_moment(given: Document) -> None:
-    (chart,) = charts(given, campaign())["where-phase-plane"]
+    (chart,) = charts(given)["where-phase-plane"]
     assert chart["values"] == [[12.0, -25.0], [None, None]]  # the last is within three deviations
     assert chart["unit"] == "10⁻³ N m"
     reach = 1e3 * float(np.quantile([0.012, 0.025, 0.001], 0.98))
     assert chart["range"] == pytest.approx([-reach, reach])
     assert chart["x"]["edges"] == chart["y"]["edges"] == given["maps"]["phase_plane"]["edges_rad"]
     given["maps"]["phase_plane"] = None
-    assert "where-phase-plane" not in charts(given, campaign())
+    assert "where-phase-plane" not in charts(given)
 
 
-def test_readings_and_residuals_of_the_traces(given: Document) -> None:
-    data = campaign()
-    given["maps"]["traces"].append(given["maps"]["traces"][0] | {"id": "not there"})
-    readings, residuals = charts(given, data)["residuals"]
-    records = {run.id: run.record for run in data.runs}
-    for reading, residual, trace in zip(
-        readings["views"], residuals["views"], given["maps"]["traces"][:2], strict=True
-    ):
-        assert reading["run"] == residual["run"] == trace["id"]
-        assert reading["label"].startswith(trace["id"])
-        record, (time, yaw) = records[trace["id"]], reading["data"]
-        assert 500 < len(time) < 2000  # enough for a screen, and no more than twice that
-        assert time[-1] > 0.99 * record.time_s[-1]
-        assert yaw == pytest.approx(np.interp(time, record.time_s, record.yaw_rad), abs=5e-5)
-        before = [1e3 * value for value in trace["before_rad"]]
-        after = [None] * 3 if trace["after_rad"] is None else [1e3 * value for value in trace["after_rad"]]
-        assert residual["data"] == [trace["time_s"], pytest.approx(before), pytest.approx(after)]
-    assert readings["y"]["label"] == "reading [rad]"
-    assert residuals["y"]["label"] == "residual [10⁻³ rad]"
-
-
-def test_no_maps_no_charts_and_no_traces_no_residuals(given: Document) -> None:
-    given["maps"]["traces"] = []
-    assert "residuals" not in charts(given, campaign())
-    assert charts(given | {"maps": None}, campaign()) == {}
+def test_no_maps_no_charts(given: Document) -> None:
+    assert charts(given | {"maps": None}) == {}

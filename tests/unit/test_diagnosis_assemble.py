@@ -223,6 +223,9 @@ def test_every_kind_of_answer_is_a_document_of_the_schema(name):
         assert document.gap.closed > 0.9
         assert document.gap.excess_after < 0.1 * document.gap.excess_before
         assert document.where.channel is not None
+        # one gap: that of the waterfall
+        assert document.gap.excess_before == document.waterfall[0].excess
+        assert document.gap.excess_after == document.waterfall[-1].excess
     else:
         assert document.gap.closed == 0.0
         assert document.gap.excess_after == document.gap.excess_before

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
+from diagnosis.answer.own_units import own_next_run
 from diagnosis.fitting.similarity import (
     REFERENCE_FREQUENCY,
     REFERENCE_STIFFNESS,
@@ -258,3 +259,17 @@ def test_the_diagnosis_of_a_stretched_campaign_is_stretched(twice_caused, time, 
     assert found.gap.closed == pytest.approx(first.gap.closed, abs=1e-3)
     for name, before in first.coefficients.after.items():
         assert found.coefficients.after[name].value == pytest.approx(before.value, abs=0.1 * before.std)
+
+
+def test_a_run_to_make_can_be_set_by_an_operator():
+    run = {
+        "spring_stiffness": 81.5033,
+        "wind_speed": 20.0,
+        "release_angle": 0.35,
+        "duration": 33.4567,
+        "separation": 9.3,
+    }
+    shown = own_next_run(run, Similarity())
+    assert shown == run | {"spring_stiffness": 81.5, "duration": 33.0}
+    small = own_next_run(run | {"spring_stiffness": 0.012345, "duration": 0.34567}, Similarity())
+    assert (small["spring_stiffness"], small["duration"]) == (0.012, 0.35)

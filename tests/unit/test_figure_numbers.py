@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
+from tests.unit.diagnosis_document import CONDITIONS, IDS, document
 from tests.unit.shown_numbers import assert_shows, numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
@@ -72,6 +72,11 @@ def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     assert fig.axes[0].texts[0].get_text() == "> 99.9 %"
 
 
+def rms(excess: Any) -> Any:
+    """A misfit in degrees, by the noise of the document."""
+    return np.degrees(4.5e-4) * np.sqrt(np.maximum(excess, 0.0))
+
+
 def test_bars_of_the_waterfall(given: Document) -> None:
     fig = waterfall_figure(given)
     assert fig is not None
@@ -80,50 +85,59 @@ def test_bars_of_the_waterfall(given: Document) -> None:
     shade, *bars = axes.patches
     ends = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars]
     box = shade.get_extents().transformed(axes.transData.inverted())
-    assert (box.x0, box.x1) == pytest.approx((0.1 * noise, noise))
-    wanted = [(2.75, 28.45), (0.1345, 2.75)]
-    assert np.array(ends) == pytest.approx(np.array(wanted))
+    assert (box.x0, box.x1) == pytest.approx((0.0, rms(noise)))
+    assert np.array(ends) == pytest.approx(rms([(2.75, 28.45), (0.1345, 2.75)]))
     assert [bar.get_y() + 0.5 * bar.get_height() for bar in bars] == pytest.approx([1.0, 2.0])
     texts = [text.get_text() for text in axes.texts]
-    for text, value in zip(texts, (28.45, 2.75, 0.1345, 0.1345), strict=True):
+    for text, value in zip(texts, rms([28.45, 2.75, 0.1345, 0.1345]), strict=True):
         assert_shows(text, [value])
+        assert text.endswith("°")
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == ["nominal model", "+ quadratic damping", "+ coulomb friction", "the rest: immaterial"]
     first, last, alone = axes.lines
-    assert (curve(first), curve(last)) == ([(28.45, 0)], [(0.1345, 3)])
-    assert curve(alone) == [(21.85, 1), (2.85, 2)]
-    assert axes.get_xscale() == "log"
+    (at,), (end,), beside = (np.array(curve(line)) for line in (first, last, alone))
+    assert (*at, *end) == pytest.approx((rms(28.45), 0, rms(0.1345), 3))
+    assert beside == pytest.approx(np.array([(rms(21.85), 1), (rms(2.85), 2)]))
+    assert axes.get_xscale() == "linear"
+    assert axes.get_xlabel() == "root mean square misfit [°]"
 
 
-def test_a_waterfall_below_the_noise_ends_at_the_floor(given: Document) -> None:
+def test_a_waterfall_below_the_noise_ends_at_zero(given: Document) -> None:
     given["waterfall"][-1]["excess"] = -0.002
     given["maps"], given["rest"] = None, given["rest"] | {"significant": False}
     fig = waterfall_figure(given)
     assert fig is not None
     ((least, _),) = curve(fig.axes[0].lines[1])
-    assert least == pytest.approx(0.1 * 3.0 * 1e-3)
+    assert least == 0.0
     assert fig.axes[0].get_yticklabels()[-1].get_text().replace("\n", " ") == "the rest: within the noise"
     assert waterfall_figure(given | {"waterfall": given["waterfall"][:1]}) is None
+
+
+def test_a_document_without_misfit_is_drawn_in_the_noise(given: Document) -> None:
+    del given["gap"]["misfit"]
+    fig = waterfall_figure(given)
+    assert fig is not None
+    assert curve(fig.axes[0].lines[0]) == [(pytest.approx(np.sqrt(28.45)), 0)]
+    assert fig.axes[0].get_xlabel() == "root mean square misfit [noise std]"
 
 
 def test_points_of_the_closure(given: Document) -> None:
     fig = answer.closure_figure(given)
     axes, runs = fig.axes[0], given["gap"]["runs"]
-    floor = 0.1 * 0.063  # a tenth of three times 0.021: what is below is drawn there
     before, held_out, fitted = axes.lines
-    assert curve(before) == [(run["before"], row) for row, run in enumerate(runs)]
+    rows = [(rms(run["before"]), row) for row, run in enumerate(runs)]
+    assert np.array(curve(before)) == pytest.approx(np.array(rows))
     for line, whether in ((held_out, True), (fitted, False)):
-        wanted = [(max(r["after"], floor), row) for row, r in enumerate(runs) if r["held_out"] == whether]
+        wanted = [(rms(r["after"]), row) for row, r in enumerate(runs) if r["held_out"] == whether]
         assert np.array(curve(line)) == pytest.approx(np.array(wanted))
     assert [label.get_text() for label in axes.get_yticklabels()] == list(IDS)
     ends = np.array([sorted(segment[:, 0]) for segment in axes.collections[0].get_segments()])
-    assert ends == pytest.approx(np.array([sorted((r["before"], max(r["after"], floor))) for r in runs]))
+    assert ends == pytest.approx(np.array([sorted((rms(r["before"]), rms(r["after"]))) for r in runs]))
     noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
-    assert (noise.x0, noise.x1) == pytest.approx((floor, 0.063))
-    assert axes.get_xscale() == "log"
+    assert (noise.x0, noise.x1) == pytest.approx((0.0, rms(0.063)))  # three times 0.021
     low, high = axes.get_xlim()
-    assert low < floor
-    assert high > 31.72
+    assert low == 0.0
+    assert high > rms(31.72)
 
 
 def test_closure_without_maps_and_without_causes(given: Document) -> None:
@@ -132,38 +146,30 @@ def test_closure_without_maps_and_without_causes(given: Document) -> None:
         run["after"] = run["before"]
     axes = answer.closure_figure(given).axes[0]
     noise = axes.patches[0].get_extents().transformed(axes.transData.inverted())
-    assert noise.x1 == pytest.approx(0.03)
+    assert noise.x1 == pytest.approx(rms(0.03))
     assert len(axes.lines) == 1
 
 
-def test_traces(given: Document) -> None:
-    given["maps"]["traces"].append(given["maps"]["traces"][0] | {"id": "not there"})
-    fig = answer.traces_figure(given, campaign())
+@pytest.mark.parametrize("speeds", [[0.0, 13.5, 21.5], None])
+def test_the_place_of_the_gap(given: Document, speeds: list[float] | None) -> None:
+    grid = given["maps"]["grid"]
+    if speeds is None:
+        grid |= {"wind_speeds": None, "time_edges_s": [0.0, 2.5, 5.0, 7.5]}
+    fig = where.place_figure(given)
     assert fig is not None
-    top, bottom = fig.axes[:2], fig.axes[2:]
-    runs = {run.id: run.record for run in campaign().runs}
-    for reading, residual, trace in zip(top, bottom, given["maps"]["traces"][:2], strict=True):
-        assert trace["id"] in reading.get_title(loc="left")
-        record, (line,) = runs[trace["id"]], reading.lines
-        shown = np.array(curve(line))
-        assert 700 < len(shown) <= 3000
-        assert np.allclose(np.interp(shown[:, 0], record.time_s, record.yaw_rad), shown[:, 1])
-        drawn = [np.array(curve(line)) for line in residual.lines]
-        wanted = [trace[key] for key in ("before_rad", "after_rad") if trace[key] is not None]
-        assert len(drawn) == len(wanted)
-        for values, rows in zip(wanted, drawn, strict=True):
-            assert rows[:, 0].tolist() == trace["time_s"]
-            assert rows[:, 1] == pytest.approx([1e3 * value for value in values])
-    given["maps"]["traces"] = []
-    assert answer.traces_figure(given, campaign()) is None
-
-
-def test_a_trace_starts_at_zero(given: Document) -> None:
-    data = campaign()
-    object.__setattr__(data.runs[0].record, "time_s", data.runs[0].record.time_s + 5.0)
-    fig = answer.traces_figure(given, data)
-    assert fig is not None
-    assert fig.axes[0].lines[0].get_xdata()[0] == 0.0
+    axes, (mesh,) = fig.axes[0], fig.axes[0].collections
+    shown = np.ma.filled(mesh.get_array().astype(float), np.nan)
+    wanted = [[rms(2.25), rms(4.25), np.nan], [rms(6.25), np.nan, rms(9.25)]]  # 0.05 is within the noise
+    np.testing.assert_allclose(shown, wanted)
+    corners = mesh.get_coordinates()
+    assert list(corners[:, 0, 1]) == pytest.approx(np.degrees(grid["amplitude_edges_rad"]).tolist())
+    if speeds is None:
+        assert corners[0, :, 0].tolist() == grid["time_edges_s"]
+    else:
+        assert [label.get_text() for label in axes.get_xticklabels()] == ["off", "13.5", "21.5"]
+    assert mesh.get_clim() == pytest.approx((0.0, rms(9.25)))
+    del given["maps"]["grid"]
+    assert where.place_figure(given) is None
 
 
 def test_intervals_of_the_coefficients(given: Document) -> None:
@@ -206,7 +212,7 @@ def test_a_map_within_the_noise_says_so(given: Document) -> None:
     assert not where.runs_figure(document()).axes[0].texts
 
 
-@pytest.mark.parametrize(("place", "key", "edges"), [(0, "time", "edges_s"), (1, "amplitude", "edges_rad")])
+@pytest.mark.parametrize(("place", "key", "edges"), [(0, "time", "edges_s"), (2, "amplitude", "edges_rad")])
 def test_profiles(given: Document, place: int, key: str, edges: str) -> None:
     axes = where.profiles_figure(given).axes[place]
     values, interval = given["maps"][key], given["where"][key + ("_s" if key == "time" else "_rad")]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,7 @@ import pytest
 
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
-from tunnel_lab.report import Byline, write_report
-from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.record import Record
+from tunnel_lab.report import Byline, render_report, write_report, write_summary
 
 pytestmark = IN_A_BROWSER
 
@@ -29,7 +26,6 @@ pytestmark = IN_A_BROWSER
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     given = document()
     given["where"]["words"] = "Everywhere."
-    given["maps"]["traces"][0]["time_s"] = [0.0, 3.6, 7.3]  # of a record of 7.31 s
     given["provenance"] = {"versions": {"numpy": "2"}, "sha256": {"runs/alpha.csv": "ab" * 32}}
     path = tmp_path_factory.mktemp("report") / "report.html"
     return write_report(given, campaign(), path, Byline("2026-05-31", "A. Smith"))
@@ -91,39 +87,43 @@ def test_the_summary_stands_open_and_the_detail_is_folded(opened: Opened) -> Non
     assert opened.page.is_visible("text=Everywhere.")
 
 
-def test_a_chart_zooms_by_dragging_and_by_button(opened: Opened) -> None:
+def test_a_chart_begins_at_the_largest_difference_and_zooms_by_dragging_and_by_button(opened: Opened) -> None:
     opened.open_all()
-    figure = opened.page.locator('figure[data-figure="residuals"]')
+    figure = opened.page.locator('figure[data-figure="fit"]')
     over = figure.locator(".u-over").first
     over.scroll_into_view_if_needed()
 
     def ends() -> list[float]:
-        """Times under the left and right edge of the residuals, which follow the reading."""
+        """Times of the samples nearest the left and right edge of the residuals, which follow the reading."""
         found = []
+        figure.locator(".u-over").nth(1).scroll_into_view_if_needed()
         box = figure.locator(".u-over").nth(1).bounding_box()
         for share in (0.002, 0.998):
             opened.page.mouse.move(box["x"] + share * box["width"], box["y"] + 20)
-            found.append(float(figure.locator(".u-value").nth(2).inner_text()))
+            found.append(float(figure.locator(".u-value").nth(4).inner_text()))
         return found
 
-    first, last = ends()
-    assert (first, last) == (0.0, 7.3)
+    assert ends() == [1.0, 2.0]  # of the times 0, 1, 2 from 0.5 to 2 s
+    figure.get_by_label("Show the whole chart").click()
+    assert ends() == [0.0, 2.0]
+    over.scroll_into_view_if_needed()
     box = over.bounding_box()
     opened.page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 60)
     opened.page.mouse.down()
     opened.page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60, steps=5)
     opened.page.mouse.up()
-    assert ends() == [3.6, 3.6]  # the only sample left of the residual
+    assert ends() == [1.0, 1.0]  # the only sample left
     figure.get_by_label("Show the whole chart").click()
-    assert ends() == [0.0, 7.3]
     figure.get_by_label("Zoom in").click()
     figure.get_by_label("Move right").click()
-    assert ends() == [3.6, 7.3]
+    assert ends() == [1.0, 2.0]
+    figure.locator("select").select_option(index=1)
+    assert ends() == [0.0, 1.5]  # of the times 0, 1.5, 3 from 0 to 1.5 s
 
 
 def test_runs_are_chosen_by_name_and_by_a_click_on_the_map(opened: Opened) -> None:
     opened.open_all()
-    choice = opened.page.locator('figure[data-figure="residuals"] select')
+    choice = opened.page.locator('figure[data-figure="fit"] select')
     assert [text.partition(" ")[0] for text in choice.locator("option").all_inner_texts()] == [
         "alpha",
         "gamma",
@@ -155,7 +155,7 @@ def test_the_theme_follows_the_system_until_it_is_chosen(opened: Opened) -> None
     assert paper() == dark
     opened.page.emulate_media(media="print")
     assert paper() == "rgb(255, 255, 255)"
-    figure = opened.page.locator('figure[data-figure="residuals"]')
+    figure = opened.page.locator('figure[data-figure="fit"]')
     assert figure.locator("svg").is_visible()
     assert not figure.locator(".uplot").first.is_visible()
 
@@ -163,7 +163,7 @@ def test_the_theme_follows_the_system_until_it_is_chosen(opened: Opened) -> None
 def test_without_scripts_the_drawn_figures_are_shown(browser: Any, report: Path) -> None:
     tab = Opened(browser, report, 1200, java_script_enabled=False)
     tab.page.click("text=How far the gap closes, run by run")
-    assert tab.page.is_visible('figure[data-figure="residuals"] svg')
+    assert tab.page.is_visible('figure[data-figure="fit"] svg')
     assert not tab.page.is_visible("#theme")
     tab.context.close()
 
@@ -233,13 +233,9 @@ def middles(points: Line, logarithmic: bool) -> Line:
     return [tuple(middle) for middle in back(0.5 * (given[1:] + given[:-1])).tolist()]
 
 
-def holed() -> tuple[dict[str, Any], Campaign]:
+def holed() -> dict[str, Any]:
     """A document whose spectrum has empty bins, other ones for every run; and a gap in the first run."""
-    given, data = copy.deepcopy(document()), campaign()
-    first, *others = data.runs
-    time, yaw = first.record.time_s, first.record.yaw_rad
-    kept = (time < GAP[0]) | (time > GAP[1])
-    first = replace(first, record=Record(time[kept], yaw[kept]))
+    given = copy.deepcopy(document())
     excess = [8.0, 7.0, 15.0, None, 5.0, 3.0, 50.0, 2.0, 6.0, 0.2, -0.6, 0.4]
     given["maps"]["frequency"] |= {
         "edges_hz": [0.0, *np.geomspace(0.05, 20.0, 12).tolist()],
@@ -252,11 +248,19 @@ def holed() -> tuple[dict[str, Any], Campaign]:
     }  # fmt: skip
     when = [t for t in np.arange(0.0, 7.3, 0.1).round(1).tolist() if not GAP[0] <= t <= GAP[1]]
     before, after = ([size * np.sin(speed * t) for t in when] for size, speed in ((4e-3, 5.0), (1e-3, 3.0)))
-    given["maps"]["traces"][0] |= {"time_s": when, "before_rad": before, "after_rad": after}
-    return given, replace(data, runs=(first, *others))
+    reading = [0.3 * np.cos(5.0 * t) for t in when]
+    given["maps"]["traces"][0] |= {
+        "time_s": when,
+        "reading_rad": reading,
+        "before_rad": before,
+        "after_rad": after,
+        "differ_s": [0.0, 7.3],
+    }
+    given["maps"]["traces"][1]["differ_s"] = [0.0, 3.0]
+    return given
 
 
-def expected_curves(given: dict[str, Any], data: Campaign) -> Iterator[tuple[str, int, int, int, Line]]:
+def expected_curves(given: dict[str, Any]) -> Iterator[tuple[str, int, int, int, Line]]:
     """Figure, chart, view, series and points of every curve, from the document."""
     spectrum = given["maps"]["frequency"]
     edges = np.array(spectrum["edges_hz"])
@@ -270,33 +274,33 @@ def expected_curves(given: dict[str, Any], data: Campaign) -> Iterator[tuple[str
         yield "where-spectrum", 0, 0, series, power(values)
     for view, values in enumerate(spectrum["by_run"], 1):
         yield "where-spectrum", 0, view, 3, power(values)
-    records = {run.id: run.record for run in data.runs}
     for view, trace in enumerate(given["maps"]["traces"]):
-        record = records[trace["id"]]
-        thin = slice(None, None, record.time_s.size // 1000)
-        yield "residuals", 0, view, 1, line(record.time_s[thin].tolist(), record.yaw_rad[thin].tolist())
+        reading = np.degrees(trace["reading_rad"])
+        yield "fit", 0, view, 1, line(trace["time_s"], reading.tolist())
         for series, name in enumerate(("before_rad", "after_rad"), 1):
             if trace[name] is not None:
-                yield "residuals", 1, view, series, line(trace["time_s"], [1e3 * v for v in trace[name]])
+                residual = np.degrees(trace[name])
+                yield "fit", 0, view, series + 1, line(trace["time_s"], (reading - residual).tolist())
+                yield "fit", 1, view, series, line(trace["time_s"], residual.tolist())
 
 
 def test_every_curve_and_cell_is_drawn_as_in_the_document(browser: Any, tmp_path: Path) -> None:
-    given, data = holed()
-    report = write_report(given, data, tmp_path / "report.html", Byline("2026-05-31", "A. Smith"))
+    given = holed()
+    report = write_report(given, campaign(), tmp_path / "report.html", Byline("2026-05-31", "A. Smith"))
     tab = Opened(browser, report, 1200, KEEP_CHARTS)
     tab.open_all()
     gaps = 0
-    for figure, place, view, series, points in expected_curves(given, data):
+    for figure, place, view, series, points in expected_curves(given):
         about = (figure, place, view, series)
         tab.page.locator(f'figure[data-figure="{figure}"] select').select_option(index=view)
         between = middles(points, logarithmic=figure == "where-spectrum")
-        broken = figure == "residuals" and view == 0
+        broken = figure == "fit" and view == 0
         crosses = [broken and x <= GAP[0] and to >= GAP[1] for (x, _), (to, _) in pairwise(points)]
         count, drawn = tab.page.evaluate(DRAWN, [figure, place, series, points + between])
         assert count == len(points), about
         assert drawn == [True] * len(points) + [not across for across in crosses], about
         gaps += sum(crosses)
-    assert gaps == 3  # of the reading and of two residuals
+    assert gaps == 5  # of the reading, two models and two residuals
     painted = [[True, True, False], [True, False, True], [True, True, False]]
     assert tab.page.evaluate(CELLS, "where-runs") == painted
     assert tab.page.evaluate(CELLS, "where-phase-plane") == [[True, True], [False, False]]
@@ -304,3 +308,27 @@ def test_every_curve_and_cell_is_drawn_as_in_the_document(browser: Any, tmp_path
         said for said in tab.complaints if "willReadFrequently" not in said
     ] == []  # the test's own readings
     tab.context.close()
+
+
+def pages(printed: bytes) -> int:
+    """Number of pages of a PDF by Chromium."""
+    return len(re.findall(rb"/Type\s*/Page\b", printed))
+
+
+def test_the_summary_is_one_printed_page(browser: Any, tmp_path: Path) -> None:
+    given = document()
+    given["verdict"] = "The gap comes from quadratic damping. " * 8
+    given["waterfall"] += [{"effect": name, "excess": 0.1} for name in ("free_play", "mains_hum")]
+    (tmp_path / "summary.html").write_text(render_report(given, campaign(), summary=True))
+    page = browser.new_page()
+    page.goto((tmp_path / "summary.html").as_uri())
+    margins = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
+    for paper in ("A4", "Letter"):
+        assert pages(page.pdf(format=paper, margin=margins)) == 1
+    page.emulate_media(media="print")
+    assert page.is_visible('figure[data-figure="fit"] svg')
+    assert not page.is_visible("text=Tests, noise and provenance")
+    page.close()
+    path = write_summary(given, campaign(), tmp_path / "summary.pdf")
+    assert path.read_bytes().startswith(b"%PDF")
+    assert pages(path.read_bytes()) == 1

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from diagnosis_document import campaign, document
 
-from diagnosis.answer.reported import on_stretches
+from diagnosis.answer.reported import held_out_totals
 from diagnosis.answer.verdict import verdict
 from diagnosis.closure import Rest, Step, Waterfall
 from diagnosis.decision import decision
+from diagnosis.misfit import Misfit
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tunnel_lab.report import view
@@ -17,12 +20,15 @@ from tunnel_lab.report.page import render_report
 
 def gap(*held_out: bool) -> GapSummary:
     runs = tuple(RunGap(f"r{i}", 2.0, 0.1, held_out=held) for i, held in enumerate(held_out))
-    return GapSummary(True, 2.0, 0.1, 0.9, HELD_OUT if any(held_out) else FITTED, runs, 0.01, 1e-9)
+    misfit = Misfit(0.002, 0.1, "rad")
+    return GapSummary(
+        True, 2.0, 0.1, 0.95, HELD_OUT if any(held_out) else FITTED, runs, 0.01, 1e-9, misfit=misfit
+    )
 
 
 def said(
     *causes: str,
-    closed_on: str = "somewhere",
+    size: GapSummary | None = None,
     both_winds: bool = True,
     material: bool = False,
     answers: tuple[tuple[str, float], ...] = (),
@@ -30,53 +36,61 @@ def said(
     return verdict(
         causes,
         decision(answers or ((" + ".join(causes), 0.9), ("unknown", 0.1))),
-        before=2.0,
-        closed=0.95,
+        gap(True) if size is None else size,
         rest=Rest(material, 0.1, 0.0, material, {}, "What remains is small."),
-        closed_on=closed_on,
         both_winds=both_winds,
     )
 
 
 @pytest.mark.parametrize(
-    ("held_out", "closed_on", "after_on"),
+    ("held_out", "closed_on"),
     [
-        ((True, True), "on runs held out of the fit", "on runs held out of the fit"),
-        ((True, False), "on runs held out of the fit", "in all runs, 1 of 2 held out of the fit"),
-        ((False, False), *["in the fitted runs (none could be held out)"] * 2),
+        ((True, True), "on runs held out of the fit"),
+        ((False,), "in the fitted runs (none could be held out)"),
     ],
 )
-def test_the_runs_of_the_closure_are_named(held_out, closed_on, after_on):
+def test_the_runs_of_the_closure_are_named(held_out, closed_on):
     found = gap(*held_out)
-    assert (found.closed_on, found.after_on) == (closed_on, after_on)
-    assert f"closes {closed_on}. What remains is small." in said(
-        "coulomb_friction", closed_on=found.closed_on
-    )
+    assert found.closed_on == closed_on
+    assert f"closes {closed_on}. What remains is small." in said("coulomb_friction", size=found)
 
 
-def test_where_no_run_could_be_held_out_the_share_closed_is_that_of_stretches():
-    stretches = Waterfall((Step(None, 4.0), Step("coulomb_friction", 0.2)), {}, "on stretches of time")
-    found = on_stretches(gap(False, False), stretches)
+def test_the_gap_is_said_in_degrees_and_of_the_swing_first():
+    # 0.002 rad · √2 = 0.16206°, over 0.1 rad 2.8 %
+    words = "(0.162° root mean square, 2.8 % of the swing, 2.00 times the noise power)"
+    assert f"The gap {words} comes from" in said("coulomb_friction")
+    assert f"There is a gap {words}" in said("unknown")
+    found = gap(True).to_json_dict()["misfit"]
+    assert found["before"] == pytest.approx(0.002 * 2.0**0.5)
+    assert found["after"] == pytest.approx(0.002 * 0.1**0.5)
+    rates = replace(gap(True), misfit=Misfit(0.01, 0.5, "rad/s"))
+    assert "(0.810 °/s root mean square, 2.8 % of the swing" in said("coulomb_friction", size=rates)
+
+
+@pytest.mark.parametrize("held_out", [(True, True), (True, False), (False, False)])
+def test_the_totals_are_those_of_the_waterfall(held_out):
+    steps = Waterfall((Step(None, 4.0), Step("coulomb_friction", 0.2)), {}, "on stretches of time")
+    found = held_out_totals(gap(*held_out), steps)
+    assert (found.excess_before, found.excess_after) == (4.0, 0.2)
     assert found.closed == pytest.approx(0.95)
     assert found.closed_on == "on stretches of time"
-    assert found.after_on == FITTED
-    for kept in (gap(True, False), gap(True, True)):
-        assert on_stretches(kept, stretches) is kept
-    unnamed = gap(False)
-    assert on_stretches(unnamed, Waterfall((Step(None, 4.0),), {}, "on stretches of time")) is unnamed
+    unnamed = held_out_totals(gap(*held_out), Waterfall((Step(None, 4.0),), {}, "on stretches of time"))
+    assert (unnamed.excess_before, unnamed.excess_after, unnamed.closed) == (4.0, 4.0, 0.0)
+    calm = replace(gap(*held_out), detected=False)
+    assert held_out_totals(calm, steps) is calm
 
 
 @pytest.mark.slow
 def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
     found = gap(False, False, False)
     given = document()
-    given["verdict"] = said("quadratic_damping", closed_on=found.closed_on)
+    given["verdict"] = said("quadratic_damping", size=found)
     given["waterfall_on"] = "on stretches of time held out of the fit"
-    given["gap"] |= {"closed_on": found.closed_on, "after_on": found.after_on}
+    given["gap"] |= {"closed_on": found.closed_on}
     for run in given["gap"]["runs"]:
         run["held_out"] = False
     notes = [fact.note for fact in view.facts(given)]
-    assert notes.count(found.closed_on) == 2
+    assert notes.count(found.closed_on) == 1
     assert not any("on runs held out" in note for note in notes)
     page = render_report(given, campaign())
     assert "on runs held out" not in page

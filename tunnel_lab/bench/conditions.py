@@ -10,6 +10,7 @@ from typing import Any
 from nicegui import events, ui
 
 from tunnel_lab.bench.parts import Fault, Frame
+from tunnel_lab.bench.words import page_words
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document
 from tunnel_sim.files.importing.conditions import RIG_KEYS, RUN_KEYS, Conditions
@@ -416,7 +417,7 @@ class _Conditions:
         """Say in words what the marks say."""
         self._lines.clear()
         kinds = {f"{WORDS[key]} is not stated: {why}": None for (_, key), why in missing.items()}
-        lines = [(f"tunnel: {line}", "fault") for line in wrong.values()] + [(line, "") for line in kinds]
+        lines = [(page_words(line), "fault") for line in wrong.values()] + [(line, "") for line in kinds]
         with self._lines:
             for line, style in lines[:_MOST_LINES]:
                 with ui.element("li"):

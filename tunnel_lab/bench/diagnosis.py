@@ -156,6 +156,12 @@ class _Answer:
                         ui.label(fact.value).classes("value")
                         ui.label(fact.label).classes("soft")
                         ui.label(fact.note).classes("soft")
+        if (document.get("maps") or {}).get("traces"):
+            ui.html("The fit over the data", sanitize=False, tag="h2")
+            source = f"{address(session, 'fit.html')}?{time.time_ns()}"
+            ui.element("iframe").classes("fit-frame").props(
+                f'src="{source}" title="The fit over the data" loading=lazy'
+            )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(document), once=True)
         self._words(document)
@@ -207,7 +213,7 @@ class ByHandPart:
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
         from tunnel_sim.effects import known_effects
 
-        self._session = session
+        self._session, self._document = session, document
         self._waiting = self._converged = False
         ui.html("By hand", sanitize=False, tag="h2")
         ui.label(_ABOUT).classes("soft")
@@ -252,7 +258,7 @@ class ByHandPart:
             self._place.clear()
             with self._place:
                 if closure is not None:
-                    show_closure(closure)
+                    show_closure(closure, self._document)
         self._waiting = False
         self._place.classes(remove="waiting")
 
@@ -268,15 +274,19 @@ class ByHandPart:
         return closure
 
 
-def show_closure(closure: Closure) -> None:
-    """The closure with causes chosen by hand."""
-    from tunnel_lab.report.view import estimate, excess, percent
+def show_closure(closure: Closure, document: dict[str, Any]) -> None:
+    """The closure with causes chosen by hand.
+
+    Args:
+        document: of the diagnosis, whose units it is shown in.
+    """
+    from tunnel_lab.report.view import estimate, misfit_shown, percent
 
     with ui.element("div").classes("facts"):
         for value, label in (
             (percent(closure.closed), f"share closed, {closure.held_out}"),
-            (f"{excess(closure.after)} noise variances", "left of the gap"),
-            (f"{excess(closure.before)} noise variances", "with the nominal model"),
+            (misfit_shown(document, closure.after), "left of the misfit, root mean square"),
+            (misfit_shown(document, closure.before), "with the nominal model"),
         ):
             with ui.element("div"):
                 ui.label(value).classes("value")
@@ -375,6 +385,17 @@ def show_run(run: dict[str, float]) -> None:
             with ui.element("div"):
                 ui.label(value).classes("value")
                 ui.label(label).classes("soft")
+    with ui.element("p").classes("buttons"):
+        button("Download the plan", lambda: ui.download(run_table(run).encode(), "next-run.toml"))
+
+
+def run_table(run: dict[str, float]) -> str:
+    """A run to make, as the table that ``campaign.toml`` takes once its record is there."""
+    import tomli_w
+
+    stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
+    head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
+    return head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
 
 
 def build_report(session: Session, frame: Frame) -> None:

@@ -11,6 +11,7 @@ from urllib.parse import quote
 from nicegui import events, ui
 
 from identification.printing import TextTable, as_html
+from tunnel_lab.bench.words import page_words
 from tunnel_lab.bench.workspace import (
     STAGES,
     Session,
@@ -132,12 +133,12 @@ class Fault:
         self._place = ui.element("div").props("role=alert aria-live=assertive")
 
     def show(self, error: TunnelError | str) -> None:
-        """Show the line that the terminal would print; an empty one is none."""
+        """Show the line that the terminal would print, in the page's words; an empty one is none."""
         self._place.clear()
         if not str(error):
             return
         with self._place:
-            ui.label(f"tunnel: {error}").classes("fault")
+            ui.label(page_words(str(error))).classes("fault")
 
     def clear(self) -> None:
         """Show nothing."""

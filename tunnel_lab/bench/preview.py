@@ -24,8 +24,12 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.record import Array
 
 
+MOST_COLUMNS = 8
+"""At most this many raw columns are drawn."""
+
 MOST_RECORDS = 24
 """At most this many records are drawn."""
+_STILL = 0.01  # of a run's readings from the least to the greatest: a range that looks flat
 Changed = Callable[[str, Any], Awaitable[None]]
 
 
@@ -127,15 +131,61 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     state(session, {"stretches": [*(stretch.model_dump() for stretch in others), stated]})
 
 
-def read(session: Session) -> Imported:
+def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
     """Read the dropped files.
 
+    Returns:
+        What was read, and the faults of the files that are left out because they cannot be read beside the others.
+
     Raises:
-        TunnelError: for the first fault, as ``tunnel import`` does.
+        TunnelError: for the first fault, as ``tunnel import`` does, where no file can be read.
     """
     from tunnel_sim.files.importing.records import read_records
 
-    return read_records(files_of(session), choices_of(session), name=session.name)
+    files, choices = files_of(session), choices_of(session)
+    try:
+        return read_records(files, choices, name=session.name), ()
+    except TunnelError as error:
+        good, faults = [], []
+        for path in files if len(files) > 1 else ():
+            try:
+                read_records([path], choices, name=session.name)
+                good.append(path)
+            except TunnelError as fault:
+                faults.append(fault)
+        if not good or not faults:
+            raise error from None
+        return read_records(good, choices, name=session.name), tuple(faults)
+
+
+def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[float | None]]]:
+    """The columns of the first table that can be read, as they are in the file.
+
+    Returns:
+        Name, unit where one is stated, row numbers and values of each column with numbers; few enough to draw.
+    """
+    import numpy as np
+
+    from tunnel_sim.files.importing.source import read_source
+
+    for path in files_of(session):
+        try:
+            tables = read_source(path, choices_of(session)).tables
+        except TunnelError:
+            continue
+        shown = [
+            (
+                channel.name,
+                channel.unit,
+                *points(np.arange(channel.values.size, dtype=np.float64), channel.values),
+            )
+            for table in tables[:1]
+            for channel in table.channels[:MOST_COLUMNS]
+            if channel.values.size > 1 and np.isfinite(channel.values).any()
+        ]
+        if shown:
+            return shown
+    return []
 
 
 def column_names(session: Session) -> list[str]:
@@ -204,11 +254,22 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
 
     if part.rest is not None:
         return part.rest, f"{significant(part.rest)} {unit}, stated and subtracted"
+    end = float(np.median(part.reading[-max(part.reading.size // 10, 2) :]))
+    if _flat(part.reading):
+        return end, f"{significant(end)} {unit}, found where the motion has ended"
     centre = None if part.run is None else centre_of(part.run, 0.0)
     if centre is not None:
         return centre.zero, f"{with_std(centre.zero, centre.std)} {unit}, found"
-    end = float(np.median(part.reading[-max(part.reading.size // 10, 2) :]))
     return end, f"about {significant(end, 2)} {unit}, found"
+
+
+def _flat(reading: Array) -> bool:
+    """Whether the last tenth of a run visibly stands still."""
+    import numpy as np
+
+    tail = reading[-max(reading.size // 10, 2) :]
+    low, high = np.quantile(tail, (0.05, 0.95))
+    return bool(high - low < _STILL * float(np.ptp(reading)))
 
 
 class ChoicesPart:
@@ -226,7 +287,7 @@ class ChoicesPart:
         self._now = choices_of(session)
         self._changed = changed
         angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
-        with ui.element("div").classes("fields"):
+        with ui.element("div").classes("fields wide"):
             self._select("angle", "Column of the angle", columns, several=True)
             self._select("unit", "Unit of the angle", angle)
             self._select("time", "Column of the times", columns)
@@ -237,7 +298,9 @@ class ChoicesPart:
             self._number("start", "Leave out samples before [s]")
             self._number("end", "Leave out samples after [s]")
             self._number("rest", "Reading at rest of every run, to be subtracted [rad]")
-            self._text("name", "Conditions in the file names, such as S{spring}_V{wind_speed}_*")
+            self._text("name", "Conditions in the file names: S{spring}_V{wind_speed}_*")
+            self._text("delimiter", "Delimiter of a text file: tab, blank, ; , or |")
+            self._text("decimal", "Decimal sign of a text file")
             ui.checkbox(
                 "Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value)
             )

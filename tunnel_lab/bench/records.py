@@ -44,7 +44,8 @@ class _Records:
         self._files = ui.element("div")
         self._fault = Fault()
         with ui.element("p").classes("buttons"):
-            button("Write the campaign", self._write, main=True)
+            self._write_button = button("Write the campaign", self._write, main=True)
+            self._write_button.props("disabled")
             if session.imported:
                 frame.way_on()
         self._written = Fault()
@@ -92,22 +93,26 @@ class _Records:
         self._reading += 1
         mine = self._reading
         imported, error = None, None
+        faults: tuple[TunnelError, ...] = ()
         try:
-            imported = await asyncio.to_thread(preview.read, self._session)
+            imported, faults = await asyncio.to_thread(preview.read, self._session)
         except TunnelError as refused:
             error = refused
         if (
             mine != self._reading or self._table.is_deleted
         ):  # a later choice is being read, or the page was left
             return True
-        self._fault.show(error or "")
+        left_out = "; ".join(f"left out: {fault}" for fault in faults)
+        self._fault.show(error or left_out)
         if error is not None and not redraw:
             return False
         self._imported = imported
+        self._write_button.props(remove="disabled") if imported else self._write_button.props("disabled")
         self._table.clear()
         if redraw:
             self._drawn.clear()
         if imported is None:
+            await self._draw_columns()
             return False
         with self._drawn:
             self._draw(imported)
@@ -120,6 +125,18 @@ class _Records:
                     with ui.element("li"):
                         ui.label(line)
         return True
+
+    async def _draw_columns(self) -> None:
+        """The columns as they are in the file, to choose from."""
+        columns = await asyncio.to_thread(preview.raw_columns, self._session)
+        if self._drawn.is_deleted or not columns:
+            return
+        with self._drawn:
+            ui.label("The columns as they are in the file:").classes("soft")
+            with ui.element("div").classes("charts"):
+                for name, unit, rows, values in columns:
+                    label = f"{name} [{unit or 'unit not stated'}]"
+                    Chart(name, "row", label, [("value", "after")], [rows, values])
 
     def _show_files(self) -> None:
         self._files.clear()

@@ -14,12 +14,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, quote, urlencode
 
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, HTMLResponse
 from nicegui import app, background_tasks, core, events, ui
 
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep, too_large
-from tunnel_lab.bench.workspace import STAGES, Session, Stage, closed, new_session, open_session, sessions
+from tunnel_lab.bench.words import page_words
+from tunnel_lab.bench.workspace import (
+    STAGES,
+    Session,
+    Stage,
+    closed,
+    new_session,
+    open_session,
+    read_result,
+    sessions,
+)
 from tunnel_lab.terminal.tables import say
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
@@ -219,6 +229,14 @@ def add_pages(folder: Path) -> None:
         session = open_session(folder, name)
         return FileResponse(session.report, headers={"cache-control": "no-store"})
 
+    @app.get("/{name}/fit.html")
+    def fit(name: str) -> HTMLResponse:
+        from tunnel_lab.report import render_fit
+
+        document = read_result(open_session(folder, name).diagnosis)
+        text = "" if document is None else render_fit(document)
+        return HTMLResponse(text, headers={"cache-control": "no-store"})
+
     @ui.page("/{name}/{stage}")
     def stage(name: str, stage: str) -> None:
         try:
@@ -235,7 +253,7 @@ def add_pages(folder: Path) -> None:
                     module, _, build = opened.builder.partition(".")
                     getattr(import_module(f"tunnel_lab.bench.{module}"), build)(session, frame)
         except TunnelError as error:
-            ui.label(f"tunnel: {error}").classes("fault")
+            ui.label(page_words(str(error))).classes("fault")
             ui.link("All campaigns", "/")
 
 

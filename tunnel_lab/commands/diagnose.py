@@ -18,47 +18,85 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 NAME = "diagnose"
+OUTPUT, CAUSES, MODEL = "Output", "Effects", "A model of your own"
 
 
 def run(
     campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
     json: Annotated[
         Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
+        typer.Option(
+            "--json",
+            metavar="FILE",
+            rich_help_panel=OUTPUT,
+            help="Write the answer as JSON; - for standard output.",
+        ),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE.html", help="Write a report, one HTML page.")
+        Path | None,
+        typer.Option(
+            "--report", metavar="FILE.html", rich_help_panel=OUTPUT, help="Write a report, one HTML page."
+        ),
+    ] = None,
+    summary: Annotated[
+        Path | None,
+        typer.Option(
+            "--summary",
+            metavar="FILE.pdf",
+            rich_help_panel=OUTPUT,
+            help="Write the report's summary, one printed page; needs Chromium.",
+        ),
     ] = None,
     author: Annotated[
-        str, typer.Option("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
+        str,
+        typer.Option(
+            "--author", metavar="NAME", rich_help_panel=OUTPUT, help="Who made the diagnosis, for the report."
+        ),
     ] = "",
     notes: Annotated[
-        str, typer.Option("--notes", metavar="TEXT", help="Notes for the head of the report.")
+        str,
+        typer.Option(
+            "--notes", metavar="TEXT", rich_help_panel=OUTPUT, help="Notes for the head of the report."
+        ),
     ] = "",
     effects: Annotated[
         list[str] | None,
-        typer.Option("--effects", metavar="A,B", help="Consider these effects only."),
+        typer.Option("--effects", metavar="A,B", rich_help_panel=CAUSES, help="Consider these effects only."),
     ] = None,
     exclude: Annotated[
         list[str] | None,
-        typer.Option("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
+        typer.Option(
+            "--exclude",
+            metavar="C",
+            rich_help_panel=CAUSES,
+            help="Leave these effects out; tunnel effects lists all.",
+        ),
     ] = None,
     effects_file: EffectsFileOption = None,
     model: Annotated[
         Path | None,
         typer.Option(
-            "--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."
+            "--model",
+            metavar="FILE.xml",
+            rich_help_panel=MODEL,
+            help="A model of your own, MJCF or URDF, as the nominal model.",
         ),
     ] = None,
     joint: Annotated[
         str | None,
-        typer.Option("--joint", metavar="NAME", help="Joint of the model that was recorded; for --model."),
+        typer.Option(
+            "--joint",
+            metavar="NAME",
+            rich_help_panel=MODEL,
+            help="Joint of the model that was recorded; for --model.",
+        ),
     ] = None,
     free: Annotated[
         list[str] | None,
         typer.Option(
             "--free",
             metavar="A,B",
+            rich_help_panel=MODEL,
             help="Parameters of the model to fit: inertia, damping, stiffness, rest. Default: those that the "
             "runs can determine.",
         ),
@@ -68,19 +106,26 @@ def run(
         typer.Option(
             "--asset-dir",
             metavar="DIR",
+            rich_help_panel=MODEL,
             help="Folder of the model's includes and meshes, where they are not in or below its own.",
         ),
     ] = None,
     patch: Annotated[
         Path | None,
         typer.Option(
-            "--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."
+            "--patch",
+            metavar="OUT.xml",
+            rich_help_panel=MODEL,
+            help="Write the model with the causes in it; for --model.",
         ),
     ] = None,
     propose: Annotated[
         Path | None,
         typer.Option(
-            "--propose", metavar="LAW.toml", help="Write the formula proposed for what no effect explains."
+            "--propose",
+            metavar="LAW.toml",
+            rich_help_panel=OUTPUT,
+            help="Write the formula proposed for what no effect explains.",
         ),
     ] = None,
 ) -> None:
@@ -99,6 +144,7 @@ def run(
     [bold]Examples[/bold]
       tunnel diagnose my-campaign
       tunnel diagnose my-campaign --json answer.json --report report.html --author "A. Smith"
+      tunnel diagnose my-campaign --summary report.pdf
       tunnel diagnose my-campaign --exclude buffeting,mains_hum
       tunnel diagnose my-campaign --json - | jq .causes
       tunnel diagnose my-campaign --effects-file my.toml
@@ -120,7 +166,11 @@ def run(
     del effects_file  # its effects are known already
     kinds = vocabulary(split_names(effects), split_names(exclude))
     to_stdout = json is not None and str(json) == "-"
-    refuse_unwritable_files(None if to_stdout else json, report, patch, propose)
+    refuse_unwritable_files(None if to_stdout else json, report, summary, patch, propose)
+    if summary is not None:
+        from tunnel_lab.report import find_browser
+
+        find_browser()
     if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir)):
         raise TunnelError(
             "--model and --joint belong together, and --free, --patch and --asset-dir to them",
@@ -143,13 +193,7 @@ def run(
         write_json(json, document)
     if patch is not None:
         write_patch(answer, patch)
-    if report is not None:
-        from diagnosis.detection.limit_cycles import diagnosable
-        from tunnel_lab.report import Byline, write_report
-
-        today = datetime.now().astimezone().date().isoformat()
-        byline = Byline(today, author, notes, "" if patch is None else patch.name)
-        write_report(document, diagnosable(data).campaign, report, byline)
+    write_pages(answer, document, (report, summary), (author, notes), patch)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
         typer.echo(json_text(document), nl=False)
@@ -158,7 +202,33 @@ def run(
     if propose is not None and proposed is None:
         nothing = "nothing remains beyond chance, or beside a random moment"
         say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
-    say_written(json, report, patch, proposed)
+    say_written(json, report, summary, patch, proposed)
+
+
+def write_pages(
+    answer: Diagnosis,
+    document: dict[str, Any],
+    paths: tuple[Path | None, Path | None],
+    said: tuple[str, str],
+    patch: Path | None,
+) -> None:
+    """Write the report and its summary, where a file is given for them.
+
+    Args:
+        document: of the answer.
+        paths: of the report and of the summary.
+        said: author and notes for their head.
+        patch: the file of the patched model, which the report names.
+    """
+    if not any(paths) or answer.data is None:
+        return
+    from tunnel_lab.report import Byline, write_report, write_summary
+
+    today = datetime.now().astimezone().date().isoformat()
+    byline = Byline(today, *said, "" if patch is None else patch.name)
+    for path, write in zip(paths, (write_report, write_summary), strict=True):
+        if path is not None:
+            write(document, answer.data, path, byline)
 
 
 def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:

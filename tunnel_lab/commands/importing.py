@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 NAME = "import"
+INPUT, UNITS, RUNS, CONDITIONS, OUTPUT = "Columns", "Units", "Runs", "Conditions", "Output"
 
 
 def run(
@@ -16,87 +17,142 @@ def run(
         list[Path], typer.Argument(metavar="FILE...", help="Files of a data logger, of any format.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FOLDER", rich_help_panel=OUTPUT, help="Where the campaign goes."
+        ),
     ] = None,
     angle: Annotated[
         list[str] | None,
         typer.Option(
-            "--angle", metavar="NAME", help="Column of the angle, by name or number. May be repeated."
+            "--angle",
+            metavar="NAME",
+            rich_help_panel=INPUT,
+            help="Column of the angle, by name or number. May be repeated.",
         ),
     ] = None,
     unit: Annotated[
         str | None,
-        typer.Option("--unit", help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …"),
+        typer.Option(
+            "--unit",
+            rich_help_panel=UNITS,
+            help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …",
+        ),
     ] = None,
     time: Annotated[
-        str | None, typer.Option("--time", metavar="NAME", help="Column of the times, by name or number.")
+        str | None,
+        typer.Option(
+            "--time", metavar="NAME", rich_help_panel=INPUT, help="Column of the times, by name or number."
+        ),
     ] = None,
     time_unit: Annotated[
-        str | None, typer.Option("--time-unit", help="Unit of the times: s, ms, us, min, …")
+        str | None,
+        typer.Option("--time-unit", rich_help_panel=UNITS, help="Unit of the times: s, ms, us, min, …"),
     ] = None,
     rate: Annotated[
-        float | None, typer.Option("--rate", help="Sample rate, Hz, where there are no times.")
+        float | None,
+        typer.Option("--rate", rich_help_panel=UNITS, help="Sample rate, Hz, where there are no times."),
     ] = None,
     counts_per_turn: Annotated[
-        float | None, typer.Option("--counts-per-turn", help="Counts of an encoder per turn.")
+        float | None,
+        typer.Option("--counts-per-turn", rich_help_panel=UNITS, help="Counts of an encoder per turn."),
     ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(
             "--calibration",
             metavar="'a + b*V'",
+            rich_help_panel=UNITS,
             help="Volts to angle: a formula, or a file of two columns.",
         ),
     ] = None,
     conditions: Annotated[
         Path | None,
         typer.Option(
-            "--conditions", metavar="RUNS.csv", help="Table of conditions: file or run, wind_speed, …"
+            "--conditions",
+            metavar="RUNS.csv",
+            rich_help_panel=CONDITIONS,
+            help="Table of conditions: file or run, wind_speed, …",
         ),
     ] = None,
     name: Annotated[
         str | None,
         typer.Option(
-            "--name", metavar="PATTERN", help="Conditions in the file names: S{spring}_V{wind_speed}_*"
+            "--name",
+            metavar="PATTERN",
+            rich_help_panel=CONDITIONS,
+            help="Conditions in the file names: S{spring}_V{wind_speed}_*",
         ),
     ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="KEY=NUMBER", help="A condition of all runs, or a size. May be repeated."
+            "--set",
+            metavar="KEY=NUMBER",
+            rich_help_panel=CONDITIONS,
+            help="A condition of all runs, or a size. May be repeated.",
         ),
     ] = None,
-    start: Annotated[float | None, typer.Option("--start", help="Leave out earlier samples, s.")] = None,
-    end: Annotated[float | None, typer.Option("--end", help="Leave out later samples, s.")] = None,
+    start: Annotated[
+        float | None, typer.Option("--start", rich_help_panel=RUNS, help="Leave out earlier samples, s.")
+    ] = None,
+    end: Annotated[
+        float | None, typer.Option("--end", rich_help_panel=RUNS, help="Leave out later samples, s.")
+    ] = None,
     rest: Annotated[
-        float | None, typer.Option("--rest", help="Reading at rest of every run, rad: it is subtracted.")
+        float | None,
+        typer.Option(
+            "--rest", rich_help_panel=CONDITIONS, help="Reading at rest of every run, rad: it is subtracted."
+        ),
     ] = None,
     cut: Annotated[
-        bool | None, typer.Option("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
+        bool | None,
+        typer.Option(
+            "--cut/--no-cut", rich_help_panel=RUNS, help="Cut records at releases.", show_default="--cut"
+        ),
     ] = None,
     delimiter: Annotated[
-        str | None, typer.Option("--delimiter", help="Delimiter of a text file: tab, blank, ';', ',' or '|'.")
+        str | None,
+        typer.Option(
+            "--delimiter", hidden=True, help="Delimiter of a text file: tab, blank, ';', ',' or '|'."
+        ),
     ] = None,
-    decimal: Annotated[str | None, typer.Option("--decimal", help="Decimal sign of a text file.")] = None,
+    decimal: Annotated[
+        str | None, typer.Option("--decimal", hidden=True, help="Decimal sign of a text file.")
+    ] = None,
     recipe: Annotated[
-        Path | None, typer.Option("--recipe", metavar="import.toml", help="Choices of an earlier import.")
+        Path | None,
+        typer.Option(
+            "--recipe", metavar="import.toml", rich_help_panel=INPUT, help="Choices of an earlier import."
+        ),
     ] = None,
     preview: Annotated[
         Path | None,
-        typer.Option("--preview", metavar="FILE.png", help="Draw what was read; write no campaign."),
+        typer.Option(
+            "--preview",
+            metavar="FILE.png",
+            rich_help_panel=OUTPUT,
+            help="Draw what was read; write no campaign.",
+        ),
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Write without asking.")] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", "-y", rich_help_panel=OUTPUT, help="Write without asking.")
+    ] = False,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
+        bool,
+        typer.Option(
+            "--overwrite", rich_help_panel=OUTPUT, help="Replace a campaign that is already in the folder."
+        ),
     ] = False,
 ) -> None:
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
     Text of any dialect, Excel, MAT, TDMS, HDF5 and Parquet are read. Columns, units,
     sample rate, runs and releases are found; what was found, and why, is printed
-    before anything is written. Options correct what was found wrongly. The campaign
-    gets a picture (import.png), the choices made (import.toml, for --recipe), and
-    comments in campaign.toml on what the files do not state, such as the stiffness.
+    before anything is written. Options correct what was found wrongly; a recipe also
+    states delimiter and decimal sign of a text file. The campaign gets a picture
+    (import.png), the choices made (import.toml, for --recipe), and comments in
+    campaign.toml on what the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig

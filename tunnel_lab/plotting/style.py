@@ -10,6 +10,7 @@ from functools import wraps
 from importlib import resources
 from math import log10
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 import numpy as np
@@ -55,6 +56,10 @@ BLUE, VERMILION = COLOURS[:2]
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 
 
+_STYLE = RLock()
+"""A style is a state of the process, which threads of the bench must not change under each other."""
+
+
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
     """A function that draws in the style of `figures.mplstyle`, without changing the settings of the process."""
 
@@ -63,7 +68,7 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
         from matplotlib import style
 
         file = resources.files("tunnel_lab.plotting") / "figures.mplstyle"
-        with resources.as_file(file) as path, style.context(path):
+        with _STYLE, resources.as_file(file) as path, style.context(path):
             return draw(*args, **named)
 
     return drawn

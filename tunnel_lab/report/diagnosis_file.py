@@ -27,8 +27,11 @@ class _Estimate(Part):
     unit: OneLine
     bound: OneLine | None = None
     determined: bool = True
-    interval: tuple[float, float] | None = Field(
-        default=None, description="ends of the central interval of 0.95, where it is not value ± 1.96 std"
+    interval: list[float] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=2,
+        description="ends of the central interval of 0.95, where it is not value ± 1.96 std",
     )
 
 
@@ -87,9 +90,22 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
     Raises:
         TunnelError: when it is missing, is not JSON, or is not a diagnosis.
     """
+    return validate(Document, read_document(path), path).model_dump()
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """Read the whole document of a diagnosis, of which only the fields that are compared are checked.
+
+    Args:
+        path: a file that ``tunnel diagnose --json`` wrote.
+
+    Raises:
+        TunnelError: as for `read_diagnosis`.
+    """
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
-    return validate(Document, document, path).model_dump()
+    validate(Document, document, path)
+    return document
 
 
 class DiagnosisDocument(Document):
@@ -116,6 +132,10 @@ class DiagnosisDocument(Document):
     ]
     waterfall_on: Annotated[str, Field(description="what was held out of the fits for it")]
     without: Annotated[dict[str, float], Field(description="by cause, the excess when it alone is taken out")]
+    sizes: Annotated[
+        list[dict[str, Any]],
+        Field(description="what each fitted cause does to a swing of a stated amplitude"),
+    ]
     rest: Annotated[dict[str, Any] | None, Field(description="what remains after the causes")]
     closable: Annotated[
         dict[str, Any] | None, Field(description="how much of what remains could be closed, and by what")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import unescape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from diagnosis.misfit import Misfit, misfit_of, unit_shown
 from tunnel_lab.plotting.style import figure_text, styled
 from tunnel_sim.vocabulary.record import Array
 
@@ -97,23 +98,16 @@ def shade(axes: Axes, interval: Sequence[float] | None) -> None:
         axes.axvspan(interval[0], interval[1], color=MARK, alpha=0.28, linewidth=0)
 
 
-def noise_axis(axes: Axes, noise: float, greatest: float) -> float:
-    """A logarithmic axis of excesses that begins below the noise, which is shaded.
-
-    Args:
-        axes: its horizontal axis is set.
-        noise: three standard deviations of an excess by chance, in noise variances, a ratio.
-        greatest: value shown, in noise variances, a ratio.
+def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:
+    """The scale on which gaps are drawn.
 
     Returns:
-        The floor: smaller and negative excesses are drawn on it.
+        Its unit, and the function from an excess in noise variances to the root mean square misfit in that unit:
+        degrees where the readings are angles, standard deviations of the noise for a document without ``misfit``.
     """
-    floor = 0.1 * noise
-    axes.set_xscale("log")
-    axes.axvspan(floor, noise, color=NOISE, linewidth=0, label="noise (3σ)")
-    axes.set_xlim(0.8 * floor, 1.6 * max(greatest, 10.0 * noise))
-    axes.set_xlabel("excess (noise variances)")
-    return floor
+    misfit = misfit_of(document) or Misfit(1.0, 0.0, "rad")
+    unit, factor = unit_shown(misfit.unit) if document["gap"].get("misfit") else ("noise std", 1.0)
+    return unit, lambda excess: factor * misfit.rms(excess)
 
 
 @styled
@@ -135,16 +129,23 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     text = buffer.getvalue()
     for pattern in _NOT_HTML:
         text = pattern.sub("", text)
-    text = _TAG.sub(lambda match: _in_page(match[0], name), text)
+    ids: dict[
+        str, str
+    ] = {}  # numbered: matplotlib's are hashes of places, which the layout finds to rounding only
+    text = _TAG.sub(lambda match: _in_page(match[0], name, ids), text)
     text = _OPENING.sub(lambda match: _SIZE.sub("", match[0]), text, count=1)
     label = description.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
     return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
 
 
-def _in_page(tag: str, name: str) -> str:
-    """A tag with ids that are unique in the page, and with colours of the theme."""
-    tag = _ID.sub(rf'id="{name}-\1"', _NAMES.sub("", tag))
-    tag = _REFERENCE.sub(rf"\1{name}-\2", tag)
+def _in_page(tag: str, name: str, ids: dict[str, str]) -> str:
+    """A tag with ids that are unique in the page, by matplotlib's in ``ids``, and with colours of the theme."""
+
+    def own(given: str) -> str:
+        return ids.setdefault(given, f"{name}-{len(ids)}")
+
+    tag = _ID.sub(lambda match: f'id="{own(match[1])}"', _NAMES.sub("", tag))
+    tag = _REFERENCE.sub(lambda match: match[1] + own(match[2]), tag)
     return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", tag)
 
 

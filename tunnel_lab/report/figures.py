@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -10,20 +11,18 @@ import numpy as np
 
 from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import excess_std, held_out_excess
-from identification.printing import coefficient_label
+from diagnosis.printing import excess_std
+from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
     INTERVAL,
     MARKERS,
-    WIDTH,
     figure,
     figure_text,
     grid,
     limit_to_known,
     log_axis,
     styled,
-    with_breaks,
 )
 from tunnel_lab.report import where
 from tunnel_lab.report.drawing import (
@@ -33,17 +32,17 @@ from tunnel_lab.report.drawing import (
     INK,
     LINE,
     NARROW,
+    NOISE,
     PAPER,
     QUIET,
     SIGMAS,
-    SOFT,
     Document,
     array,
     drawn_label,
     faded,
-    noise_axis,
+    misfit_scale,
 )
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_lab.report.fit import fit_figure
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -52,17 +51,18 @@ if TYPE_CHECKING:
 
 SHOWN = 8
 """Most answers drawn."""
-_DRAWN_TRACES = 2
-_LABEL = 40  # characters in a line of a label
+_LABEL = 24  # characters in a line of a label
 _LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
 _MOST_CURVES = len(COLOURS)
-_LEGEND, _HANDLE = 108, 8  # characters: the width of the figure, and the line beside a label
+_LONG = 30  # characters of a label
+_LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
 _AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the start [s]"}
 _STEP_LABEL = 20  # characters in a line of a label
+_ROOM = 1.5  # times the greatest value
 _LEAST_STEP_NOISE = 1e-3  # noise powers: where the document has no maps, and so no noise of an excess
 
 
-def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figure]:
+def diagnosis_figures(document: Document) -> dict[str, Figure]:
     """All figures of a diagnosis.
 
     Args:
@@ -71,8 +71,12 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
     Returns:
         Figures by name, in the order of the report.
     """
-    figures: dict[str, Figure | None] = {"waterfall": waterfall_figure(document)}
+    figures: dict[str, Figure | None] = {}
+    if document.get("maps") and document["causes"]:
+        figures["place"] = where.place_figure(document)
+    figures["waterfall"] = waterfall_figure(document)
     if document.get("maps"):
+        figures["fit"] = fit_figure(document)
         figures["where-runs"] = where.runs_figure(document)
         figures["where-profiles"] = where.profiles_figure(document)
         figures["where-spectrum"] = where.spectrum_figure(document)
@@ -81,8 +85,6 @@ def diagnosis_figures(document: Document, campaign: Campaign) -> dict[str, Figur
         figures["where-moment"] = where.moment_figure(document)
     figures["which"] = candidates_figure(document)
     figures["how-far"] = closure_figure(document)
-    if document.get("maps"):
-        figures["residuals"] = traces_figure(document, campaign)
     figures["law"] = law_figure(document)
     figures["coefficients"] = coefficients_figure(document)
     return {name: figure for name, figure in figures.items() if figure is not None}
@@ -99,7 +101,7 @@ def candidates_figure(document: Document) -> Figure | None:
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]
-    fig = figure(WIDTH, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
+    fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
     axes = fig.add_subplot()
     values = [candidate["probability"] for candidate in shown]
     axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
@@ -118,73 +120,38 @@ def candidates_figure(document: Document) -> Figure | None:
 
 @styled
 def closure_figure(document: Document) -> Figure:
-    """Excess of every run before and after the causes are added, on a logarithmic scale from below the noise.
+    """Root mean square misfit of every run before and after the causes are added.
 
     Returns:
         A pair of points per run; the second is filled where the run was held out of the fit.
     """
     runs = document["gap"]["runs"]
-    fig = figure(WIDTH, 1.2 + 0.22 * max(len(runs), 4))
+    fig = figure(NARROW, 1.2 + 0.22 * max(len(runs), 4))
     axes = fig.add_subplot()
     rows = np.arange(len(runs))
-    before = np.array([run["before"] for run in runs])
-    after = np.array([run["after"] for run in runs])
+    unit, size = misfit_scale(document)
+    before = np.array([size(run["before"]) for run in runs])
+    after = np.array([size(run["after"]) for run in runs])
     stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
-    noise = SIGMAS * max(stds) if stds else _LEAST_NOISE
-    floor = noise_axis(axes, noise, float(max(before.max(), after.max())))
-    shown, shown_after = np.maximum(before, floor), np.maximum(after, floor)
-    axes.hlines(rows, shown_after, shown, color=LINE, linewidth=2.5)
-    axes.plot(shown, rows, "s", color=BEFORE, ms=5, label="nominal model")
+    axes.axvspan(
+        0.0, size(SIGMAS * max(stds) if stds else _LEAST_NOISE), color=NOISE, lw=0, label="noise (3σ)"
+    )
+    axes.set_xlim(0.0, 1.05 * float(max(before.max(), after.max())) or 1.0)
+    axes.set_xlabel(f"root mean square misfit [{unit}]")
+    axes.hlines(rows, after, before, color=LINE, linewidth=2.5)
+    axes.plot(before, rows, "s", color=BEFORE, ms=5, clip_on=False, label="nominal model")
     if not np.array_equal(before, after):
         held_out = np.array([run["held_out"] for run in runs])
         for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
             if chosen.any():
                 label = f"with the causes, run {words}"
-                axes.plot(shown_after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, label=label)
+                axes.plot(
+                    after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, clip_on=False, label=label
+                )
     axes.set_yticks(rows, [figure_text(run["id"]) for run in runs])
     axes.invert_yaxis()
-    fig.legend(loc="outside upper left", ncols=4)
+    fig.legend(loc="outside upper left", ncols=2)
     grid(axes)
-    return fig
-
-
-@styled
-def traces_figure(document: Document, campaign: Campaign) -> Figure | None:
-    """Reading and residuals of the runs with the largest gap.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        A column per run: the reading above, the residual before and after below; None without traces.
-    """
-    traces = document["maps"]["traces"]
-    records = {run.id: run.record for run in campaign.runs}
-    traces = [trace for trace in traces if trace["id"] in records][:_DRAWN_TRACES]
-    if not traces:
-        return None
-    fig = figure(WIDTH, 3.8)
-    panels = fig.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.2))
-    for column, trace in enumerate(traces):
-        top, bottom = panels[0, column], panels[1, column]
-        record = records[trace["id"]]
-        thin = slice(None, None, max(1, record.yaw_rad.size // 1500))
-        time, reading = with_breaks(record.time_s[thin] - record.time_s[0], record.yaw_rad[thin])
-        top.plot(time, reading, color=SOFT, linewidth=0.7)
-        top.set_title(f"{figure_text(trace['id'])}: reading [rad]")
-        for name, colour, label in (
-            ("before_rad", BEFORE, "nominal model"), ("after_rad", AFTER, "with the causes")
-        ):  # fmt: skip
-            if trace[name] is not None:
-                when, residual = with_breaks(array(trace["time_s"]), 1e3 * array(trace[name]))
-                bottom.plot(when, residual, color=colour, linewidth=0.8, label=label)
-        bottom.set_title("residual [10⁻³ rad]")
-        bottom.set_xlabel("time since the start of the record [s]")
-        bottom.margins(x=0.01)
-        grid(top)
-        grid(bottom)
-    handles, labels = panels[1, 0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=2)
     return fig
 
 
@@ -203,9 +170,9 @@ def coefficients_figure(document: Document) -> Figure | None:
     ]
     if not names:
         return None
-    fig = figure(WIDTH, 1.7)
+    fig = figure(NARROW, 0.3 + 1.3 * len(names))
     for place, name in enumerate(names, 1):
-        axes = fig.add_subplot(1, len(names), place)
+        axes = fig.add_subplot(len(names), 1, place)
         for row, (values, colour, marker) in enumerate(((before, BEFORE, "s"), (after, AFTER, "o"))):
             std = values[name]["std"]
             axes.errorbar(
@@ -236,8 +203,8 @@ def backbone_figure(document: Document) -> Figure:
     # the runs that show the gap first, in the campaign's order, and then the rest for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
     labels = {run["id"]: drawn_label(run) for run in maps["runs"]}
-    fig = figure(WIDTH, 4.6)
-    frequency, damping = fig.subplots(1, 2)
+    fig = figure(NARROW, 7.0)
+    frequency, damping = fig.subplots(2, 1)
     shifts, changes = [], []
     for index, curve in enumerate(chosen):
         amplitude = array(curve["amplitude_rad"])
@@ -264,7 +231,7 @@ def backbone_figure(document: Document) -> Figure:
     if chosen:
         longest = max(len(labels[curve["id"]]) for curve in chosen)
         columns = min(3, _LEGEND // (longest + _HANDLE)) or 1
-        fig.legend(loc="outside lower center", ncols=columns)
+        fig.legend(loc="outside lower center", ncols=columns, fontsize="x-small" if longest > _LONG else None)
     return fig
 
 
@@ -292,7 +259,7 @@ def law_figure(document: Document) -> Figure | None:
     values, std = (np.reshape(curve[name], shape) for name in ("values", "std"))
     unit = "rad" if curve["unit"] == "rad" else "N m" if curve["unit"] == "N m" else "rad/s²"
     name = f"{'error of the reading' if unit == 'rad' else 'missing moment'} [{unit}]"
-    fig = figure(WIDTH, 3.2)
+    fig = figure(NARROW, 3.2)
     axes = fig.add_subplot()
     axes.set_xlabel(_AXES[curve["over"][0]])
     if len(shape) == 1:
@@ -325,23 +292,26 @@ def waterfall_figure(document: Document) -> Figure | None:
 
     Returns:
         A dot for the nominal gap, a bar for each cause from what was left before it to what it leaves, and a dot
-        for the rest, on a logarithmic scale. None where no cause is named.
+        for the rest, on a linear scale of the root mean square misfit. None where no cause is named.
     """
     steps = document.get("waterfall", [])
     if len(steps) < 2:
         return None
-    noise = SIGMAS * (excess_std(document) or _LEAST_STEP_NOISE)
-    excesses = np.array([step["excess"] for step in steps], np.float64)
-    alone = np.array(list(document.get("without", {}).values()), np.float64)
-    fig = figure(NARROW, 1.2 + 0.4 * (excesses.size + 1))
+    unit, size = misfit_scale(document)
+    noise = size(SIGMAS * (excess_std(document) or _LEAST_STEP_NOISE))
+    left = np.array([size(step["excess"]) for step in steps], np.float64)
+    without = {name: size(value) for name, value in document.get("without", {}).items()}
+    fig = figure(NARROW, 1.2 + 0.4 * (left.size + 1))
     axes = fig.add_subplot()
-    floor = noise_axis(axes, noise, float(np.concatenate([excesses, alone]).max()))
-    axes.set_xlim(None, 12.0 * axes.get_xlim()[1])  # room for the numbers
-    _steps(axes, excesses, floor)
-    _alone(axes, document, floor)
+    axes.axvspan(0.0, noise, color=NOISE, linewidth=0, label="noise (3σ)")
+    greatest = max([*left.tolist(), *without.values()])
+    axes.set_xlim(0.0, _ROOM * greatest)  # room for the numbers
+    axes.set_xlabel(f"root mean square misfit [{unit}]")
+    _steps(axes, left, unit)
+    _alone(axes, document, without)
     names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
     axes.set_yticks(
-        range(excesses.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _STEP_LABEL)]
+        range(left.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _STEP_LABEL)]
     )
     axes.invert_yaxis()
     fig.legend(loc="outside upper left", ncols=2)
@@ -349,31 +319,30 @@ def waterfall_figure(document: Document) -> Figure | None:
     return fig
 
 
-def _steps(axes: Axes, excesses: Array, floor: float) -> None:
+def _steps(axes: Axes, left: Array, unit: str) -> None:
     """What each cause closes (or opens) as a bar between two values; the first and the last value as dots."""
-    shown = np.maximum(excesses, floor)
-    starts, ends = np.minimum(shown[:-1], shown[1:]), np.maximum(shown[:-1], shown[1:])
-    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(excesses)]
-    rows = np.arange(excesses.size + 1)
+    starts, ends = np.minimum(left[:-1], left[1:]), np.maximum(left[:-1], left[1:])
+    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(left)]
+    rows = np.arange(left.size + 1)
     axes.barh(rows[1:-1], ends - starts, left=starts, color=colours, height=0.55)
-    for row, value, colour in ((0, shown[0], BEFORE), (rows[-1], shown[-1], ACCENT)):
-        axes.plot(value, row, "o", color=colour, ms=8)
-    axes.vlines(shown, rows[:-1], rows[1:], color=QUIET, linewidth=0.8)
-    texts = [held_out_excess(value) for value in excesses.tolist()]
+    for row, value, colour in ((0, left[0], BEFORE), (rows[-1], left[-1], ACCENT)):
+        axes.plot(value, row, "o", color=colour, ms=8, clip_on=False)
+    axes.vlines(left, rows[:-1], rows[1:], color=QUIET, linewidth=0.8)
+    texts = [
+        f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}" for value in left.tolist()
+    ]
     words = [texts[0], *(f"leaves {text}" for text in texts[1:]), texts[-1]]
-    for row, (text, end) in enumerate(zip(words, [shown[0], *ends, shown[-1]], strict=True)):
+    for row, (text, end) in enumerate(zip(words, [left[0], *ends, left[-1]], strict=True)):
         axes.annotate(text, (float(end), row), (7, 0), textcoords="offset points", va="center")
 
 
-def _alone(axes: Axes, document: Document, floor: float) -> None:
+def _alone(axes: Axes, document: Document, without: Mapping[str, float]) -> None:
     """Mark what is left without each cause alone, where there are several."""
-    without = document.get("without", {})
     rows = {step["effect"]: row for row, step in enumerate(document["waterfall"])}
     if len(without) < 2:
         return
-    values = np.maximum(list(without.values()), floor)
     places = [rows[name] for name in without]
-    axes.plot(values, places, "o", color=INK, mfc=PAPER, ms=5, label="without it alone")
+    axes.plot(list(without.values()), places, "o", color=INK, mfc=PAPER, ms=5, label="without it alone")
 
 
 def _rest_name(document: Document) -> str:

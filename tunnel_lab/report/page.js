@@ -11,6 +11,7 @@
     probe.style.color = `var(--${role})`;
     return getComputedStyle(probe).color;
   };
+  const pale = (role) => colour(role).replace(/^rgb\((.*)\)$/, "rgba($1, 0.45)");
   const element = (parent, kind, words = "", given = {}) => {
     const made = Object.assign(document.createElement(kind), given);
     made.textContent = words;
@@ -31,14 +32,14 @@
 
   function lines(spec, width, group) {
     return {
-      width, height: 260,
+      width, height: spec.height || 260,
       scales: { x: scale(spec.x), y: scale(spec.y) },
       axes: [axis(spec.x, { size: 34 }), axis(spec.y, { size: 54 })],
       series: [
         { label: spec.x.label, value: (_, v) => number(v) },
         ...spec.series.map((one) => ({
-          label: one.label, stroke: colour(one.role), width: 1.3, spanGaps: false,
-          points: { show: false }, value: (_, v) => number(v),
+          label: one.label, stroke: one.width ? pale(one.role) : colour(one.role), width: one.width || 1.3,
+          spanGaps: false, points: { show: false }, value: (_, v) => number(v),
         })),
       ],
       bands: spec.band ? [{ series: spec.band, fill: colour("noise") }] : [],
@@ -119,6 +120,10 @@
     }
   }
   const whole = (chart) => chart.setData(chart.data, true);
+  const nearest = (chart, one, spec) => {
+    const range = spec.views && spec.views[one.view].range;
+    if (range) chart.setScale("x", { min: range[0], max: range[1] });
+  };
 
   function choose(name, run) {
     for (const one of drawn.filter((other) => other.select && other.name !== name)) {
@@ -134,6 +139,7 @@
       const say = (words) => { one.hint.textContent = words || one.help; };
       const options = spec.kind === "cells" ? cells(spec, width, one.name, say) : lines(spec, width, one.name);
       const chart = new uPlot(options, spec.kind === "cells" ? cellData(spec) : spec.views[one.view].data, one.places[i]);
+      nearest(chart, one, spec);
       const wrap = chart.root.querySelector(".u-wrap");
       wrap.setAttribute("role", "img");
       wrap.setAttribute("aria-label", `${spec.title}. ${one.text}`);
@@ -160,7 +166,10 @@
       views.forEach((view, i) => element(one.select, "option", view.label, { value: i }));
       one.select.addEventListener("change", () => {
         one.view = Number(one.select.value);
-        one.charts.forEach((chart, i) => chart.setData(one.specs[i].views[one.view].data));
+        one.charts.forEach((chart, i) => {
+          chart.setData(one.specs[i].views[one.view].data);
+          nearest(chart, one, one.specs[i]);
+        });
       });
     }
     const each = (act) => () => one.charts.forEach((chart, i) => act(chart, one.specs[i]));
@@ -170,6 +179,8 @@
       ["◀", "Move left", (chart, spec) => zoom(chart, spec, 1, -0.25)],
       ["▶", "Move right", (chart, spec) => zoom(chart, spec, 1, 0.25)],
       ["Whole", "Show the whole chart", whole],
+      ...(views.some((view) => view.range)
+        ? [["Largest difference", "Show the cycles where the models differ most", (chart, spec) => nearest(chart, one, spec)]] : []),
     ]) element(bar, "button", words, { type: "button", title: label, ariaLabel: label }).addEventListener("click", each(act));
   }
 
@@ -179,7 +190,7 @@
     const one = {
       name: figure.dataset.figure, box, specs, charts: [], view: 0, keys: [],
       text: figure.querySelector("svg").getAttribute("aria-label"),
-      help: "Drag to zoom, double-click for the whole chart." + (rows ? " Click a run to show its spectrum and residuals." : ""),
+      help: "Drag to zoom, double-click for the whole chart." + (rows ? " Click a run to show its spectrum and its fit." : ""),
     };
     figure.classList.add("live");
     tools(one);
@@ -209,20 +220,24 @@
 
   const redraw = () => drawn.filter((one) => one.charts.length).forEach(build);
   const theme = document.getElementById("theme"), themes = ["automatic", "light", "dark"];
-  theme.hidden = false;
-  theme.addEventListener("click", () => {
-    const next = themes[(themes.indexOf(root.dataset.theme || "automatic") + 1) % themes.length];
-    root.dataset.theme = next;
-    theme.textContent = `Theme: ${next}`;
-    redraw();
-  });
+  if (theme) {
+    theme.hidden = false;
+    theme.addEventListener("click", () => {
+      const next = themes[(themes.indexOf(root.dataset.theme || "automatic") + 1) % themes.length];
+      root.dataset.theme = next;
+      theme.textContent = `Theme: ${next}`;
+      redraw();
+    });
+  }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
   const fold = document.getElementById("fold"), parts = [...document.querySelectorAll("details")];
-  fold.hidden = false;
-  fold.addEventListener("click", () => {
-    const open = parts.some((part) => !part.open);
-    parts.forEach((part) => { part.open = open; });
-    fold.textContent = open ? "Close all" : "Open all";
-  });
+  if (fold) {
+    fold.hidden = false;
+    fold.addEventListener("click", () => {
+      const open = parts.some((part) => !part.open);
+      parts.forEach((part) => { part.open = open; });
+      fold.textContent = open ? "Close all" : "Open all";
+    });
+  }
 })();

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 import io
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from diagnosis.closable import closable_table, closable_words
 from diagnosis.names import plain
@@ -18,13 +19,20 @@ from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures
+from tunnel_lab.report.fit import fit_charts, fit_figure
 from tunnel_lab.report.view import Document
-from tunnel_lab.report.where import charts
+from tunnel_lab.report.where import Chart, charts
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DESCRIPTIONS = {
+    "place": "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
     "waterfall": "What is left of the gap as the causes are added one after another.",
+    "fit": "What was measured and what both models predict against time, and below it their residuals.",
     "where-runs": "Heat map of the excess of every run over time.",
     "where-profiles": "Excess against time and against amplitude, and the missing moment against time.",
     "where-spectrum": "Residual power against frequency, with the nominal model and with the causes added.",
@@ -32,8 +40,7 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
-    "how-far": "Excess of every run with the nominal model and with the causes added.",
-    "residuals": "Reading and residuals of the runs with the largest gap against time.",
+    "how-far": "Misfit of every run with the nominal model and with the causes added.",
     "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
 }
@@ -96,15 +103,71 @@ def write_report(document: Document, campaign: Campaign, path: Path, byline: Byl
     )
 
 
-def render_report(document: Document, campaign: Campaign, byline: Byline | None = None) -> str:
+def render_report(
+    document: Document, campaign: Campaign, byline: Byline | None = None, *, summary: bool = False
+) -> str:
     """The page as text.
+
+    Args:
+        document: as for `write_report`.
+        summary: whether only what fits one printed page is shown.
+
+    Returns:
+        HTML that needs no other file and no network; the same for the same document and byline.
+    """
+    answer, kind = view.headline(document)
+    context = {
+        "document": document,
+        "byline": (byline or Byline()),
+        "answer": answer,
+        "kind": kind,
+        "summary": summary,
+        "named": kind in ("open", "found"),
+        "facts": view.facts(document),
+        "found": view.causes_found(document),
+        "coefficients": view.coefficient_rows(document),
+        "next_steps": view.next_steps(document),
+    } | _detail(document, campaign)
+    drawn = diagnosis_figures(document)
+    return _rendered("page.html.j2", context | _parts(drawn, fit_charts(document) | charts(document)))
+
+
+def render_fit(document: Document) -> str:
+    """The fit over the data as a page of its own.
 
     Args:
         document: as for `write_report`.
 
     Returns:
-        HTML that needs no other file and no network; the same for the same document and byline.
+        HTML that needs no other file and no network; without a chart where the document has no ``maps``.
     """
+    drawn = fit_figure(document)
+    parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
+    return _rendered("fit.html.j2", {"campaign": document["campaign"], "summary": False} | parts)
+
+
+def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
+    """One figure of the report.
+
+    Args:
+        document: as for `write_report`.
+        what: name of the figure, as in `DESCRIPTIONS`.
+        runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+
+    Raises:
+        TunnelError: for a figure or a run that the diagnosis does not have.
+    """
+    if what == "fit" and (drawn := fit_figure(document, runs)) is not None:
+        return drawn
+    figures = diagnosis_figures(document)
+    if what not in figures:
+        raise TunnelError(
+            f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {', '.join(figures)}"
+        )
+    return figures[what]
+
+
+def _rendered(name: str, context: dict[str, Any]) -> str:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(
@@ -114,31 +177,20 @@ def render_report(document: Document, campaign: Campaign, byline: Byline | None 
         lstrip_blocks=True,
         loader=FunctionLoader(_resource),
     )
-    answer, kind = view.headline(document)
-    context = {
-        "document": document,
-        "byline": (byline or Byline()),
-        "answer": answer,
-        "kind": kind,
-        "named": kind in ("open", "found"),
-        "facts": view.facts(document),
-        "coefficients": view.coefficient_rows(document),
-        "next_steps": view.next_steps(document),
-    } | _detail(document, campaign)
-    return environment.get_template("page.html.j2").render(context | _parts(document, campaign))
+    return environment.get_template(name).render(context)
 
 
 def _resource(name: str) -> str:
     return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
 
 
-def _parts(document: Document, campaign: Campaign) -> dict[str, Any]:
+def _parts(drawn: Mapping[str, Figure], shown: dict[str, list[Chart]]) -> dict[str, Any]:
     """Figures, styles and scripts: text that is part of the page as it is."""
     from markupsafe import Markup
 
     figures = {
         name: inline_svg(figure, name, DESCRIPTIONS[name])  # the SVG is already escaped
-        for name, figure in diagnosis_figures(document, campaign).items()
+        for name, figure in drawn.items()
     }
     font = font_face(shown_text("".join(figures.values())))
     return {
@@ -147,7 +199,7 @@ def _parts(document: Document, campaign: Campaign) -> dict[str, Any]:
         "licence": Markup(_resource("vendor/uPlot-LICENSE.txt")),
         "library": Markup(_resource("vendor/uPlot.iife.min.js")),
         "script": Markup(_resource("page.js")),
-        "charts": charts(document, campaign),
+        "charts": shown,
     }
 
 

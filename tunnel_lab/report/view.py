@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
+from diagnosis.misfit import misfit_of, of_swing, rms_shown, unit_shown
 from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import held_out_excess, run_words
+from diagnosis.printing import held_out_excess, misfit_text, run_words
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -23,6 +26,17 @@ from tunnel_sim.vocabulary.campaign import Campaign
 Document = Mapping[str, Any]
 UNDETERMINED_PLACE = "cannot be determined from these runs"
 CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: UNDETERMINED_PLACE}
+
+
+CHANNELS = {
+    "stiffness": "the restoring moment",
+    "damping": "the damping",
+    "forcing": "an imposed moment",
+    "sensor": "the reading",
+    "calibration": "a stated value",
+}
+_VISIBLE = 0.005  # of a damping ratio: a change that is said
+_VISIBLE_FREQUENCY = 5e-5  # as a fraction, likewise
 
 
 @dataclass(frozen=True)
@@ -63,23 +77,130 @@ def headline(document: Document) -> tuple[str, str]:
 
 def facts(document: Document) -> list[Fact]:
     """The figures at the head of the page."""
-    gap, where = document["gap"], document["where"]
+    gap = document["gap"]
     decided = document.get("decided", True)
     added = "the causes" if decided else "the most probable answer"
-    listed = [Fact("Gap of the nominal model", excess(gap["excess_before"]), "noise variances")]
+    listed = [misfit_fact(document, "Misfit of the nominal model", gap["excess_before"])]
     if document["causes"] and document["causes"] != ["unknown"]:
-        after = Fact(f"With {added} added", excess(gap["excess_after"]), gap["after_on"])
-        listed += [after, Fact("Share closed", percent(gap["closed"]), gap["closed_on"])]
-    if document["causes"]:
-        listed += [
-            Fact("Channel", where["channel"] or UNDETERMINED_PLACE),
-            Fact("Condition", CONDITIONS.get(where["condition"], str(where["condition"]))),
-        ]
+        after = misfit_fact(document, f"With {added} added", gap["excess_after"])
+        if (document.get("rest") or {}).get("significant") is False:
+            left = f"{minus(held_out_excess(gap['excess_after']))} noise powers"
+            after = Fact(after.label, "within the noise", left)
+        listed += [after, Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"])]
     if document["candidates"]:
         first = document["candidates"][0]
         whose = "answer" if decided else "most probable answer"
         listed.append(Fact(f"Probability of the {whose}", percent(first["probability"])))
     return listed
+
+
+def misfit_fact(document: Document, label: str, value: float) -> Fact:
+    """A gap in the units that people use, and in noise powers beside them.
+
+    Args:
+        label: of the figure.
+        value: the gap as an excess, in noise variances, a ratio.
+    """
+    misfit = misfit_of(document)
+    powers = f"{minus(held_out_excess(value))} noise powers"
+    if misfit is None:
+        return Fact(label, powers)
+    return Fact(label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}")
+
+
+def misfit_shown(document: Document, value: float) -> str:
+    """A gap as a root mean square; in noise powers for a document without ``misfit``.
+
+    Args:
+        value: the gap as an excess, in noise variances, a ratio.
+    """
+    misfit = misfit_of(document)
+    return f"{minus(held_out_excess(value))} noise powers" if misfit is None else rms_shown(misfit, value)
+
+
+def windy(document: Document) -> bool:
+    """Whether any run had wind; True where the document does not say."""
+    runs = (document.get("maps") or {}).get("runs")
+    return not runs or any(run["wind_speed"] > 0.0 for run in runs)
+
+
+def acts_on(document: Document, effect: str) -> str:
+    """What an effect acts on and when, such as ``the damping, with or without wind``; empty for an unknown one."""
+    if effect not in {kind.name for kind in known_effects()}:
+        return ""
+    kind = effect_class(effect)
+    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(document) else ''}"
+
+
+def causes_found(document: Document) -> list[dict[str, Any]]:
+    """Every cause of the answer with its size.
+
+    Returns:
+        Name, what it acts on, its parameters, what it does to a swing, and what its addition closes.
+    """
+    if document["causes"] in ([], ["unknown"]):
+        return []
+    answer = document["candidates"][0]
+    names = answer["effect"].split(" + ")
+    sizes = {size["effect"]: size for size in document.get("sizes", ())}
+    steps = {step["effect"]: (old, step) for old, step in pairwise(document.get("waterfall", ()))}
+    found = []
+    for name in names:
+        mine = {
+            plain(full.rpartition(".")[2]): estimate(value)
+            for full, value in answer["parameters"].items()
+            if full.partition(".")[0] == name or len(names) == 1
+        }
+        old, new = steps.get(name, (None, None))
+        closes = (
+            "" if new is None else " to ".join(misfit_shown(document, step["excess"]) for step in (old, new))
+        )
+        found.append(
+            {
+                "name": plain(name),
+                "acts": acts_on(document, name),
+                "parameters": list(mine.items()),
+                "does": size_words(document, sizes[name]) if name in sizes else "",
+                "closes": closes,
+            }
+        )
+    return found
+
+
+def size_words(document: Document, size: Document) -> str:
+    """What a cause does to a swing, in a sentence.
+
+    Args:
+        size: an entry of ``sizes``.
+
+    Returns:
+        Its damping and frequency where the cause changes them visibly, its zero and its reading.
+    """
+    mark, factor = unit_shown((document.get("maps") or {}).get("unit", "rad"))
+    angle = unit_shown("rad")[1]
+    said = []
+    zeta, without = size["damping_ratio"], size["damping_ratio_without"]
+    if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
+        said.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
+    if abs(size["frequency_change"]) > _VISIBLE_FREQUENCY:
+        said.append(f"frequency {100.0 * size['frequency_change']:+.2g} %")
+    reading = factor * size["reading_change"]
+    if abs(size["zero_change"]) > 0.5 * size["reading_change"]:
+        said.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
+    said.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
+    held = angle * size["stands_rad"]
+    stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
+    amplitude = significant(angle * size["amplitude_rad"], 2)
+    return minus_inside(f"Over three cycles from {amplitude}°: {', '.join(said)}{stands}")
+
+
+def _spaced(mark: str) -> str:
+    return mark if mark == "°" else f" {mark}"
+
+
+def minus_inside(text: str) -> str:
+    """A text in which numbers have a minus sign in place of a leading hyphen."""
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", text)
 
 
 def percent(value: float) -> str:
@@ -187,7 +308,7 @@ def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
                 "meaning": (kind.__doc__ or "").split("\n")[0],
                 "equation": kind.equation,
                 "signature": kind.signature,
-                "where": f"{kind.channel}, {CONDITIONS[kind.condition]}",
+                "where": acts_on(document, name),
                 "references": kind.references,
             }
         )
@@ -243,8 +364,8 @@ def next_steps(document: Document) -> list[str]:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
     if not document.get("decided", True):
         steps.append(
-            "Add runs with other springs, wind speeds and release angles, and diagnose again: no answer has a "
-            "probability of one half."
+            f"Add runs with other springs{', wind speeds' if windy(document) else ''} and release angles, and "
+            "diagnose again: no answer has a probability of one half."
         )
         steps.append(
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause."
@@ -253,9 +374,11 @@ def next_steps(document: Document) -> list[str]:
         steps.append("Read where the model departs from the runs, and examine the rig there.")
         steps.append("State the effect that you suspect in a file, and diagnose again with --effects-file.")
     else:
-        steps.append(
-            f"Repair the rig ({plain(*causes)}), measure again, and compare the two diagnoses (tunnel compare)."
-        )
+        known = {kind.name: kind.advice for kind in known_effects()}
+        steps += [
+            f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in causes
+        ]
+        steps.append("Measure again, and compare the two diagnoses (tunnel compare).")
         steps.append("Until then use the coefficients with the causes, not those of the nominal model.")
     if rest.get("material"):
         steps.append(
@@ -291,25 +414,31 @@ def place_rows(document: Document) -> list[tuple[str, str]]:
     return [
         ("Runs that show it", ", ".join(where["runs"]) or "–"),
         ("Time", interval(where["time_s"], "s")),
-        ("Amplitude", interval(where["amplitude_rad"], "rad")),
+        ("Amplitude", interval(where["amplitude_rad"], "°", unit_shown("rad")[1])),
         ("Frequency", interval(where["frequency_hz"], "Hz")),
         ("Channel", where["channel"] or UNDETERMINED_PLACE),
-        ("Condition", CONDITIONS.get(where["condition"], str(where["condition"]))),
+        *(
+            [("Condition", CONDITIONS.get(where["condition"], str(where["condition"])))]
+            if windy(document)
+            else ()
+        ),
     ]
 
 
-def interval(values: list[float] | None, unit: str) -> str:
+def interval(values: list[float] | None, unit: str, factor: float = 1.0) -> str:
     """An interval in words.
 
     Args:
         values: its ends, or None.
+        factor: on the ends, to have them in ``unit``; dimensionless.
 
     Returns:
         Text such as ``0.00 to 4.20 s``; a dash where there is none.
     """
     if values is None:
         return "–"
-    return f"{significant(values[0], 3)} to {significant(values[1], 3)} {unit}"
+    low, high = (significant(factor * value, 3) for value in values)
+    return f"{low} to {high}{_spaced(unit)}"
 
 
 def step_rows(document: Document) -> list[dict[str, str]]:
@@ -322,8 +451,10 @@ def step_rows(document: Document) -> list[dict[str, str]]:
     return [
         {
             "name": plain(step["effect"] or "nominal model"),
-            "left": minus(held_out_excess(step["excess"])),
-            "without": minus(held_out_excess(without[step["effect"]])) if step["effect"] in without else "",
+            "left": minus_inside(misfit_text(document, step["excess"])),
+            "without": minus_inside(misfit_text(document, without[step["effect"]]))
+            if step["effect"] in without
+            else "",
         }
         for step in (steps if len(steps) > 1 else ())
     ]
@@ -346,8 +477,10 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
                 "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
                 "duration": f"{run.record.duration:.3g}",
                 "rate": f"{run.record.sample_rate:.4g}",
-                "before": "–" if excesses is None else excess(excesses["before"]),
-                "after": "–" if excesses is None else excess(excesses["after"]),
+                "before": "–"
+                if excesses is None
+                else minus_inside(misfit_text(document, excesses["before"])),
+                "after": "–" if excesses is None else minus_inside(misfit_text(document, excesses["after"])),
                 "named": "yes" if run.id in document["where"]["runs"] else "",
             }
         )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, grid, styled, with_breaks
+from tunnel_lab.plotting.style import INTERVAL, figure, grid, styled
 from tunnel_lab.report.drawing import (
     AFTER,
     BEFORE,
@@ -19,10 +19,10 @@ from tunnel_lab.report.drawing import (
     array,
     drawn_label,
     faded,
+    misfit_scale,
     run_label,
     shade,
 )
-from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -33,9 +33,44 @@ if TYPE_CHECKING:
 _ANGLE, _RATE = "angle β [rad]", "rate β̇/ω [rad]"
 _UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 Chart = dict[str, Any]
-_POINTS = 1000  # of a reading: more than a screen shows
 _LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
 _ALL = "all runs together"
+
+
+@styled
+def place_figure(document: Document) -> Figure | None:
+    """Where the gap is: misfit by amplitude and by wind speed, or by amplitude and time where there is one speed.
+
+    Args:
+        document: a diagnosis with its maps.
+
+    Returns:
+        A map small enough for a phone, in which cells within the noise stay empty; None for maps without it.
+    """
+    grid_of = document["maps"].get("grid")
+    if grid_of is None:
+        return None
+    unit, size = misfit_scale(document)
+    excess, std = (np.stack([array(row) for row in grid_of[name]]) for name in ("excess", "std"))
+    rows = np.degrees(array(grid_of["amplitude_edges_rad"]))
+    speeds = grid_of["wind_speeds"]
+    columns = np.arange(len(speeds) + 1) - 0.5 if speeds else array(grid_of["time_edges_s"])
+    cells = np.vectorize(size, otypes=[float])(np.nan_to_num(excess))
+    shown = np.where(excess > SIGMAS * std, cells, np.nan)
+    fig = figure(NARROW, 2.7)
+    axes = fig.add_subplot()
+    top = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
+    mesh = axes.pcolormesh(columns, rows, shown, cmap=faded(BEFORE), vmin=0.0, vmax=top)
+    axes.set_ylabel("amplitude [°]")
+    if speeds:
+        axes.set_xticks(range(len(speeds)), [f"{speed:g}" if speed else "off" for speed in speeds])
+        axes.set_xlabel("wind speed [m/s]")
+    else:
+        axes.set_xlabel("time since the start of the record [s]")
+    axes.set_ylim(0.0, float(rows[-1]))
+    axes.set_xlim(float(columns[0]), float(columns[-1]))
+    fig.colorbar(mesh, ax=axes, label=f"root mean square misfit [{unit}]")
+    return fig
 
 
 @styled
@@ -52,7 +87,7 @@ def runs_figure(document: Document) -> Figure:
 
     maps = document["maps"]
     runs = maps["runs"]
-    fig = figure(WIDTH, 1.4 + 0.24 * max(len(runs), 4))
+    fig = figure(NARROW, 1.4 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
     edges = array(maps["time"]["edges_s"])
     cells, floor, top = run_cells(maps)
@@ -95,8 +130,8 @@ def profiles_figure(document: Document) -> Figure:
         Three panels; the shaded intervals hold four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
-    fig = figure(WIDTH, 3.4)
-    axes = fig.subplot_mosaic([["time", "amplitude"], ["moment", "amplitude"]], height_ratios=(1.3, 0.8))
+    fig = figure(NARROW, 6.0)
+    axes = fig.subplot_mosaic([["time"], ["moment"], ["amplitude"]], height_ratios=(1.3, 0.8, 1.3))
     _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
     axes["time"].tick_params(labelbottom=False)
     _moment(axes["moment"], maps["time"])
@@ -138,7 +173,7 @@ def spectrum_figure(document: Document) -> Figure:
         One panel with logarithmic axes; the shaded interval holds four fifths of the gap.
     """
     values = document["maps"]["frequency"]
-    fig = figure(WIDTH, 2.7)
+    fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
     edges, centre = spectrum_axis(values)
     before, std = array(values["excess"]) + 1.0, array(values["std"])
@@ -229,9 +264,9 @@ def moment_figure(document: Document) -> Figure | None:
         return None
     edges = array(plane["edges_rad"])
     _, _, unit, factor = plane_cells(plane)
-    fig = figure(WIDTH, 2.6)
+    fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
-    for axes, name, label in zip(fig.subplots(1, 2), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
+    for axes, name, label in zip(fig.subplots(2, 1), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
         mean, spread = factor * array(plane[name]), factor * array(plane[f"{name}_std"])
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
         axes.fill_between(
@@ -269,7 +304,7 @@ def _readable(plane: Document, size: Array) -> tuple[str, float]:
     return (f"10⁻³ {unit}", 1e3) if greatest < 0.1 else (unit, 1.0)
 
 
-def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
+def charts(document: Document) -> dict[str, list[Chart]]:
     """The charts of a diagnosis.
 
     Args:
@@ -284,8 +319,6 @@ def charts(document: Document, campaign: Campaign) -> dict[str, list[Chart]]:
     by_figure = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
     if maps["phase_plane"] is not None:
         by_figure["where-phase-plane"] = [_plane(maps["phase_plane"])]
-    if traces := _traces(maps, campaign):
-        by_figure["residuals"] = traces
     return by_figure
 
 
@@ -298,7 +331,7 @@ def _runs(maps: Document) -> Chart:
         "x": {"label": "time since the start of the record [s]", "edges": maps["time"]["edges_s"]},
         "y": {"label": "run", "edges": np.arange(len(ids) + 1).tolist(), "names": ids},
         "labels": [run_label(run) for run in maps["runs"]],
-        "values": [_rounded(row) for row in cells],
+        "values": [rounded(row) for row in cells],
         "unit": "noise variances",
         "range": [low, high],
         "log": True,
@@ -313,7 +346,7 @@ def _plane(plane: Document) -> Chart:
         "title": "Missing moment",
         "x": {"label": "angle β [rad]", "edges": edges},
         "y": {"label": "rate β̇/ω [rad]", "edges": edges},
-        "values": [_rounded(row) for row in cells],
+        "values": [rounded(row) for row in cells],
         "unit": unit,
         "range": [-reach, reach],
         "log": False,
@@ -348,55 +381,20 @@ def _spectrum(maps: Document) -> Chart:
 def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
     """A view of the bins that hold a value; the others are empty, and a null there would break the curves."""
     filled = np.any(np.isfinite(excesses), axis=0)
-    power = (_rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
-    return _view(label, _rounded(centre[filled]), *power, run=run)
+    power = (rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
+    return view(label, rounded(centre[filled]), *power, run=run)
 
 
-def _traces(maps: Document, campaign: Campaign) -> list[Chart]:
-    """The reading and, below it on the same axis of time, the residuals."""
-    labels = {run["id"]: run_label(run) for run in maps["runs"]}
-    records = {run.id: run.record for run in campaign.runs}
-    readings, residuals = [], []
-    for trace in maps["traces"]:
-        if trace["id"] not in records:
-            continue
-        name, label = trace["id"], labels.get(trace["id"], str(trace["id"]))
-        record = records[name]
-        thin = slice(None, None, max(1, record.yaw_rad.size // _POINTS))
-        readings.append(
-            _broken(label, record.time_s[thin] - record.time_s[0], record.yaw_rad[thin], run=name)
-        )
-        before = 1e3 * array(trace["before_rad"])
-        after = (
-            np.full(before.size, np.nan) if trace["after_rad"] is None else 1e3 * array(trace["after_rad"])
-        )
-        residuals.append(_broken(label, array(trace["time_s"]), before, after, run=name))
-    if not readings:
-        return []
-    unit = campaign.sensor.unit
-    time_axis = {"label": "time since the start of the record [s]", "log": False}
-    series = [{"label": "nominal model", "role": "before"}, {"label": "with the causes", "role": "after"}]
-    return [
-        _lines("Reading", time_axis, unit, [{"label": "reading", "role": "soft"}], readings),
-        _lines("Residual", time_axis, f"10⁻³ {unit}", series, residuals),
-    ]
-
-
-def _lines(title: str, x: Chart, unit: str, series: list[Chart], views: list[Chart]) -> Chart:
-    y = {"label": f"{title.lower()} [{unit}]", "log": False}
-    return {"kind": "lines", "title": title, "x": x, "y": y, "series": series, "views": views}
-
-
-def _view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
+def view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
+    """The curves of a chart of lines that are shown together; ``run`` is the run they belong to."""
     return {"label": label, "run": run, "data": list(data)}
 
 
-def _broken(label: str, time: Array, *curves: Array, run: str) -> Chart:
-    """A view of curves over time, which break where samples are missing."""
-    when, *values = with_breaks(time, *curves)
-    return _view(label, _rounded(when, 6), *map(_rounded, values), run=run)
+def rounded(values: Array, digits: int = 4) -> list[float | None]:
+    """Numbers for JSON, as many digits as a screen shows; null where a value is not known.
 
-
-def _rounded(values: Array, digits: int = 4) -> list[float | None]:
-    """Numbers for JSON, as many digits as a screen shows; null where a value is not known."""
+    Args:
+        values: of any unit and shape, flattened, shape (n,).
+        digits: significant ones (count).
+    """
     return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]

@@ -37,7 +37,9 @@ EffectOption = Annotated[
         help="Add an effect to the nominal model. May be repeated; tunnel effects lists them.",
     ),
 ]
-HELP = "Format of the tables; json: one object per line. Other lines then go to standard error."
+HELP = "Format of the tables: text, csv, md or json (one object per line). Other lines then go to standard error."
+EVERY = "As for every command"
+"""Where the help lists what every command takes."""
 QUIET_HELP = "Print errors only; files and --json - are still written."
 quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 """Whether this command prints errors only."""
@@ -59,6 +61,7 @@ EffectsFileOption = Annotated[
     typer.Option(
         "--effects-file",
         metavar="FILE.toml",
+        rich_help_panel="Effects",
         help="Add the effects that this file states as expressions to the vocabulary.",
         callback=_know_effects,
     ),
@@ -113,13 +116,20 @@ chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat
 
 def with_format(run: Callable[..., None]) -> Callable[..., None]:
     """A command with ``--quiet``, and ``--format`` for the tables that it prints."""
-    kind = Annotated[TableFormat, typer.Option("--format", help=HELP)]
+    kind = Annotated[
+        TableFormat, typer.Option("--format", metavar="FORMAT", rich_help_panel=EVERY, help=HELP)
+    ]
     return _with_option(with_quiet(run), "table_format", kind, chosen)
 
 
 def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
     """A command with the option ``--quiet``."""
-    return _with_option(run, "quiet", Annotated[bool, typer.Option("--quiet", "-q", help=QUIET_HELP)], quiet)
+    return _with_option(
+        run,
+        "quiet",
+        Annotated[bool, typer.Option("--quiet", "-q", rich_help_panel=EVERY, help=QUIET_HELP)],
+        quiet,
+    )
 
 
 def _with_option(

@@ -21,6 +21,7 @@ class AsymmetricStiffness(Effect):
     place = 5
     channel = "stiffness"
     condition = "always"
+    advice = "Seat the spring so that it is as stiff to both sides"
     equation = "−κ Kr β²; general form: |β|^p for β²"
     signature = (
         "The centre of the oscillation shifts by −κ A²/2 and a second harmonic appears; the "

@@ -70,6 +70,7 @@ class Effect:
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty where the
       effect is not periodic in the angle.
     - ``tries``: how many starting points of a fit are worth trying.
+    - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own.
     - ``caveat``: how to read the coefficients that are reported with it.
     """
 
@@ -92,6 +93,7 @@ class Effect:
     ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""
     tries: ClassVar[int] = 1
+    advice: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
@@ -154,6 +156,18 @@ class Effect:
         """
         del omega
         return True
+
+    def stands(self, stiffness: float) -> float:
+        """How far from rest the effect holds a body that has stopped.
+
+        Args:
+            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment is.
+
+        Returns:
+            The greatest such angle, rad; 0 for an effect that holds none.
+        """
+        del stiffness
+        return 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.

@@ -29,6 +29,7 @@ class Buffeting(Effect):
     place = 13
     channel = "forcing"
     condition = "wind_on"
+    advice = "Quieten the stream, or average over more runs with the wind on"
     equation = "random moment of standard deviation s ½ρV²Al, correlated as exp(−2π fb |t − t'|)"
     signature = (
         "In wind-on runs the response wanders about the decay; after the decay it continues as "

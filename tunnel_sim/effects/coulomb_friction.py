@@ -27,6 +27,7 @@ class CoulombFriction(Effect):
     place = 1
     channel = "damping"
     condition = "always"
+    advice = "Free the bearing and the potentiometer of their dry friction"
     equation = (
         "−Tc sgn β̇; rest while the other moments stay within ±Tc; general form: −Tc z/zs, ż = β̇ − |β̇| z/zs"
     )
@@ -51,6 +52,10 @@ class CoulombFriction(Effect):
         fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
         form=True,
     )
+
+    def stands(self, stiffness: float) -> float:
+        """The angle at which the spring's moment is that of the friction, rad."""
+        return self.friction_moment / stiffness if stiffness > 0.0 else 0.0
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with steps short enough to resolve the presliding range."""

@@ -21,6 +21,7 @@ class CubicStiffness(Effect):
     place = 4
     channel = "stiffness"
     condition = "always"
+    advice = "Model the spring's cubic stiffness, or release from smaller angles"
     equation = "−κ Kr β³; general form: |β|^p sgn β for β³"
     signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)

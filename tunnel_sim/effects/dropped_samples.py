@@ -26,6 +26,7 @@ class DroppedSamples(Effect):
     place = 25
     channel = "calibration"
     condition = "always"
+    advice = "Replace the logger, or state the time of every sample"
     equation = (
         "y(t) = β(t) until the instant and β(t + τ) after it, shared out over one sample interval; "
         "the instant is drawn for every run. With n instants in a run, τ/n is lost at each"

@@ -22,6 +22,7 @@ class FlowMisalignment(Effect):
     place = 15
     channel = "forcing"
     condition = "wind_on"
+    advice = "Align the rig with the flow"
     equation = "moment Ka βf added; general form: βf (V/20 m/s)^n for βf"
     signature = (
         "The centre of the oscillation shifts in proportion to the wind speed squared over the stiffness."

@@ -20,6 +20,7 @@ class FreePlay(Effect):
     place = 6
     channel = "stiffness"
     condition = "always"
+    advice = "Take up the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)

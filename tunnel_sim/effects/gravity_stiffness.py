@@ -23,6 +23,7 @@ class GravityStiffness(Effect):
     place = 7
     channel = "stiffness"
     condition = "always"
+    advice = "Model gravity's sine, or level the axis and balance the body on it"
     equation = "−Kg sin(β − βg)"
     signature = (
         "The same stiffness is added to every spring, so the line of Kr against ωn² keeps its gradient "

@@ -25,6 +25,7 @@ class MainsHum(Effect):
     place = 20
     channel = "sensor"
     condition = "always"
+    advice = "Shield the sensor's cable, or ground it at one end only"
     equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
     signature = "A spectral line at the mains frequency in every run, independent of the motion."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)

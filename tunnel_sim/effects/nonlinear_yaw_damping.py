@@ -21,6 +21,7 @@ class NonlinearYawDamping(Effect):
     place = 11
     channel = "damping"
     condition = "wind_on"
+    advice = "Model the damping that depends on the angle, or release from smaller angles"
     equation = "Ca (1 + μa β²) β̇ instead of Ca β̇; general form: |β|^p for β²"
     signature = (
         "The aerodynamic part of the damping ratio in wind-on runs changes by the relative amount μa A²/4."

@@ -21,6 +21,7 @@ class NonlinearYawMoment(Effect):
     place = 9
     channel = "stiffness"
     condition = "wind_on"
+    advice = "Model the moment that is not linear in the angle, or release from smaller angles"
     equation = "Ka (1 + κa β²) β instead of Ka β; general form: |β|^p for β²"
     signature = "Like cubic stiffness, but proportional to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)

@@ -21,6 +21,7 @@ class QuadraticDamping(Effect):
     place = 2
     channel = "damping"
     condition = "always"
+    advice = "Model the damping that grows with the rate"
     equation = "−C2 |β̇| β̇; general form: |β̇|^n sgn β̇ for |β̇| β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
     references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)

@@ -25,6 +25,7 @@ class RodFlexibility(Effect):
     place = 8
     channel = "stiffness"
     condition = "always"
+    advice = "Stiffen the rod, or put the sensor at the body's end"
     equation = (
         "s Izz θ̈ + Cr θ̇ + Kr θ = Krod φ + Crod φ̇; (1 − s) Izz β̈ = Ka β + Ca β̇ − Krod φ − Crod φ̇; φ = β − θ, "
         "the sensor reads θ, Crod is 1 % of critical"

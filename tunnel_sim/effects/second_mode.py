@@ -32,6 +32,7 @@ class SecondMode(Effect):
     place = 24
     channel = "sensor"
     condition = "always"
+    advice = "Stiffen what oscillates beside the body, or model both modes"
     equation = (
         "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.35 rad)^n for a, "
         "β0 the release angle"

@@ -28,6 +28,7 @@ class SensorClipping(Effect):
     place = 21
     channel = "sensor"
     condition = "always"
+    advice = "Widen the sensor's range, or release from smaller angles"
     equation = "|y| ≤ L; general form: |y − c| ≤ L, approached exponentially within k L of the limit"
     signature = "The peaks of the largest swings are flat; all other readings are unchanged."
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)

@@ -23,6 +23,7 @@ class SensorDrift(Effect):
     place = 19
     channel = "sensor"
     condition = "always"
+    advice = "Let the sensor warm up, and record its zero before and after each run"
     equation = f"y = β + d t/T over a run of length T; general form: {EQUATION} for t/T"
     signature = (
         "The centre of the oscillation moves with time, in the same way for every wind speed and spring."

@@ -27,6 +27,7 @@ class SensorHysteresis(Effect):
     place = 18
     channel = "sensor"
     condition = "always"
+    advice = "Take up the backlash between rod and sensor"
     equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
     signature = (
         "The reading stands still for a moment at each reversal of the motion and lags by w in between."

@@ -29,6 +29,7 @@ class SensorNonlinearity(Effect):
     place = 16
     channel = "sensor"
     condition = "always"
+    advice = "Calibrate the sensor over the whole swing"
     equation = "y = β + s β³; general form: |β|^p sgn β for β³, plus q β²"
     signature = (
         "A third harmonic of s A³/4; the frequency is unchanged, and the decay looks faster by the relative "

@@ -22,6 +22,7 @@ class SensorQuantisation(Effect):
     place = 17
     channel = "sensor"
     condition = "always"
+    advice = "State the sensor's real resolution, or use a finer one"
     equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
     signature = (
         "The readings are multiples of a coarser step than stated; their error is a sawtooth of the angle."

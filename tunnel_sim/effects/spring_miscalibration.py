@@ -25,6 +25,7 @@ class SpringMiscalibration(Effect):
     place = 22
     channel = "calibration"
     condition = "always"
+    advice = "Measure the stiffness of that spring again"
     equation = "(1 + x) Kr instead of the stated Kr, in the runs of one spring"
     signature = (
         "All runs of one spring lie off the line of stiffness against squared frequency by the same relative "

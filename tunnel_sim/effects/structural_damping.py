@@ -22,6 +22,7 @@ class StructuralDamping(Effect):
     place = 3
     channel = "damping"
     condition = "always"
+    advice = "Model the hysteretic loss: the same share of the energy per cycle at every frequency"
     equation = "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz)"
     signature = (
         "Each run is linear, but the damping moment grows with the square root of the spring's stiffness."

@@ -24,6 +24,7 @@ class UnsteadyAeroLag(Effect):
     place = 12
     channel = "damping"
     condition = "wind_on"
+    advice = "Model the lag of the aerodynamic moment"
     equation = (
         "Ka x instead of Ka β, with τ ẋ = β − x, τ = a l/V; for a < 0 a phase lead: Ka (2β − x) with |τ|"
     )

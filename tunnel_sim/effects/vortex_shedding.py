@@ -22,6 +22,7 @@ class VortexShedding(Effect):
     place = 14
     channel = "forcing"
     condition = "wind_on"
+    advice = "Choose wind speeds at which the vortices are shed far from the rig's frequency"
     equation = "c ½ρV²Al sin(2π St V t/width + φ), φ drawn for every run"
     signature = "A spectral line whose frequency is proportional to the wind speed."
     references = ("Bearman, Annu. Rev. Fluid Mech. 16 (1984) 195, doi 10.1146/annurev.fl.16.010184.001211",)

@@ -28,6 +28,7 @@ class WindSpeedDrift(Effect):
     place = 10
     channel = "stiffness"
     condition = "wind_on"
+    advice = "Hold the wind speed during the run, or record it"
     equation = "V(t) = V (1 + d t/T) over a run of length T; general form: " + EQUATION + " for t/T"
     signature = "The frequency of wind-on runs changes with time rather than with amplitude."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)

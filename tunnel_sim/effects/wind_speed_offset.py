@@ -24,6 +24,7 @@ class WindSpeedOffset(Effect):
     place = 23
     channel = "calibration"
     condition = "wind_on"
+    advice = "Calibrate the wind speed"
     equation = "true speed = stated speed + ΔV; general form: ΔV (V/20 m/s)^n for ΔV"
     signature = "The aerodynamic stiffness is not proportional to the square of the stated speed."
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)

@@ -1,4 +1,4 @@
-"""Gymnasium environments of the rig; importing this package registers them.
+"""Gymnasium environments of the rig; ``import tunnel_sim.envs`` registers them, which ``gymnasium.make`` needs.
 
 ``tunnel_sim/FreeDecay-v0``: an episode is one run (docs/reference/envs/free-decay.md).
 ``tunnel_sim/Campaign-v0``: an episode is a campaign and a step is a run. It needs identification and diagnosis, so

@@ -17,7 +17,7 @@ from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.plan import POTENTIOMETER_RESOLUTION, SensorModel
 from tunnel_sim.vocabulary.rig import Rig
 
-PRESETS = ("plain", "operator")
+PRESETS = ("operator", "plain")
 LEAST_DEVIATION = 1e-6
 """Least standard deviation of a reading, rad: below it the prior is lost in the rounding of the information."""
 _MAY_BE_ZERO = frozenset({"noise_std", "resolution", "effect_probability"})
@@ -28,8 +28,8 @@ class FreeDecayConfig:
     """What all episodes of an environment have in common.
 
     Args:
-        preset: ``plain``: no control during a run; ``operator``: the action sets the wind-speed set-point and an
-            applied yaw moment.
+        preset: ``operator``: the action sets the wind-speed set-point and an applied yaw moment; ``plain``: no
+            control during a run.
         duration: of a run, s; a whole number of control periods.
         control_period: s; a whole number of sample intervals.
         sample_rate: of the potentiometer, Hz.
@@ -44,7 +44,7 @@ class FreeDecayConfig:
         rig_file: a rig description; None: the packaged one.
     """
 
-    preset: Literal["plain", "operator"] = "plain"
+    preset: Literal["plain", "operator"] = "operator"
     duration: float = 10.0
     control_period: float = 0.01
     sample_rate: float = 1000.0

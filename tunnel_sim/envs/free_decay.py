@@ -16,7 +16,7 @@ from tunnel_sim.envs.controls import action_space, operator_action
 from tunnel_sim.envs.engines import ManyRuns, Models, OneRun
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.errors import EnvError
-from tunnel_sim.envs.rendering import RENDER_MODES, RigView
+from tunnel_sim.envs.rendering import RENDER_MODES, RigView, render_modes
 from tunnel_sim.vocabulary.record import Array, Record
 
 
@@ -46,7 +46,8 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         self.config = free_decay_config(arguments)
         self.rig = self.config.rig()
-        self.metadata = {**self.metadata, "render_fps": render_fps(self.config.control_period)}  # type: ignore[misc]
+        fps = render_fps(self.config.control_period)
+        self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": fps}  # type: ignore[misc]
         self.observation_space = observation_space(self.config)
         self.action_space = action_space(self.config)
         self.render_mode = render_mode

@@ -121,10 +121,19 @@ class RigView:
         self._shown = time.monotonic()
 
 
-def _open_window(model: Any, data: Any) -> Any:
-    if sys.platform.startswith("linux") and not (
+def render_modes() -> list[str]:
+    """The modes that this machine can draw in: a window needs a display."""
+    return [mode for mode in RENDER_MODES if mode != "human" or _has_display()]
+
+
+def _has_display() -> bool:
+    return not sys.platform.startswith("linux") or bool(
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
+    )
+
+
+def _open_window(model: Any, data: Any) -> Any:
+    if not _has_display():
         raise EnvError("there is no display", where="render_mode human", remedy="use render_mode='rgb_array'")
     from mujoco import viewer  # imported here because it needs the libraries of a display
 

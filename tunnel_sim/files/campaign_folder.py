@@ -249,6 +249,25 @@ def read_campaign(folder: Path | str) -> Campaign:
     )
 
 
+def as_campaign(given: Campaign | Path | str) -> Campaign:
+    """A campaign, read where its place is given.
+
+    Args:
+        given: the campaign; its folder, or the ``campaign.toml`` in it; or one file of a data logger.
+
+    Raises:
+        TunnelError: as for `read_campaign`, and where a file cannot be imported without options.
+    """
+    if isinstance(given, Campaign):
+        return given
+    path = Path(given)
+    if not path.is_file() or path.name == CAMPAIGN_FILE:
+        return read_campaign(path)
+    from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
+
+    return read_records([path]).campaign
+
+
 def write_campaign(
     campaign: Campaign,
     folder: Path | str,

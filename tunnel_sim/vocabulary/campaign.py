@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 Quantity = Literal["angle", "rate", "acceleration"]
 """What a sensor measures: the yaw angle, or its first or second derivative."""
@@ -101,6 +105,24 @@ class Run:
         """Whether the wind is on."""
         return self.wind_speed > 0.0
 
+    def to_xarray(self) -> Dataset:
+        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
+
+        Raises:
+            TunnelError: where xarray, of the extra ``frames``, is not installed.
+        """
+        try:
+            from xarray import Dataset  # only here: an extra
+        except ModuleNotFoundError as error:
+            remedy = "pip install 'virtual-wind-tunnel[frames]'"
+            raise TunnelError("xarray is not installed", remedy=remedy) from error
+        names = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
+        stated = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        readings = ("time_s", self.record.yaw_rad, {"long_name": "reading of the yaw angle"})
+        return Dataset(
+            {"yaw_rad": readings}, coords={"time_s": self.record.time_s}, attrs={"id": self.id, **stated}
+        )
+
 
 def needs_density(wind_speed: float, *scales: float | None) -> bool:
     """Whether a run must state its air density: without a stiffness and sizes only ωn and ζ can be identified.
@@ -128,3 +150,25 @@ class Campaign:
     runs: tuple[Run, ...]
     description: str = ""
     law: JointLaw | None = None
+
+    def __repr__(self) -> str:
+        """The runs, their conditions, and where to go from here, in three lines."""
+        count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"
+        on = sum(run.wind_on for run in self.runs)
+        springs = [run.spring_stiffness for run in self.runs if run.spring_stiffness is not None]
+        stated = [
+            f"springs {_between(springs)} N m/rad" if springs else "no spring stated",
+            f"wind {_between([run.wind_speed for run in self.runs])} m/s" if on else "wind off",
+            f"{_between([run.record.duration for run in self.runs])} s",
+        ]
+        return (
+            f"Campaign {self.name!r}: {count}, {on} with the wind on\n"
+            f"  {', '.join(stated if self.runs else [])}\n"
+            "  .runs[0].record; identify(campaign), diagnose(campaign)"
+        )
+
+
+def _between(values: list[float]) -> str:
+    """Least and greatest, such as ``16.1 to 44.8``; one number where they are alike."""
+    low, high = (f"{end:.3g}" for end in (min(values), max(values)))
+    return low if low == high else f"{low} to {high}"

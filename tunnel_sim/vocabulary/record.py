@@ -51,6 +51,16 @@ class Record:
                 "time_s and yaw_rad must be one-dimensional, equally long and of two samples or more"
             )
 
+    def __repr__(self) -> str:
+        """The samples, the range of the readings, and where to go from here, in three lines."""
+        kind = "evenly spaced" if self.uniform else "not evenly spaced"
+        low, high = float(self.yaw_rad.min()), float(self.yaw_rad.max())
+        return (
+            f"Record of {self.time_s.size} samples in {self.duration:.4g} s, {self.sample_rate:.4g} Hz, {kind}\n"
+            f"  readings from {low:.4g} to {high:.4g} rad (rad/s or rad/s² where the sensor measures those)\n"
+            "  .time_s, .yaw_rad"
+        )
+
     @property
     def sample_interval(self) -> float:
         """Mean sample interval, s."""

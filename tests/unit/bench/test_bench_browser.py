@@ -125,7 +125,7 @@ def test_which_of_two_channels_is_the_angle_is_asked_for(browser: Any, served: B
         page.get_by_role("option", name="data[1]").click()
         page.keyboard.press("Escape")
         page.wait_for_selector(".mark.rest")
-        assert page.get_by_role("alert").filter(has_text="tunnel: ").count() == 0
+        assert page.locator(".fault").count() == 0
         one.click("Write the campaign")
         page.wait_for_url("**/conditions")
     (run,) = read_campaign(served.folder / "Measured_data2").runs
@@ -140,11 +140,10 @@ def test_a_wrong_file_is_refused_in_the_words_of_the_command(
     with tab(browser, served) as one:
         one.page.set_input_files("input[type=file]", [str(wrong)])
         one.page.wait_for_url("**/notes/records")
-        line = one.page.get_by_role("alert").filter(has_text="tunnel: ").first.inner_text()
-        assert line.startswith("tunnel: ")
-        assert "notes.csv" in line
-        one.click("Write the campaign")
-        one.page.wait_for_selector("text=the files cannot be read yet")
+        line = one.page.locator(".fault").first.inner_text()
+        assert "notes.csv: no columns of numbers; give “Delimiter of a text file”" in line
+        assert "--" not in line
+        assert one.page.get_by_role("button", name="Write the campaign").is_disabled()
     assert not (served.folder / "notes").exists()
 
 
@@ -196,7 +195,7 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
             page.keyboard.type(text)
             page.keyboard.press("Enter")
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
-        page.wait_for_selector("text=tunnel: run 'a': wind-on without air_density")
+        page.wait_for_selector("text=run 'a': wind-on without air_density")
         assert page.get_by_text("3 Identify").get_attribute("aria-disabled") == "true"
         one.open("/two/conditions")  # what is wrong is kept too
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
@@ -239,6 +238,20 @@ def test_two_tabs_do_not_mix(browser: Any, served: Bench) -> None:
             opened.page.wait_for_function("document.activeElement && true")
             opened.open(opened.page.url.removeprefix(served.base))
             assert opened.page.get_by_label("reference length l [m]").input_value() == text
+
+
+def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench) -> None:
+    shutil.copytree(served.folder / "two", served.folder / "fitted")
+    session = Session(served.folder, "fitted")
+    _diagnosed(session)
+    with tab(browser, served) as one:
+        one.open("/fitted/diagnose")
+        fit = one.page.frame_locator('iframe[title="The fit over the data"]')
+        fit.locator(".uplot").nth(1).wait_for()
+        shown = fit.locator("select option").all_inner_texts()
+        frame = one.page.locator('iframe[title="The fit over the data"]').bounding_box()
+        assert frame["height"] > 600
+    assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
 
 
 PAGES = ("/", "/try", "/two/records", "/two/conditions", "/two/identify", "/two/diagnose", "/two/next-run")

@@ -10,6 +10,7 @@ import pytest
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import conditions, preview
 from tunnel_lab.bench.records import write
+from tunnel_lab.bench.words import page_words
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.conditions import read_recipe
@@ -32,13 +33,13 @@ def session(tmp_path: Path) -> Session:
 
 
 def test_a_moved_mark_is_where_the_run_begins_also_for_the_command(session: Session) -> None:
-    (record,) = preview.drawn(preview.read(session))
+    (record,) = preview.drawn(preview.read(session)[0])
     (mark,) = record.marks
     assert mark.start == pytest.approx(1.0, abs=0.05)
     assert mark.rest == pytest.approx(0.0, abs=0.02)
     preview.move(session, mark, {"start": 2.0021})
-    preview.move(session, preview.drawn(preview.read(session))[0].marks[0], {"end": 7.5})
-    (moved,) = preview.drawn(preview.read(session))[0].marks
+    preview.move(session, preview.drawn(preview.read(session)[0])[0].marks[0], {"end": 7.5})
+    (moved,) = preview.drawn(preview.read(session)[0])[0].marks
     assert (moved.start, moved.end) == (pytest.approx(2.0), pytest.approx(7.5))
     again = read_records(
         [session.uploads / "log.csv"], read_recipe(session.choices)
@@ -52,7 +53,7 @@ def test_a_moved_mark_is_where_the_run_begins_also_for_the_command(session: Sess
 
 
 def test_a_mark_behind_its_end_is_refused_and_nothing_changes(session: Session) -> None:
-    mark = preview.drawn(preview.read(session))[0].marks[0]
+    mark = preview.drawn(preview.read(session)[0])[0].marks[0]
     with pytest.raises(TunnelError, match=r"run '.*': the end .* is not after the release"):
         preview.move(session, mark, {"start": mark.end + 1.0})
     assert not session.choices.exists()
@@ -62,17 +63,17 @@ def test_a_mark_behind_its_end_is_refused_and_nothing_changes(session: Session) 
 
 
 def test_a_moved_rest_is_subtracted_also_by_the_command_and_can_be_taken_back(session: Session) -> None:
-    before = preview.read(session)
+    before = preview.read(session)[0]
     (mark,) = preview.drawn(before)[0].marks
     assert mark.about.endswith("rad, found")
     preview.move(session, mark, {"rest": 0.012})
-    (moved,) = preview.drawn(preview.read(session))[0].marks
+    (moved,) = preview.drawn(preview.read(session)[0])[0].marks
     assert (moved.rest, moved.start, moved.end) == (0.012, mark.start, mark.end)
     assert moved.about == "0.01200 rad, stated and subtracted"
     (run,) = read_records([session.uploads / "log.csv"], read_recipe(session.choices)).campaign.runs
     np.testing.assert_array_equal(run.record.yaw_rad, before.campaign.runs[0].record.yaw_rad - 0.012)
     preview.move(session, mark, {"rest": None})
-    assert preview.drawn(preview.read(session))[0].marks[0].rest == mark.rest
+    assert preview.drawn(preview.read(session)[0])[0].marks[0].rest == mark.rest
     preview.move(session, mark, {"rest": 3.0})
     with pytest.raises(TunnelError, match="never passes the stated rest of 3 rad"):
         preview.read(session)
@@ -89,13 +90,56 @@ def test_choices_are_a_recipe_and_can_be_taken_back(session: Session) -> None:
 
 
 def test_a_campaign_written_again_keeps_its_conditions(session: Session) -> None:
-    write(session, preview.read(session))
+    write(session, preview.read(session)[0])
     cells = conditions.stated(session)
     (run,) = (row for row in cells if row)
     cells[run]["spring_stiffness"] = "16.12"
     conditions.save(session, cells)
-    preview.move(session, preview.drawn(preview.read(session))[0].marks[0], {"start": 3.0})
-    write(session, preview.read(session))
+    preview.move(session, preview.drawn(preview.read(session)[0])[0].marks[0], {"start": 3.0})
+    write(session, preview.read(session)[0])
     found = read_campaign(session.campaign).runs[0]
     assert found.spring_stiffness == 16.12
     assert found.record.time_s.size == 1200
+
+
+def test_a_bad_file_does_not_block_a_good_one(session: Session) -> None:
+    (session.uploads / "notes.csv").write_text("nothing but words\n" * 40)
+    imported, faults = preview.read(session)
+    assert [part.raw.source.name for part in imported.parts] == ["log.csv"]
+    assert len(faults) == 1
+    assert "notes.csv" in str(faults[0])
+    (session.uploads / "log.csv").unlink()
+    with pytest.raises(TunnelError, match=r"notes\.csv"):
+        preview.read(session)
+    assert preview.raw_columns(session) == []
+
+
+def test_the_raw_columns_are_those_of_the_file(session: Session) -> None:
+    (name, unit, rows, values), (second, _, _, readings) = preview.raw_columns(session)
+    assert (name, unit, second) == ("time", "s", "yaw")
+    assert len(rows) == len(values) == len(readings)
+    assert values == sorted(values)
+
+
+def test_the_rest_follows_a_flat_end(session: Session) -> None:
+    time = np.arange(3000) / 100.0
+    held = 0.734 + np.where(time < 12.0, 0.3 * np.exp(-0.2 * time) * np.cos(9.0 * time) - 0.02, 0.0)
+    rows = "\n".join(f"{t:.2f},{y:.5f}" for t, y in zip(time, held, strict=True))
+    (session.uploads / "log.csv").write_text(f"time_s,yaw_rad\n{rows}\n")
+    (mark,) = preview.drawn(preview.read(session)[0])[0].marks
+    assert mark.rest == pytest.approx(0.734, abs=1e-6)
+    assert "found where the motion has ended" in mark.about
+
+
+def test_a_page_speaks_of_fields_and_not_of_options() -> None:
+    for line, words in (
+        (
+            "tunnel: log.csv: two columns; give --angle NAME",
+            "log.csv: two columns; give “Column of the angle”",
+        ),
+        ("'pot' is in V; give --calibration \"a + b*V\"", "'pot' is in V; give “Angle of a voltage”"),
+        ("give --unit deg if it does", "give “Unit of the angle” deg if it does"),
+        ("or keep it whole with --no-cut", "or keep it whole by switching off “Cut records at releases”"),
+        ("diagnose again with --effects-file", "diagnose again with --effects-file"),
+    ):
+        assert page_words(line) == words

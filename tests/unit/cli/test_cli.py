@@ -174,3 +174,26 @@ def test_a_shell_completes_commands(tunnel: Tunnel, monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("COMP_WORDS", "tunnel ident")
     monkeypatch.setenv("COMP_CWORD", "1")
     assert tunnel()[:2] == (0, "identify\n")
+
+
+@pytest.mark.parametrize("command", ["import", "diagnose"])
+def test_options_stand_in_groups_with_room_for_their_descriptions(
+    tunnel: Tunnel, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    _, out, _ = tunnel(command, "--help")
+    heads = [re.sub(r"[╭─╮ ]+", " ", line).strip() for line in out.splitlines() if line.startswith("╭")]
+    assert len(heads) >= 5
+    assert heads[-1] == "As for every command"
+    panel: list[str] = []
+    for line in out.splitlines():
+        if line.startswith("│"):
+            panel.append(line)
+        elif panel:
+            # every description of a panel begins in the column where that of its first option does
+            blanked = re.sub(r"--\S+|<\S+>|[A-Z][\w,.]*(?=  )", lambda m: " " * len(m[0]), panel[0])
+            begins = re.search(r"[A-Z]", blanked)
+            assert begins is not None, panel
+            assert len(panel[0]) - begins.start() - 2 > 30, panel
+            panel = []
+    assert "--delimiter" not in out

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.unit.diagnosis_document import document
 from tunnel_sim.files import writing
 
 Tunnel = Callable[..., tuple[int, str, str]]
@@ -101,6 +102,25 @@ def test_plot_writes_whole_figures(tunnel: Tunnel, tiny_campaign: Path, tmp_path
     for path in files:
         assert path.read_bytes().startswith(PNG if path.suffix == ".png" else b"%PDF")
         assert f"Written: {path}" in out
+
+
+def test_plot_draws_the_fit_of_a_diagnosis(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
+    (tmp_path / "answer.json").write_text(json.dumps(document()))
+    status, out, err = tunnel("plot", tmp_path / "answer.json", "--out", tmp_path / "figures")
+    assert (status, err) == (0, "")
+    files = sorted((tmp_path / "figures" / "answer").iterdir())
+    assert [path.name for path in files] == ["fit-1.pdf", "fit-1.png"]
+    assert all(f"Written: {path}" in out for path in files)
+    status, _, err = tunnel("plot", tmp_path / "answer.json", "--run", "delta", "--out", tmp_path / "figures")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "no run 'delta'" in err
+    assert "alpha, gamma" in err
+    (tmp_path / "bare.json").write_text(json.dumps(document() | {"maps": None}))
+    status, _, err = tunnel("plot", tmp_path / "bare.json", "--out", tmp_path / "figures")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "no curves to draw" in err
+    status, _, err = tunnel("plot", tiny_campaign, "--run", "r01")
+    assert (status, err.count("\n")) == (2, 1)
 
 
 def test_plot_refuses_a_folder_that_cannot_be_made(

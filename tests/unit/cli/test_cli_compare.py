@@ -47,6 +47,13 @@ def after(tmp_path: Path) -> Path:
     )
 
 
+def test_an_interval_is_read(tunnel: Tunnel, before: Path, tmp_path: Path) -> None:
+    given = document()
+    given["coefficients"]["after"]["cn_r"]["interval"] = [-0.28, -0.24]
+    status, _, err = tunnel("compare", before, written(tmp_path / "skewed.json", **given))
+    assert (status, err) == (0, "")
+
+
 def tables(out: str) -> dict[str, list[dict[str, Any]]]:
     """The rows of each table, by its title."""
     found = [json.loads(line) for line in out.splitlines()]

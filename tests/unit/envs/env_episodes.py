@@ -13,7 +13,8 @@ NAME = "tunnel_sim/FreeDecay-v0"
 
 
 def make(**arguments: Any) -> gymnasium.Env[Any, Any]:
-    return gymnasium.make(NAME, **arguments)
+    """Without control, where no preset is given."""
+    return gymnasium.make(NAME, **{"preset": "plain", **arguments})
 
 
 def episode(

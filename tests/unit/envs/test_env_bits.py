@@ -140,7 +140,7 @@ def test_native_sync_and_async_agree_to_the_bit_through_resets(preset: str) -> N
 
 
 def test_a_mask_begins_some_runs_and_leaves_the_others() -> None:
-    envs = gymnasium.make_vec(NAME, num_envs=3, duration=0.2)
+    envs = gymnasium.make_vec(NAME, num_envs=3, preset="plain", duration=0.2)
     envs.reset(seed=1)
     for _ in range(5):
         envs.step(np.zeros(3, dtype=np.int64))
@@ -153,7 +153,7 @@ def test_a_mask_begins_some_runs_and_leaves_the_others() -> None:
 
 
 def test_runs_may_have_options_of_their_own() -> None:
-    envs = gymnasium.make_vec(NAME, num_envs=2, duration=0.2)
+    envs = gymnasium.make_vec(NAME, num_envs=2, preset="plain", duration=0.2)
     _, infos = envs.reset(seed=1, options={"wind_speed": 12.0, "runs": [{"spring": 3}, {"spring": 8}]})
     assert infos["wind_speed"].tolist() == [12.0, 12.0]
     assert infos["spring_stiffness"].tolist() == [4.28, 44.84]

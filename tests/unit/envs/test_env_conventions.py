@@ -5,8 +5,6 @@ from __future__ import annotations
 import copy
 import subprocess
 import sys
-import tomllib
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -82,22 +80,36 @@ print(gymnasium.make_vec("tunnel_sim.envs:{NAME}", num_envs=2).num_envs)
     assert done.stdout.split() == [NAME, "2"]
 
 
-def test_the_declared_entry_point_is_the_one_that_registers() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = project.get("entry-points", {}).get("gymnasium.envs")
-    if declared is None:
-        pytest.skip("pyproject.toml declares no entry point of gymnasium.envs")
-    point = EntryPoint("tunnel_sim", declared["tunnel_sim"], "gymnasium.envs")
-    assert point.load() is register_environments
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.usefixtures("drawing")
-def test_gymnasiums_checker_passes_without_a_warning(preset: str, windows: list[Window]) -> None:
+def test_gymnasiums_checker_passes_without_a_warning(
+    preset: str, windows: list[Window], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
     env = make(preset=preset, duration=1.0, render_mode="rgb_array", width=64, height=48)
     check_env(env.unwrapped)
     assert [window.closed for window in windows] == [True]  # the human mode was tried, and closed
     env.close()
+
+
+@pytest.mark.usefixtures("drawing")
+def test_the_checker_passes_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    env = gymnasium.make(NAME, duration=1.0, render_mode="rgb_array", width=64, height=48).unwrapped
+    assert env.metadata["render_modes"] == ["rgb_array"]
+    check_env(env)
+    env.close()
+
+
+def test_the_default_has_something_to_control() -> None:
+    env = gymnasium.make(NAME, duration=1.0)
+    assert env.action_space.shape == (2,)
+    still, moved = (
+        episode(env, np.array(action, np.float32), seed=1)[1] for action in ([-1.0, 0.0], [1.0, 0.0])
+    )
+    assert sum(still) != sum(moved)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -169,7 +181,7 @@ def test_time_limit_cuts_and_the_record_so_far_remains() -> None:
     assert len(rewards) == 20
     assert "record" not in info
     assert env.unwrapped.record().time_s.size == 200
-    native = gymnasium.make_vec(NAME, num_envs=2, duration=1.0, max_episode_steps=20)
+    native = gymnasium.make_vec(NAME, num_envs=2, preset="plain", duration=1.0, max_episode_steps=20)
     native.reset(seed=1)
     for _ in range(20):
         *_, truncated, infos = native.step(np.zeros(2, dtype=np.int64))
@@ -183,7 +195,7 @@ def test_episode_statistics_sum_the_information() -> None:
     assert info["episode"]["r"] == pytest.approx(sum(rewards))
     assert info["episode"]["l"] == 30
     envs = gymnasium.wrappers.vector.RecordEpisodeStatistics(
-        gymnasium.make_vec(NAME, num_envs=2, duration=0.3)
+        gymnasium.make_vec(NAME, num_envs=2, preset="plain", duration=0.3)
     )
     envs.reset(seed=1)
     for _ in range(30):
@@ -214,7 +226,9 @@ def test_a_picture_shows_the_pose() -> None:
     assert pictures[0].dtype == np.uint8
     assert np.array_equal(pictures[0], pictures[2])
     assert np.abs(pictures[0].astype(int) - pictures[1]).mean() > 0.3
-    envs = gymnasium.make_vec(NAME, num_envs=2, render_mode="rgb_array", width=96, height=64, camera="above")
+    envs = gymnasium.make_vec(
+        NAME, num_envs=2, preset="plain", render_mode="rgb_array", width=96, height=64, camera="above"
+    )
     still = {"wind_speed": 0.0, "spring": 5}
     envs.reset(seed=1, options={"runs": [still | {"release_angle": angle} for angle in (0.0, 0.3)]})
     for drawn, expected in zip(envs.render(), pictures, strict=False):

@@ -64,7 +64,7 @@ def test_arguments(arguments: dict[str, Any], parts: list[str]) -> None:
     ],
 )
 def test_options(options: dict[str, Any], parts: list[str]) -> None:
-    for env in (make(), gymnasium.make_vec(NAME, num_envs=2)):
+    for env in (make(), gymnasium.make_vec(NAME, num_envs=2, preset="plain")):
         with pytest.raises(EnvError) as refusal:
             env.reset(seed=1, options=options)
         assert_one_line(refusal.value, parts)
@@ -103,7 +103,7 @@ def test_actions_of_the_operator(action: Any) -> None:
     ],
 )
 def test_resets_of_many(reset: dict[str, Any], parts: list[str]) -> None:
-    envs = gymnasium.make_vec(NAME, num_envs=3)
+    envs = gymnasium.make_vec(NAME, num_envs=3, preset="plain")
     with pytest.raises(EnvError, match="call reset"):
         envs.step(np.zeros(3, dtype=np.int64))
     with pytest.raises(EnvError) as refusal:
@@ -119,7 +119,7 @@ def test_unknown_camera_and_modes_of_many() -> None:
     with pytest.raises(EnvError, match="did you mean 'rgb_array'"):
         FreeDecayEnv(render_mode="rgb_aray")  # gymnasium.make itself warns of it
     with pytest.raises(EnvError, match="rgb_array"):
-        gymnasium.make_vec(NAME, num_envs=2, render_mode="human")
+        gymnasium.make_vec(NAME, num_envs=2, preset="plain", render_mode="human")
 
 
 def assert_one_line(error: BaseException, parts: list[str]) -> None:

@@ -75,6 +75,7 @@ export default {
         handle.style.width = `${to - from}px`;
         handle.hidden ||= to <= from;
         handle.firstChild.textContent = mark.about;
+        handle.firstChild.style.top = `${-at - 9}px`; // above the chart, where no trace is
       }
     },
     handle(id) {
