@@ -22,7 +22,7 @@ def test_trains_writes_both_files_and_says_what_came_of_it(tmp_path, capsys):
 def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, capsys):
     from identification.neural import train as module
 
-    step, taken = module.advance, []
+    step, taken = module.advance_training, []
 
     def interrupted(progress, problem):
         taken.append(1)
@@ -32,7 +32,7 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
 
     whole, out = tmp_path / "whole.safetensors", tmp_path / "w.safetensors"
     assert main(["train", str(whole), *QUICK]) == 0
-    monkeypatch.setattr(module, "advance", interrupted)
+    monkeypatch.setattr(module, "advance_training", interrupted)
     assert main(["train", str(out), *QUICK]) == 130
     assert not out.exists()
     assert "the same command continues" in capsys.readouterr().err
