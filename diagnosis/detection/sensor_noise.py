@@ -271,7 +271,7 @@ def typical_step(levels: Array) -> float:
     """The step of equal width whose rounding has the same power, rad.
 
     Args:
-        levels: as `reading_levels` gives them, two or more.
+        levels: as `reading_levels` gives them, two or more, shape (levels,), rad.
     """
     widths = np.diff(levels)
     return float(np.sqrt(np.sum(widths**3) / np.sum(widths)))

@@ -62,7 +62,18 @@ def by_run(
     damping: float = 0.0,
     products: Products | None = None,
 ) -> tuple[Array, Array, Array]:
-    """As `normal_equations`, before the sum over the runs: shapes (runs, common, common) and (runs, common)."""
+    """As `normal_equations`, before the sum over the runs.
+
+    Args:
+        jacobian: from `sensitivities`.
+        residuals: scaled.
+        damping: of the release's own step, as a share of its diagonal.
+        products: of the jacobian, where they are known.
+
+    Returns:
+        Matrices, shape (runs, common, common), gradients, shape (runs, common), and the solutions of
+        `normal_equations`.
+    """
     known = Products.of(jacobian) if products is None else products
     columns = list(zip(jacobian, residuals, strict=True))
     seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
