@@ -58,7 +58,7 @@ def test_diagnose_with_a_report(tunnel: Tunnel, folder: Path, tmp_path: Path) ->
     text = page.read_text(encoding="utf-8")
     assert r"$\foo$" in text
     assert "<svg>&amp;" not in text
-    figure = text.partition('aria-label="Excess of every run with')[2].partition("</svg>")[0]
+    figure = text.partition('aria-label="Misfit of every run with')[2].partition("</svg>")[0]
     assert 'id="how-far-' in figure
     assert '>id="x"&lt;svg&gt;&amp;amp;</text>' in figure
 
