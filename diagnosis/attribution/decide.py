@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.fitting.channels import Misfit
+from diagnosis.fitting.channels import ChannelMisfit
 from diagnosis.policy import (
     CHANCE_STDS,
     EVEN_SHARE,
@@ -76,7 +76,7 @@ class FittedSet:
     numbers: int = 0
 
 
-def weigh(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
+def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
     """Probabilities of the answers.
 
     Args:
@@ -124,7 +124,7 @@ def least_excess(excesses: Sequence[Array]) -> Array:
     return np.asarray(np.min([np.zeros(6), *excesses], axis=0), np.float64)
 
 
-def misfit_scale(nominal: Misfit, chance: float | Array = NEEDLESS_CHI2) -> Array:
+def misfit_scale(nominal: ChannelMisfit, chance: float | Array = NEEDLESS_CHI2) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
     Args:
@@ -158,7 +158,7 @@ def log_misfit(left: Array, scale: Array) -> float:
     return float(np.sum(np.log1p((above + LEAK * (above.sum() - above)) / scale)))
 
 
-def _log_odds(excess: Array, nominal: Misfit) -> float:
+def _log_odds(excess: Array, nominal: ChannelMisfit) -> float:
     """Logarithm of the odds of a set against an unknown cause."""
     scale = misfit_scale(nominal, CHANCE_STDS * np.sqrt(2.0 * nominal.count))
     gap, left = log_misfit(nominal.excess, scale), log_misfit(excess, scale)

@@ -18,7 +18,7 @@ from diagnosis.attribution.hypothesis import (
     turned_back,
     with_forms,
 )
-from diagnosis.fitting.channels import Misfit, misfit
+from diagnosis.fitting.channels import ChannelMisfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit
 from diagnosis.fitting.starting_points import StartingPoint, is_gross, starting_points
 from diagnosis.policy import (
@@ -102,7 +102,9 @@ def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
-def going_on(children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: Misfit) -> list[Hypothesis]:
+def going_on(
+    children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: ChannelMisfit
+) -> list[Hypothesis]:
     """The sets to grow further.
 
     Args:

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.attribution.decide import FittedSet, least_excess, log_weight, misfit_scale
-from diagnosis.fitting.channels import CHANNELS, Misfit, misfit
+from diagnosis.fitting.channels import CHANNELS, ChannelMisfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.spectra import linear_coefficients, resonance
@@ -107,7 +107,7 @@ class Scale:
     least: Array
 
     @classmethod
-    def of(cls, sets: Sequence[Hypothesis], gap: Misfit) -> Scale:
+    def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit) -> Scale:
         """The scale of some sets, from what the nominal model leaves."""
         return cls(misfit_scale(gap), least_excess([h.excess for h in sets]))
 
@@ -195,7 +195,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
 
 
 def with_forms(
-    found: Sequence[Hypothesis], gap: Misfit, least: float, count: int = FREED_HYPOTHESES
+    found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int = FREED_HYPOTHESES
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a good part open.
 
@@ -213,7 +213,7 @@ def with_forms(
     return sorted([*freed, *ranked[count:]], key=lambda h: h.fit.total)
 
 
-def _freed_if_it_pays(hypothesis: Hypothesis, gap: Misfit, least: float) -> Hypothesis:
+def _freed_if_it_pays(hypothesis: Hypothesis, gap: ChannelMisfit, least: float) -> Hypothesis:
     """The hypothesis with its forms free where it then has more weight; else as it is."""
     fitted = hypothesis.fit
     freed = _free_forms(fitted) if fitted.excess > least else None

@@ -19,7 +19,7 @@ from diagnosis.attribution.grow import grow, sets_with_one_more
 from diagnosis.attribution.hypothesis import Hypothesis, Scale, restricted
 from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import ProcessNoise, random_moments, with_response
-from diagnosis.fitting.channels import Misfit, misfit
+from diagnosis.fitting.channels import ChannelMisfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
 from diagnosis.fitting.normal_equations import by_run
 from diagnosis.fitting.problem import Point, Problem
@@ -95,7 +95,7 @@ def weigh_random_moments(
 
 
 def without_the_random_moment(
-    answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: Misfit
+    answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: ChannelMisfit
 ) -> list[Hypothesis]:
     """The sets beside random moments fitted with the sensor's noise alone: what they leave may be no random moment.
 

@@ -27,7 +27,7 @@ _LEAST = 4  # samples in a cycle
 
 
 @dataclass(frozen=True, eq=False)
-class Misfit:
+class ChannelMisfit:
     """What residuals hold by channel.
 
     Args:
@@ -46,7 +46,7 @@ class Misfit:
         return np.asarray(self.chi2 - self.count, np.float64)
 
 
-def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> Misfit:
+def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
     """What a fit leaves, by channel.
 
     Args:
@@ -59,7 +59,7 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> Misfit:
         for i, (run, own) in enumerate(zip(fit.problem.data.runs, left, strict=True))
     ]
     chi2, count, motion = (np.sum(values, axis=0) for values in zip(*parts, strict=True))
-    return Misfit(chi2, count, float(motion))
+    return ChannelMisfit(chi2, count, float(motion))
 
 
 def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Array, float]:

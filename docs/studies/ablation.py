@@ -33,7 +33,7 @@ from diagnosis import diagnose, policy
 from diagnosis import investigate as investigation
 from diagnosis.attribution import decide
 from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
-from diagnosis.fitting.channels import Misfit
+from diagnosis.fitting.channels import ChannelMisfit
 from diagnosis.policy import DECIDED_FROM
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
@@ -81,7 +81,7 @@ class Case:
     small: frozenset[str]
     read_off: Names = ()
     sets: tuple[FittedSet, ...] = ()
-    nominal: Misfit | None = None
+    nominal: ChannelMisfit | None = None
     causes: Names = ()
 
     def right(self, causes: Names) -> bool:
@@ -176,11 +176,11 @@ def changed(name: str, factor: float) -> Iterator[None]:
 
 
 @contextmanager
-def _weighings(seen: list[tuple[Sequence[FittedSet], Misfit]]) -> Iterator[None]:
+def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterator[None]:
     """Keep what is weighed meanwhile."""
     weigh = decide.weigh
 
-    def kept(sets: Sequence[FittedSet], nominal: Misfit) -> list[Weighed]:
+    def kept(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
         seen.append((sets, nominal))
         return weigh(sets, nominal)
 
@@ -202,7 +202,7 @@ def read_case(
         small: names of those that act and need not be found.
         only: names of the effects to try; None: all.
     """
-    seen: list[tuple[Sequence[FittedSet], Misfit]] = []
+    seen: list[tuple[Sequence[FittedSet], ChannelMisfit]] = []
     given = Case(tuple(sorted(truth)), frozenset(small))
     kinds = None if only is None else [effect_class(name) for name in only]
     try:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.attribution.decide import UNKNOWN, FittedSet, main_effect, misfit_scale, weigh
-from diagnosis.fitting.channels import CHANNELS, Misfit
+from diagnosis.fitting.channels import CHANNELS, ChannelMisfit
 from diagnosis.policy import LEAK, MODEL_ERROR, RIVAL_PROBABILITY, SET_PRICE, STEEPNESS
 
 NAMES = ("a", "b", "c", "d", "e")
@@ -20,7 +20,7 @@ GAP = st.tuples(*[st.floats(1.0, 1e7)] * len(CHANNELS)).map(np.array)
 
 def nominal(excess, motion=1e8):
     """What a nominal model leaves: χ² beyond noise by channel."""
-    return Misfit(COUNT + excess, COUNT, motion)
+    return ChannelMisfit(COUNT + excess, COUNT, motion)
 
 
 def fitted(left, gap, numbers=0):

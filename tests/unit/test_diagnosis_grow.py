@@ -11,7 +11,7 @@ from diagnosis.attribution import grow as growth
 from diagnosis.attribution.decide import weigh
 from diagnosis.attribution.grow import exchange, grow, prune, without
 from diagnosis.attribution.hypothesis import Hypothesis, with_forms
-from diagnosis.fitting.channels import Misfit, misfit
+from diagnosis.fitting.channels import ChannelMisfit, misfit
 from diagnosis.fitting.least_squares import Fit, fit
 from diagnosis.fitting.problem import Point
 from diagnosis.fitting.spectra import resonance
@@ -120,7 +120,7 @@ def left(*effects, damping):
     )
 
 
-GAP = Misfit(np.array([1e6, *[100.0] * 5]), np.full(6, 100.0), 1e7)
+GAP = ChannelMisfit(np.array([1e6, *[100.0] * 5]), np.full(6, 100.0), 1e7)
 
 
 def test_a_set_goes_on_from_its_own_parent_though_the_best_set_is_a_dead_end():

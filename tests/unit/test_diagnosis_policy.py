@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.attribution.decide import FittedSet, weigh
-from diagnosis.fitting.channels import Misfit
+from diagnosis.fitting.channels import ChannelMisfit
 
 COUNT = np.array([100.0, 100.0, 10.0, 10.0, 110.0, 10_000.0])
 MOTION = 4e7
@@ -45,5 +45,5 @@ def test_the_probabilities_are_those_of_the_decision():
     }
     expected[("unknown",)] = 0.97 / (1.0 + against) + 0.03 / 4
     sets = [FittedSet(key, 0.1, left, numbers) for key, (left, numbers) in SETS.items()]
-    found = weigh(sets, Misfit(COUNT + GAP, COUNT, MOTION))
+    found = weigh(sets, ChannelMisfit(COUNT + GAP, COUNT, MOTION))
     assert {answer.effects: answer.probability for answer in found} == pytest.approx(expected)
