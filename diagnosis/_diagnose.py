@@ -129,7 +129,10 @@ def _diagnose(
     if progress is not None:
         progress("what no effect explains")
     answer = _with_closable(answer, study)
-    modes = second_modes(campaign) if answer.causes == UNKNOWN else ()
+    # below one half a set of effects comes first, though each of them may be less probable than none
+    odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
+    likeliest = max(odds, key=odds.__getitem__, default="")
+    modes = second_modes(campaign) if likeliest in UNKNOWN else ()
     return replace(answer, verdict=" ".join((*modes, answer.verdict)))
 
 
