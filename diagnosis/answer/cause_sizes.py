@@ -71,13 +71,14 @@ def _size(study: Study, fit: Fit, kind: type[Effect]) -> CauseSize | None:
 
 def _decay(interval: float, curve: Array, frequency: float) -> Sequence[float] | None:
     """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are no decay."""
-    from scipy.optimize import curve_fit  # only here: slow to load
+    from scipy.optimize import least_squares  # only here: slow to load
 
     time = (np.arange(curve.size) + 0.5) * interval
 
-    def decay(t: Array, omega: float, delta: float, a: float, b: float, zero: float) -> Array:
-        swing: Array = np.exp(-delta * t) * (a * np.cos(omega * t) + b * np.sin(omega * t)) + zero
-        return swing
+    def left(point: Array) -> Array:
+        omega, delta, a, b, zero = point
+        swing: Array = np.exp(-delta * time) * (a * np.cos(omega * time) + b * np.sin(omega * time)) + zero
+        return swing - curve
 
     if curve.size < 10 or not np.all(np.isfinite(curve)):
         return None
@@ -85,8 +86,11 @@ def _decay(interval: float, curve: Array, frequency: float) -> Sequence[float] |
     omega = 2.0 * np.pi * frequency
     try:
         with np.errstate(over="raise", invalid="raise"):
-            (omega, delta, *_, zero), _ = curve_fit(decay, time, curve, (omega, 0.0, size, 0.0, 0.0))
-    except (RuntimeError, FloatingPointError):
+            found = least_squares(left, (omega, 0.0, size, 0.0, 0.0), method="lm")
+    except (ValueError, FloatingPointError):
         return None
+    if not found.success:
+        return None
+    omega, delta, *_, zero = found.x
     natural = float(np.hypot(omega, delta))
     return natural, float(delta) / natural, float(zero)
