@@ -139,6 +139,8 @@ WHITE_INNOVATIONS = 7.0
 BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
 #: Rate at which a random moment of all runs is taken for one of a single run. Convention.
 ONE_RUN_FALSE_ALARM_RATE = 1e-3
+#: Rate at which a random moment is taken for something that follows the phase of the motion. Convention.
+PHASE_FALSE_ALARM_RATE = 1e-3
 #: χ² that every instant or phase of a run's own may gain by chance. Judgement: it is the best of many tried.
 OWN_EVIDENCE = 10.0
 

@@ -13,19 +13,20 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import fdtrc
 
 from diagnosis.attribution.decide import FittedSet, log_weight
 from diagnosis.attribution.grow import grow, sets_with_one_more
 from diagnosis.attribution.hypothesis import Hypothesis, Scale, restricted
 from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import ProcessNoise, random_moments, with_response
-from diagnosis.fitting.channels import ChannelMisfit, misfit
+from diagnosis.fitting.channels import CHANNELS, ChannelMisfit, misfit
 from diagnosis.fitting.least_squares import Fit, FitError, fit, fit_at
 from diagnosis.fitting.normal_equations import by_run
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.starting_points import starting_points
-from diagnosis.policy import MOST_CAUSES, NEEDLESS_CHI2
+from diagnosis.policy import MOST_CAUSES, NEEDLESS_CHI2, PHASE_FALSE_ALARM_RATE
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
@@ -85,7 +86,7 @@ def weigh_random_moments(
     top = _settled(best, nominal, [kind for kind in kinds if kind.fitted], allowed)
     for seen in _until_steady(top, nominal.problem.data, [kind for kind in kinds if kind.fitted]):
         process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
-        if process is not None:
+        if process is not None and not follows_the_motion(seen.fit):
             kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
             names = tuple(dict.fromkeys((kind.name, *seen.effects)))
@@ -169,6 +170,31 @@ def wind_off_excess(fit: Fit) -> float:
         if not run.wind_on
     ]
     return float(np.mean(off)) if off else 0.0
+
+
+def follows_the_motion(fitted: Fit) -> bool:
+    """Whether residuals in the wind change the amplitude of the motion otherwise than its phase.
+
+    A random moment does not know the phase of the motion: what it adds along the motion and along the rate has the
+    same power. A missing damping adds to the first, and a missing stiffness to the second.
+
+    Args:
+        fitted: with residuals in the sensor's noise alone.
+
+    Returns:
+        By Fisher's test of the ratio of the two powers. Every run in the wind counts as one degree of freedom of
+        each, since a slow random motion may have no more.
+    """
+    runs = list(zip(fitted.problem.data.runs, fitted.residuals, strict=True))
+    windy = sum(run.wind_on for run, _ in runs)
+    seen = misfit(
+        fitted, [residual if run.wind_on else np.zeros_like(residual) for run, residual in runs]
+    ).chi2
+    along = {name: float(seen[CHANNELS.index(name)]) for name in CHANNELS}
+    motion = along["damping"] + along["damping of runs"]
+    rate = along["frequency"] + along["frequency of runs"]
+    larger = max(motion, rate) / max(min(motion, rate), 1e-300)
+    return 2.0 * float(fdtrc(windy, windy, larger)) < PHASE_FALSE_ALARM_RATE
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.attribution.random_moments import overdispersion
+from diagnosis.attribution.random_moments import follows_the_motion, overdispersion
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.problem import Problem
 from diagnosis.fitting.starting_points import starting_points
@@ -50,3 +50,28 @@ def test_the_scatter_between_runs_is_told_from_that_of_the_noise(fitted, share):
     found = [overdispersion(drawn(fitted, rng, share), KIND) for _ in range(200)]
     assert 0.5 < np.mean(found) / (1.0 + share**2) < 2.0
     assert min(found) >= 1.0
+
+
+@pytest.mark.parametrize(("along", "rate", "follows"), [(3.0, 3.0, False), (300.0, 1.0, True)])
+def test_a_random_moment_adds_as_much_along_the_motion_as_along_the_rate(fitted, along, rate, follows):
+    """Truth: slow random changes of the amplitude and of the phase, in noise standard deviations of a sample.
+
+    The false-alarm rate is one in a thousand: none of 40 campaigns may be refused, and most must be that follow the
+    motion three hundred times as much as its rate.
+    """
+    rng = np.random.default_rng(12)
+    data = fitted.problem.data
+    found = []
+    for _ in range(40):
+        residuals = []
+        for run, left in zip(data.runs, fitted.residuals, strict=True):
+            motion = run.scaled(run.reading) - left
+            slope = np.gradient(motion)
+            slow = 1.0 + np.arange(left.size) / left.size
+            parts = [
+                size * rng.normal() * slow * part / np.std(part)
+                for size, part in ((along, motion), (rate, slope))
+            ]
+            residuals.append(rng.normal(size=left.size) + parts[0] + parts[1])
+        found.append(follows_the_motion(replace(fitted, residuals=residuals)))
+    assert np.mean(found) <= 0.05 if not follows else np.mean(found) >= 0.5
