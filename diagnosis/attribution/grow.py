@@ -13,6 +13,7 @@ from diagnosis.attribution.hypothesis import (
     Hypothesis,
     Scale,
     is_plausible,
+    of_more_weight,
     own_gain,
     restricted,
     turned_back,
@@ -234,8 +235,7 @@ def sets_with_one_more(
             if best is None:
                 continue
             child = Hypothesis((*parent.effects, kind.name), best)
-            both = [child] if child.names not in found else [found[child.names], child]
-            found[child.names] = max(both, key=Scale.of(both, misfit(parent.fit)).weight)
+            found[child.names] = of_more_weight(found.get(child.names), child, misfit(parent.fit))
     return list(found.values())
 
 

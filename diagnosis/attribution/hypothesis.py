@@ -121,6 +121,16 @@ class Scale:
         return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
 
 
+def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
+    """That of more weight, the first if they are equal.
+
+    Args:
+        one: None for none.
+        gap: what the nominal model leaves.
+    """
+    return other if one is None else max(one, other, key=Scale.of((one, other), gap).weight)
+
+
 def own_gain(problem: Problem, point: Point) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
     return float(OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
@@ -223,7 +233,7 @@ def _freed_if_it_pays(hypothesis: Hypothesis, gap: ChannelMisfit, least: float) 
     if needed and needed != freed.problem.free_forms:
         freed = _free_forms(fitted, only=needed) or freed
     found = Hypothesis(hypothesis.effects, freed, fitted)
-    return max(hypothesis, found, key=Scale.of((hypothesis, found), gap).weight)
+    return of_more_weight(hypothesis, found, gap)
 
 
 def _forms_that_matter(freed: Fit, least: float) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from scipy.special import fdtrc
 
 from diagnosis.attribution.decide import FittedSet, log_weight
 from diagnosis.attribution.grow import grow, sets_with_one_more
-from diagnosis.attribution.hypothesis import Hypothesis, Scale, restricted
+from diagnosis.attribution.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.attribution.innovation_tests import is_steady_noise
 from diagnosis.attribution.process_noise import ProcessNoise, random_moments, with_response
 from diagnosis.fitting.channels import CHANNELS, ChannelMisfit, misfit
@@ -112,8 +112,7 @@ def without_the_random_moment(
         if answer.beside is not None:
             with suppress(FitError, np.linalg.LinAlgError):
                 alone = replace(answer.beside, fit=fit(answer.beside.fit.problem, answer.beside.fit.point))
-                both = [alone] if alone.names not in found else [found[alone.names], alone]
-                found[alone.names] = max(both, key=Scale.of(both, gap).weight)
+                found[alone.names] = of_more_weight(found.get(alone.names), alone, gap)
     return list(found.values())
 
 

@@ -46,6 +46,20 @@ def output_of(command: str, folder: Path) -> list[str]:
     return done.stdout.splitlines()
 
 
+def script_output(script: str, folder: Path) -> str:
+    """What Python prints for a script in which no warning is allowed."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def comparable(lines: list[str]) -> list[str]:
     """Lines without trailing blanks and without the line that depends on the machine's OpenGL."""
     kept = [line.rstrip() for line in lines if "icture of the rig" not in line]
@@ -92,16 +106,7 @@ def test_the_script_for_a_newcomer_runs_and_prints_what_is_shown(tmp_path: Path)
     output_of(simulate, tmp_path)
     (script,), (shown,) = blocks("python"), blocks("text")
     assert len(script.splitlines()) <= 10
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert_same(shown.splitlines(), done.stdout.splitlines())
+    assert_same(shown.splitlines(), script_output(script, tmp_path).splitlines())
     assert (tmp_path / "fit.png").stat().st_size > 10_000
     assert "</html>" in (tmp_path / "report.html").read_text(encoding="utf-8")
 

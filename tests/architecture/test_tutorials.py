@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from test_readme import assert_same
+from test_readme import assert_same, script_output
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "tutorials"
@@ -30,16 +27,7 @@ def steps(page: Path) -> list[tuple[str, str]]:
 
 def printed(codes: list[str], folder: Path) -> list[str]:
     script = "".join(f"{code}\nprint({END!r})\n" for code in codes)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split(END + "\n")[:-1]
+    return script_output(script, folder).split(END + "\n")[:-1]
 
 
 @pytest.mark.slow

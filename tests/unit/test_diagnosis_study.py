@@ -14,7 +14,8 @@ from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
 from diagnosis.attribution.hypothesis import Hypothesis
 from diagnosis.attribution.random_moments import RandomAnswer
 from diagnosis.detection.mains import Hum
-from diagnosis.investigate import _noise_explains, _polished
+from diagnosis.investigate import _noise_explains, _polished, _weighed
+from diagnosis.policy import HUM_LEFT
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -129,3 +130,17 @@ def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
     left = _left(excess, block, test=SimpleNamespace(noisy=noisy))
     assert _noise_explains(left, OPEN) is explains
     assert not _noise_explains(left, [*OPEN, Weighed(("dropped_samples",), 0.02, 0.9)])
+
+
+@pytest.mark.parametrize(("share", "alone"), [(0.5, True), (20.0, False)])
+def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_itself(
+    study: Study, share: float, alone: bool
+) -> None:
+    """Truth: white residuals that hold a multiple of the share of a hum's power that no pure line removes."""
+    hum = Hum(50.0, 1e-3, 1e-5, None, 20.0)
+    rng = np.random.default_rng(4)
+    excess = share * HUM_LEFT * hum.excess
+    residuals = [np.sqrt(1.0 + excess) * rng.normal(size=r.size) for r in study.nominal.residuals]
+    base = replace(study.nominal, residuals=residuals)
+    found = _weighed(replace(study, hum=hum, hypotheses=()), base)
+    assert found[0].effects == (() if alone else UNKNOWN)

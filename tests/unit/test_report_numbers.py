@@ -15,8 +15,8 @@ import pytest
 
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
+from tunnel_lab.report import advice, render_report, view
 from tunnel_lab.report import page as report_page
-from tunnel_lab.report import render_report, view
 
 Document = dict[str, Any]
 NOT_READ = ("svg", "style", "script", "caption", "figcaption", "footer")
@@ -134,9 +134,9 @@ def test_without_wind_no_wind_is_mentioned(given: Document) -> None:
         run["wind_speed"] = 0.0
     undecided = {"decided": False, "common": {"effects": {}, "channels": {}}}
     for one, said in ((given, True), (still, False)):
-        texts = [view.causes_found(one)[0]["acts"], *view.next_steps(one | undecided)]
+        texts = [view.causes_found(one)[0]["acts"], *advice.next_steps(one | undecided)]
         texts += [label for label, _ in view.place_rows(one)]
-        assert ("wind" in " ".join(texts).replace(view.run_words(given["next_run"]), "")) == said
+        assert ("wind" in " ".join(texts).replace(advice.run_words(given["next_run"]), "")) == said
         assert ("Condition" in texts) == said
 
 
@@ -258,7 +258,7 @@ def test_the_next_run(given: Document, page: Sections) -> None:
     for key, value in given["next_run"].items():
         text = page.row("which", key.replace("_", " ").capitalize())
         assert_shows(text, [value])
-    assert view.next_run_rows(given | {"next_run": None}) == []
+    assert advice.next_run_rows(given | {"next_run": None}) == []
 
 
 def test_noise_and_confirmation(given: Document, page: Sections) -> None:
@@ -309,7 +309,7 @@ def test_the_uncertainty_budget(given: Document) -> None:
     ],
 )  # fmt: skip
 def test_what_to_do_next(given: Document, changes: Document, words: list[str]) -> None:
-    steps = view.next_steps(given | changes)
+    steps = advice.next_steps(given | changes)
     run = given["next_run"] is not None and "ambiguous_with" not in changes and changes
     steps = [step for step in steps if not (run and "distinguishes" in step)]
     assert len(steps) == len(words)

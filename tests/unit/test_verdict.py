@@ -14,7 +14,7 @@ from diagnosis.decision import decision
 from diagnosis.misfit import Misfit
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
-from tunnel_lab.report import view
+from tunnel_lab.report import advice, view
 from tunnel_lab.report.page import render_report
 
 
@@ -189,5 +189,5 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     labels = [fact.label for fact in view.facts(given)]
     assert "With the most probable answer added" in labels
     assert "Probability of the most probable answer" in labels
-    assert any("Do not repair" in step for step in view.next_steps(given))
+    assert any("Do not repair" in step for step in advice.next_steps(given))
     assert parameters_table(given).title.startswith("Parameters of the most probable answer")

@@ -302,7 +302,7 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
     from diagnosis.printing import rival_lines
-    from tunnel_lab.report.view import next_steps
+    from tunnel_lab.report.advice import next_steps
 
     document = read_result(session.diagnosis)
     assert document is not None  # else the stage is closed

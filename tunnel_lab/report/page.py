@@ -16,7 +16,7 @@ from diagnosis.names import plain
 from diagnosis.patch import patch_lines, patch_table
 from diagnosis.printing import inclusion_line
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
-from tunnel_lab.report import view
+from tunnel_lab.report import advice, view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures
 from tunnel_lab.report.fit import fit_charts, fit_figure
@@ -126,7 +126,7 @@ def render_report(
         "facts": view.facts(document),
         "found": view.causes_found(document),
         "coefficients": view.coefficient_rows(document),
-        "next_steps": view.next_steps(document),
+        "next_steps": advice.next_steps(document),
     } | _detail(document, campaign)
     drawn = diagnosis_figures(document)
     return _rendered("page.html.j2", context | _parts(drawn, fit_charts(document) | charts(document)))
@@ -218,7 +218,7 @@ def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:
         "patch": patch_table(document),
         "patch_lines": [line.removeprefix("- ") for line in patch_lines(document)],
         "rivals": [plain(name) for name in document["ambiguous_with"]],
-        "next_run": view.next_run_rows(document),
+        "next_run": advice.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
         "budget": budget(document),
         "tests": test_rows(document),

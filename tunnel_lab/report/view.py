@@ -11,7 +11,7 @@ from typing import Any
 from diagnosis.misfit import misfit_of, of_swing, rms_shown, unit_shown
 from diagnosis.names import plain
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import held_out_excess, misfit_text, run_words
+from diagnosis.printing import held_out_excess, misfit_text
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -347,67 +347,6 @@ def _interval95(values: Document) -> str:
     return " to ".join(map(minus, texts))
 
 
-def next_steps(document: Document) -> list[str]:
-    """What to do next, in the order in which to do it."""
-    causes, rest = document["causes"], document.get("rest") or {}
-    steps = [
-        f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
-        for remark in document.get("remarks", ())
-        if remark["outcome"] != "noted"
-    ]
-    if document["next_run"] is not None and document["ambiguous_with"]:
-        steps.append(
-            f"Make the run that distinguishes the answers: {run_words(document['next_run'])}. "
-            "Add it to the campaign and diagnose again."
-        )
-    if not causes:
-        return [*steps, "Use the coefficients of the nominal model, within their intervals."]
-    if not document.get("decided", True):
-        steps.append(
-            f"Add runs with other springs{', wind speeds' if windy(document) else ''} and release angles, and "
-            "diagnose again: no answer has a probability of one half."
-        )
-        steps.append(
-            "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause."
-        )
-    elif causes == ["unknown"]:
-        steps.append("Read where the model departs from the runs, and examine the rig there.")
-        steps.append("State the effect that you suspect in a file, and diagnose again with --effects-file.")
-    else:
-        known = {kind.name: kind.advice for kind in known_effects()}
-        steps += [
-            f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in causes
-        ]
-        steps.append("Measure again, and compare the two diagnoses (tunnel compare).")
-        steps.append("Until then use the coefficients with the causes, not those of the nominal model.")
-    if rest.get("material"):
-        steps.append(
-            "Do not trust the coefficients beyond their intervals: what remains of the gap moves them."
-        )
-    return steps
-
-
-def next_run_rows(document: Document) -> list[tuple[str, str]]:
-    """The run expected to distinguish the rivals.
-
-    Returns:
-        Labels and values; empty where none is proposed.
-    """
-    run = document["next_run"] or {}
-    units = {
-        "spring_stiffness": "N m/rad",
-        "wind_speed": "m/s",
-        "release_angle": "rad",
-        "duration": "s",
-        "separation": "standard deviations of the noise, expected",
-    }
-    return [
-        (plain(name).capitalize(), f"{significant(value, 3)} {units.get(name, '')}".strip())
-        for name, value in run.items()
-        if isinstance(value, int | float)
-    ]
-
-
 def place_rows(document: Document) -> list[tuple[str, str]]:
     """Where the gap is, field by field."""
     where = document["where"]
@@ -451,13 +390,16 @@ def step_rows(document: Document) -> list[dict[str, str]]:
     return [
         {
             "name": plain(step["effect"] or "nominal model"),
-            "left": minus_inside(misfit_text(document, step["excess"])),
-            "without": minus_inside(misfit_text(document, without[step["effect"]]))
-            if step["effect"] in without
-            else "",
+            "left": _gap(document, step["excess"]),
+            "without": _gap(document, without.get(step["effect"])),
         }
         for step in (steps if len(steps) > 1 else ())
     ]
+
+
+def _gap(document: Document, value: float | None) -> str:
+    """A gap in words; empty for none."""
+    return "" if value is None else minus_inside(misfit_text(document, value))
 
 
 def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
@@ -469,7 +411,7 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
     gap = {run["id"]: run for run in document["gap"]["runs"]}
     rows = []
     for run in campaign.runs:
-        excesses = gap.get(run.id)
+        excesses = gap.get(run.id, {})
         rows.append(
             {
                 "id": run.id,
@@ -477,10 +419,8 @@ def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
                 "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
                 "duration": f"{run.record.duration:.3g}",
                 "rate": f"{run.record.sample_rate:.4g}",
-                "before": "–"
-                if excesses is None
-                else minus_inside(misfit_text(document, excesses["before"])),
-                "after": "–" if excesses is None else minus_inside(misfit_text(document, excesses["after"])),
+                "before": _gap(document, excesses.get("before")) or "–",
+                "after": _gap(document, excesses.get("after")) or "–",
                 "named": "yes" if run.id in document["where"]["runs"] else "",
             }
         )
