@@ -84,7 +84,7 @@ def _numbers(campaign: Campaign, run: Run) -> dict[str, float | None]:
 
 
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
-    given = {} if run.drive is None else {run.drive.column: run.drive.values}
+    given: dict[str, Any] = {} if run.drive is None else {run.drive.column: run.drive.values}
     return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad, **given}
 
 

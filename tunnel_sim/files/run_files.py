@@ -109,7 +109,7 @@ def table_bytes(
     Raises:
         TunnelError: when the table cannot be encoded.
     """
-    given = {} if drive is None else {drive.column: drive.values}
+    given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
     table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
     # CSV values have the fewest digits that read back as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
-from tunnel_sim.files.importing.inputs import heading, is_input
+from tunnel_sim.files.importing.inputs import is_input, is_stated
 from tunnel_sim.files.importing.tables import UNITS, Channel, Table, kind_of, known_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
@@ -180,7 +180,7 @@ def _readings(
         chosen = [c for name in choices.angle for c in _chosen(block, name, "--angle", where)]
         return [channel for channel in chosen if channel is not time]
     others = [
-        c for c in _unconditional(block) if c is not time and not is_input(c) and not _given(c, choices)
+        c for c in _unconditional(block) if c is not time and not is_input(c) and not is_stated(c, choices)
     ]
     moving = [channel for channel in others if _span(channel) > 0.0]
     levels = [
@@ -214,11 +214,6 @@ def _readings(
         )
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
-
-
-def _given(channel: Channel, choices: ImportChoices) -> bool:
-    """Whether a column is stated to be the input."""
-    return choices.input is not None and choices.input.lower() in (channel.name.lower(), heading(channel))
 
 
 def _unconditional(block: Sequence[Channel]) -> list[Channel]:
