@@ -98,6 +98,12 @@ def refuse_driven(campaign: Campaign, name: str) -> None:
                 remedy=f"use {' or '.join(DRIVEN_ESTIMATORS)}, or leave the driven runs out",
             )
         checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
+        if campaign.sensor.derivative:
+            raise TunnelError(
+                f"driven runs of {campaign.sensor.quantity}s are not identified yet",
+                where=where,
+                remedy="record the angle",
+            )
         if run.spring_stiffness == 0.0:
             raise TunnelError(
                 "a body without a spring is not identified yet",

@@ -21,7 +21,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.estimate import Estimate, Quantity, RunEstimate, Status, by_severity
+from identification.estimate import Estimate, RunEstimate, Status, by_severity
 from identification.signal.decay_fit import Reading, RunFit
 from identification.signal.driven import driven_rows, driven_start
 from identification.signal.free_decay import Decay, response_rows, sensitivity_weights
@@ -105,7 +105,9 @@ def _driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
         return FittedRun(reading, None, None, RunEstimate(run.id, (Status.NOT_CONVERGED,)))
     size = link.shape[1]
     order = [0, 1, *range(size, size + _OWN), *range(2, size)]
-    information = eliminate(found.normal[np.ix_(order, order)], np.zeros(len(order)), 2 + _OWN)[0]
+    information = found.normal[np.ix_(order, order)]
+    if not tied:  # the gain of the run's own
+        information = eliminate(information, np.zeros(len(order)), 2 + _OWN)[0]
     decay = Decay(*found.parameters[:2].tolist())
     zero, angle, rate = found.own[0].tolist()
     fit = RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
