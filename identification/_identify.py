@@ -108,5 +108,5 @@ def refuse_driven(campaign: Campaign, name: str) -> None:
             raise TunnelError(
                 "a body without a spring is not identified yet",
                 where=where,
-                remedy="leave spring_stiffness out: rate, stiffness and gain are then found per unit inertia",
+                remedy="leave the run out",
             )

@@ -34,7 +34,7 @@ from identification.signal.run_fit import (
     noise_and_failure,
     residuals_of,
 )
-from identification.statistics import determined, eliminate, fisher_covariance, scaled_solve
+from identification.statistics import determined, eliminate, fisher_covariance, inverse, scaled_solve
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
@@ -88,7 +88,12 @@ def driven_estimate(campaign: Campaign, name: str) -> Estimate:
     ]
     statuses |= noise_statuses([item.noise for item in fitted])
     if not pairs:
-        return replace(estimate, statuses=by_severity(statuses))
+        gains = [
+            _own_gain_remark(run, item)
+            for run, item in zip(campaign.runs, fitted, strict=True)
+            if run.drive is not None and run.drive.on_body and item.fit is not None
+        ]
+        return replace(estimate, statuses=by_severity(statuses), remarks=tuple(gains))
     return _joint(campaign, estimate, pairs, statuses)
 
 
@@ -188,6 +193,22 @@ def _driven_gain(run: Run) -> float:
     assert run.drive is not None
     start = driven_start(run.record.time_s, run.record.yaw_rad, run.drive.values)
     return 0.0 if start is None else start[2]
+
+
+def _own_gain_remark(run: Run, item: FittedRun) -> Remark:
+    """The gain of one run's input per unit inertia, at the run's own fit."""
+    assert item.fit is not None
+    assert item.noise is not None
+    start = np.array([item.fit.decay.rate, item.fit.decay.stiffness, _driven_gain(run)])
+    found = _fit([run], [np.eye(3)], start, own_zeros=True)
+    information = eliminate(found.normal, np.zeros(len(found.normal)), 3)[0]
+    std = float(np.sqrt(inverse(information)[2, 2] * item.noise.slow_ratio)) * item.noise.std
+    return Remark(
+        Outcome.NOTED,
+        (run.id,),
+        f"the gain of the input is {found.parameters[2]:.5g} ± {std:.2g} rad/s² per unit",
+        "state spring_stiffness for a gain in N m per unit",
+    )
 
 
 def _gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inertia: float | None) -> Remark:

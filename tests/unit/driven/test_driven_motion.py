@@ -190,7 +190,11 @@ def test_its_standard_deviations_are_those_of_the_scatter() -> None:
 def test_a_run_without_a_spring_stated_gives_frequency_and_damping() -> None:
     free = campaign(("drive",))
     bare = replace(free, runs=(replace(free.runs[0], spring_stiffness=None),))
-    found = identify(bare).runs[0]
+    estimate = identify(bare)
+    said = next(str(remark) for remark in estimate.remarks if "gain of the input" in str(remark))
+    gain, std = (float(word) for word in said.split("is ")[1].split(" rad")[0].split(" ± "))
+    assert abs(gain - 2.5 / INERTIA) < 4.5 * std
+    found = estimate.runs[0]
     assert found.omega_n is not None
     assert abs(found.omega_n.value - np.sqrt(K)) < 4.5 * found.omega_n.std
 
