@@ -60,6 +60,13 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
+    driven = next((run.id for run in campaign.runs if run.drive is not None), None)
+    if driven is not None:
+        raise TunnelError(
+            "the run is driven, and driven runs are not diagnosed yet",
+            where=f"{campaign.name}, run '{driven}'",
+            remedy="identify it with output_error, or leave the driven runs out",
+        )
     kinds = known_effects() if kinds is None else kinds
     campaign = campaign if model is None else with_law(campaign, model.law)
     with answering_with(kinds):

@@ -13,6 +13,7 @@ from identification.statistics import widened_by_contradictions
 from identification.status import Examined
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.drive import checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -42,6 +43,7 @@ def identify(
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
+    refuse_driven(campaign, chosen.name)
     examined = examine(campaign).accepted()
     left = examined.campaign
     found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
@@ -68,5 +70,43 @@ def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> 
         estimate,
         runs=tuple(found.get(run.id) or left_out[run.id] for run in campaign.runs),
         statuses=by_severity({*estimate.statuses, *(run.status for run in left_out.values())}),
-        remarks=examined.remarks,
+        remarks=(*examined.remarks, *estimate.remarks),
     )
+
+
+DRIVEN_ESTIMATORS = ("output_error",)
+"""Names of the estimators that take the input of driven runs."""
+
+
+def refuse_driven(campaign: Campaign, name: str) -> None:
+    """Refuse driven runs that an estimator would take for free decays, and bodies without a spring.
+
+    Args:
+        name: of the estimator.
+
+    Raises:
+        TunnelError: naming the first such run.
+    """
+    for run in campaign.runs:
+        if run.drive is None:
+            continue
+        where = f"{campaign.name}, run '{run.id}'"
+        if name not in DRIVEN_ESTIMATORS:
+            raise TunnelError(
+                f"the run is driven, and {name} takes free decays only",
+                where=where,
+                remedy=f"use {' or '.join(DRIVEN_ESTIMATORS)}, or leave the driven runs out",
+            )
+        checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
+        if campaign.sensor.derivative:
+            raise TunnelError(
+                f"driven runs of {campaign.sensor.quantity}s are not identified yet",
+                where=where,
+                remedy="record the angle",
+            )
+        if run.spring_stiffness == 0.0:
+            raise TunnelError(
+                "a body without a spring is not identified yet",
+                where=where,
+                remedy="leave the run out",
+            )

@@ -26,6 +26,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
+from identification.campaign.driven import driven_estimate
 from identification.estimate import Estimate, Quantity, Status, by_severity
 from identification.signal.decay_fit import DecayFit, RunFit, fit_decays
 from identification.signal.noise import noise_level
@@ -72,6 +73,8 @@ class OutputError:
         """
         for run in campaign.runs:
             loads(run, campaign.rig)  # refuses a wind-on run without density before any work is done
+        if any(run.drive is not None for run in campaign.runs):
+            return driven_estimate(campaign, self.name)
         fitted = [
             identify_run(run, campaign.sensor, cycles_per_window=self.cycles_per_window)
             for run in campaign.runs

@@ -166,6 +166,21 @@ def examine(campaign: Campaign) -> Examined:
         return Examined(campaign, repeats)
     noted = (*noted_quantity(kept), *wide_swings(kept))
     kept, clocks = with_clocks(kept)
+    driven = tuple(run for run in kept.runs if run.drive is not None)
+    if driven:  # they neither begin with a release nor end at rest, and what sustains them is known
+        free = replace(kept, runs=tuple(run for run in kept.runs if run.drive is None))
+        if not free.runs:
+            return Examined(kept, (*repeats, *noted, *clocks))
+        examined = _free_runs(free)
+        found = {run.id: run for run in (*examined.campaign.runs, *driven)}
+        runs = tuple(found[run.id] for run in kept.runs if run.id in found)
+        kept = replace(examined.campaign, runs=runs)
+        return Examined(kept, (*repeats, *noted, *clocks, *examined.remarks))
+    examined = _free_runs(kept)
+    return Examined(examined.campaign, (*repeats, *noted, *clocks, *examined.remarks))
+
+
+def _free_runs(kept: Campaign) -> Examined:
     kept, releases = from_releases(kept)
     kept, rests = without_rest(kept)
     kept, excited = self_excited_runs(kept)
@@ -173,7 +188,7 @@ def examine(campaign: Campaign) -> Examined:
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
     faults = growing_runs(swings) or exchanged_labels(swings)
     faults = faults or (*springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
-    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *excited, *zeros, *faults))
+    return Examined(kept, (*releases, *rests, *excited, *zeros, *faults))
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

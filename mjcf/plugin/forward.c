@@ -4,6 +4,8 @@
 
 #include "step.h"
 
+static const double kReached = 1e-6;  // of an interval or a step: a shorter part of one is rounding
+
 static double wind_at(const vwt_run* run, double time) {
   return fmax(0, vwt_series(run->wind, (int)run->wind_count, run->wind_interval, time));
 }
@@ -37,6 +39,14 @@ static double lagged_at(const Step* s, double duration, const Motion* y) {
                           body_rate(s->run, y));
 }
 
+// The drive's moment at a time within the step, N m, where it acts on the rod's upper end (1) or on the body (0).
+static double drive_at(const Step* s, double time, int on_end) {
+  if (s->run->moment_count == 0 || (s->run->moment_on_end != 0) != on_end) {
+    return 0;
+  }
+  return s->moment + s->moment_slope * (time - s->moment_from);
+}
+
 static double air_at(const Step* s, double duration, const Motion* y) {
   const double time = s->start + duration;
   const vwt_air_state air = {
@@ -49,7 +59,7 @@ static double air_at(const Step* s, double duration, const Motion* y) {
                                                         s->run->forcing_interval, time)
                                            : 0,
   };
-  return vwt_air_moment(s->p, &air);
+  return vwt_air_moment(s->p, &air) + drive_at(s, time, 0);
 }
 
 // The moment stated as an expression.
@@ -65,8 +75,8 @@ static double stated_moment(const Step* s, double time, const Motion* y) {
 // Moments on the rod's upper end except friction; with a rigid rod they include the aerodynamic moment.
 static double other_moment(const Step* s, double air, double time, const Motion* y) {
   const vwt_parameters* p = s->p;
-  const double mechanism = vwt_mechanism_moment(p, y->angle, y->rate) + stated_moment(s, time, y) -
-                           p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
+  const double mechanism = vwt_mechanism_moment(p, y->angle, y->rate) + stated_moment(s, time, y) +
+                           drive_at(s, time, 1) - p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
   if (s->run->twist_stiffness > 0) {
     return mechanism + s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
   }
@@ -211,8 +221,48 @@ Step vwt_release(const vwt_parameters* p, const vwt_run* run, LagWeights* weight
                   .from = {run->angle, run->rate, run->twist, run->twist_rate},
                   .lagged = run->lagged,
                   .slip = run->rate > 0 ? 1 : run->rate < 0 ? -1 : 0,
+                  .sample = -1,
                   .weights = weights};
   return s;
+}
+
+// The drive from the step's start on. Returns the time of its next sample, s, or infinity after the last.
+static double set_drive(Step* s) {
+  const vwt_run* run = s->run;
+  const int last = (int)run->moment_count - 1;
+  const double delay = run->moment_delay, *time = run->moment_time;
+  // a sample that rounding puts just after the step's start counts as reached
+  while (s->sample < last &&
+         time[s->sample + 1] + delay <= s->start + kReached * (last > 0 ? time[1] - time[0] : 0)) {
+    s->sample++;
+  }
+  const int at = s->sample < 0 ? 0 : s->sample;
+  s->moment = run->moment_scale * run->moment[at];
+  s->moment_slope = 0;
+  s->moment_from = time[at] + delay;
+  if (s->sample >= 0 && s->sample < last && run->moment_held == 0) {
+    s->moment_slope = run->moment_scale * (run->moment[at + 1] - run->moment[at]) / (time[at + 1] - time[at]);
+  }
+  return s->sample < last ? time[s->sample + 1] + delay : INFINITY;
+}
+
+// A step that ends early at each sample of the drive, where the drive has a kink.
+static void step_with_drive(Step* s, double h, int coulomb) {
+  const double end = s->start + h, least = kReached * h;
+  for (;;) {
+    const double next = set_drive(s), left = end - s->start;
+    const double part = next < end - least ? next - s->start : left;
+    if (coulomb) {
+      vwt_step_with_friction(s, part);
+    } else {
+      const Motion y = runge_kutta(s, part);
+      move(s, part, &y);
+    }
+    if (part == left) {
+      return;
+    }
+    s->start = next;
+  }
 }
 
 static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle, double* rate) {
@@ -231,7 +281,9 @@ static int integrate(const vwt_parameters* p, const vwt_run* run, double* angle,
     angle[i] = before.angle;
     rate[i] = before.rate;
     for (int k = 0; k < steps; k++) {
-      if (coulomb) {
+      if (run->moment_count > 0) {
+        step_with_drive(&s, h, coulomb);
+      } else if (coulomb) {
         vwt_step_with_friction(&s, h);
       } else {
         const Motion y = runge_kutta(&s, h);

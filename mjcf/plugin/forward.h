@@ -23,6 +23,13 @@
   POINTER(forcing)         /* 1, forcing_count samples at forcing_interval s */     \
   NUMBER(forcing_count)    /* 0: none */                                            \
   NUMBER(forcing_interval)                                                          \
+  POINTER(moment)          /* of the drive: moment_count samples, any unit */       \
+  POINTER(moment_time)     /* s, of these samples, increasing */                    \
+  NUMBER(moment_count)     /* 0: none */                                            \
+  NUMBER(moment_scale)     /* N m per unit */                                       \
+  NUMBER(moment_delay)     /* s, by which the drive acts later than its samples */  \
+  NUMBER(moment_held)      /* 1: constant from one sample to the next; 0: linear */ \
+  NUMBER(moment_on_end)    /* 1: acts on the rod's upper end; 0: on the body */     \
   POINTER(program)         /* of the moment by expression, program_count elements */ \
   NUMBER(program_count)    /* 0: none */                                            \
   NUMBER(angle)            /* rad, of the rod's upper end at time 0 */              \

@@ -26,6 +26,8 @@ typedef struct {
   double range;        // of Dahl's friction, rad; 0: none
   double deflection;   // Dahl's state at the start, rad
   LagWeights* weights;
+  int sample;          // of the drive, at the step's start; -1 before the first
+  double moment, moment_slope, moment_from;  // of the drive, N m and N m/s, linear in time from there on
 } Step;
 
 // The run at its start.
@@ -38,7 +40,7 @@ void vwt_step_with_friction(Step* s, double h);
 void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at, int samples, double* angle,
               double* rate);
 
-// Runs that `vwt_forward` may integrate side by side: constant wind, rigid rod, no imposed moment, no presliding.
+// Runs that `vwt_forward` may integrate side by side: constant wind, rigid rod, no imposed moment or drive, no presliding.
 enum { VWT_LANES = 4 };
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run);
 int vwt_alike(const vwt_run* one, const vwt_run* other);

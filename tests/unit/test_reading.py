@@ -178,14 +178,14 @@ def test_rows_and_columns_are_limited(tmp_path: Path) -> None:
             read_table(tmp_path / name, "here")
     with pytest.raises(TunnelError, match="11 samples, more than 10;"):
         read_table(tmp_path / "long.csv", "here", most=10)
-    assert read_table(tmp_path / "long.csv", "here", most=11)[1].size == 11
+    assert read_table(tmp_path / "long.csv", "here", most=11).reading.size == 11
 
 
 def test_only_the_columns_of_the_format_are_decoded(tmp_path: Path) -> None:
     lists = pl.Series([[1.0]] * 3)
     pl.DataFrame({"yaw_rad": [0.1, 0.2, 0.3], "lists": lists}).write_parquet(tmp_path / "r.parquet")
-    time_s, reading, column = read_table(tmp_path / "r.parquet", "here")
-    assert (time_s, reading.tolist(), column) == (None, [0.1, 0.2, 0.3], "yaw_rad")
+    held = read_table(tmp_path / "r.parquet", "here")
+    assert (held.time_s, held.reading.tolist(), held.column) == (None, [0.1, 0.2, 0.3], "yaw_rad")
 
 
 def test_a_reading_beyond_all_computing_is_refused(tmp_path: Path) -> None:

@@ -39,6 +39,21 @@ def run(
             help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …",
         ),
     ] = None,
+    drive: Annotated[
+        str | None,
+        typer.Option(
+            "--input", metavar="NAME", rich_help_panel=INPUT, help="Column of a driven run's input, or none."
+        ),
+    ] = None,
+    input_as: Annotated[
+        str | None,
+        typer.Option(
+            "--input-as",
+            metavar="COLUMN",
+            rich_help_panel=INPUT,
+            help="What the input is: moment_nm, drive or base_rad.",
+        ),
+    ] = None,
     time: Annotated[
         str | None,
         typer.Option(
@@ -158,6 +173,7 @@ def run(
       tunnel import log.csv --out my-rig
       tunnel import log.csv --preview import.png
       tunnel import S*.csv --out my-rig --name "S{spring}_V{wind_speed}_*" --set air_density=1.2
+      tunnel import shaker.csv --out my-rig --input torque --input-as moment_nm
       tunnel import rig.mat --out my-rig --angle "data[1]" --unit deg
       tunnel import next.csv --out next --recipe my-rig/import.toml --yes
 
@@ -180,6 +196,8 @@ def run(
     stated = {
         "angle": tuple(angle or ()) or None,
         "unit": unit,
+        "input": drive,
+        "input_as": input_as,
         "time": time,
         "time_unit": time_unit,
         "rate": rate,

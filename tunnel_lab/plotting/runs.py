@@ -335,6 +335,12 @@ def _draw(axes: Axes, parts: list[ImportedRun], unit: str) -> None:
         colour = COLOURS[number % len(COLOURS)] if len(parts) > 1 else BLUE
         axes.plot(*thinned(time[piece], reading[piece]), color=colour, linewidth=0.7)
         axes.axvline(time[part.piece.first], color=VERMILION, linewidth=0.8, linestyle="--")
+    if raw.input is not None:
+        name, values = raw.input
+        beside = axes.twinx()
+        beside.plot(*thinned(time, values), color=VERMILION, linewidth=0.4, alpha=0.6)
+        beside.set_ylabel(f"input {name}", fontsize=8, color=VERMILION)
+        beside.tick_params(labelsize=7)
     kept = sum(part.run is not None for part in parts)
     about = raw.id if kept == 1 else f"{raw.id}: {kept} runs"
     axes.set_title(figure_text(about), fontsize=9, loc="left")

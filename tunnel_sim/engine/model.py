@@ -235,6 +235,11 @@ def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model
     Raises:
         TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
     """
+    if settings.drive is not None:
+        raise TunnelError(
+            "the MuJoCo model does not take the input of a driven run yet",
+            remedy="simulate a free decay, or integrate it with tunnel_sim.physics.forward",
+        )
     check_stable(rig, settings)
     key = (repr(rig), settings.layout(), drawn)
     compiled = _COMPILED.get(key)

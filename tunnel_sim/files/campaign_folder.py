@@ -20,11 +20,12 @@ from tunnel_sim.files.plausible import (
     enough_cycles,
     increasing_times,
     plausible_run,
+    plausible_sampling,
     plausible_values,
     same_unit,
 )
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
-from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
+from tunnel_sim.files.run_files import RUN_FORMATS, RunTableValues, read_table, table_bytes
 from tunnel_sim.files.toml_input import (
     OneLine,
     SampleRate,
@@ -45,6 +46,7 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
+from tunnel_sim.vocabulary.drive import Drive, Hold, checked_drive, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -89,12 +91,20 @@ class RunTable(StrictModel):
 
     id: OneLine = Field(description="a short unique name in quotes")
     file: OneLine = Field(description="a path inside the campaign's folder, such as 'runs/r01.csv'")
-    spring_stiffness: Positive | None = Field(
-        default=None, description="a positive number in N m/rad, or leave it out for the normalised form"
+    spring_stiffness: NotNegative | None = Field(
+        default=None,
+        description="a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
+        "normalised form",
     )
     wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
     release_angle: float | None = Field(default=None, description="a number in rad")
+    drive_hold: Hold | None = Field(
+        default=None, description="'zero' or 'linear', between the samples of a driven run's input"
+    )
+    drive_gain: float | None = Field(
+        default=None, description="a number other than 0 in N m per unit of the column drive"
+    )
 
 
 class CampaignDocument(StrictModel):
@@ -197,7 +207,8 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
             document[key] = _stated(values)
     document["runs"] = [
         {"id": run.id, "file": files[run.id]}
-        | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record")})
+        | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record", "drive")})
+        | ({} if run.drive is None else _stated({"drive_hold": run.drive.hold, "drive_gain": run.drive.gain}))
         for run in campaign.runs
     ]
     return document
@@ -316,7 +327,9 @@ def write_campaign(
         (partial / RUN_FOLDER).mkdir()
         for run in campaign.runs:
             (partial / files[run.id]).write_bytes(
-                table_bytes(run.record, folder / files[run.id], campaign.sensor.quantity or "angle")
+                table_bytes(
+                    run.record, folder / files[run.id], campaign.sensor.quantity or "angle", run.drive
+                )
             )
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
@@ -352,9 +365,8 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
             where=where,
             remedy="copy the file into the folder",
         )
-    time_s, reading, column = read_table(
-        path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle"
-    )
+    held = read_table(path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle")
+    time_s = held.time_s
     if time_s is None:
         if sample_rate is None:
             raise TunnelError(
@@ -362,8 +374,14 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
                 where=where,
                 remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
             )
-        time_s = np.arange(reading.size) / sample_rate
-    record = checked_record(time_s, reading, column, sensor, run.release_angle, where)
+        time_s = np.arange(held.reading.size) / sample_rate
+    drive = _drive(run, held, where)
+    record = checked_record(
+        time_s, held.reading, held.column, sensor, run.release_angle, where, driven=drive is not None
+    )
+    if drive is not None:
+        checked_drive(drive, record, where, judged=sensor.plausible is not False)
+    without_spring_needs_drive(run.spring_stiffness, drive, where)
     return Run(
         id=run.id,
         record=record,
@@ -371,7 +389,27 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
         spring_stiffness=run.spring_stiffness,
         air_density=run.air_density,
         release_angle=run.release_angle,
+        drive=drive,
     )
+
+
+def _drive(run: RunTable, held: RunTableValues, where: str) -> Drive | None:
+    if held.input is None or held.input_column is None:
+        stated = next((key for key in ("drive_hold", "drive_gain") if getattr(run, key) is not None), None)
+        if stated is None:
+            return None
+        raise TunnelError(
+            f"{stated} without an input column",
+            where=where,
+            remedy="add a column moment_nm, drive or base_rad to the run file, or leave the key out",
+        )
+    if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
+        raise TunnelError(
+            f"drive_gain = {run.drive_gain:g} of the column {held.input_column}",
+            where=where,
+            remedy="give drive_gain of a column drive only, in N m per unit, not zero",
+        )
+    return Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
 
 
 def checked_record(
@@ -381,6 +419,8 @@ def checked_record(
     sensor: SensorProperties,
     release_angle: float | None,
     where: str,
+    *,
+    driven: bool = False,
 ) -> Record:
     """The record of a run, unless it is refused.
 
@@ -390,15 +430,20 @@ def checked_record(
         column: that the readings are from, for messages.
         sensor: what is stated of the sensor.
         release_angle: as stated, rad.
+        driven: whether the run has an input: it need not oscillate at a frequency of its own.
 
     Raises:
-        TunnelError: times that do not increase, fewer than three cycles, or what looks like a wrong unit.
+        TunnelError: times that do not increase, too few cycles of a free decay, or what looks like a wrong unit.
     """
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
     if judged and angle:
         same_unit(reading, column, release_angle, where)
     record = Record(time_s, reading)
+    if driven:
+        if judged:
+            plausible_sampling(record, where, angle=angle)
+        return record
     cycles = enough_cycles(record, where)
     if judged:
         plausible_run(record, cycles, where, angle=angle)
@@ -414,7 +459,12 @@ def _check_records(campaign: Campaign, folder: Path) -> None:
             raise TunnelError(
                 "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
             )
-        checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where)
+        record = checked_record(
+            time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, driven=run.drive is not None
+        )
+        if run.drive is not None:
+            checked_drive(run.drive, record, where, judged=campaign.sensor.plausible is not False)
+        without_spring_needs_drive(run.spring_stiffness, run.drive, where)
 
 
 def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:

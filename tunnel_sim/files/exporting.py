@@ -13,6 +13,7 @@ from tunnel_sim.files.readers import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.drive import INPUT_COLUMNS
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
@@ -58,17 +59,20 @@ def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
         )
         for run in campaign.runs
     ]
-    pl.concat(frames).write_csv(stream)
+    # free decays have no value of an input
+    pl.concat(frames, how="diagonal" if _input_columns(campaign) else "vertical").write_csv(stream)
 
 
 def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     """A structure array ``runs``, and a structure ``rig``."""
     from scipy.io import savemat
 
-    keys = ("id", *_CONDITIONS, "time_s", _column(campaign))
+    held = ("drive_hold", "drive_gain") if _input_columns(campaign) else ()
+    keys = ("id", *_CONDITIONS, *held, "time_s", _column(campaign), *_input_columns(campaign))
     runs = np.zeros(len(campaign.runs), dtype=[(key, object) for key in keys])
     for place, run in enumerate(campaign.runs):
-        known = {"id": run.id, **_stated(run, _CONDITIONS), **_record(campaign, run)}
+        stated = {key: value for key, value in _conditions(run).items() if value is not None}
+        known = {"id": run.id, **stated, **_record(campaign, run)}
         runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
     rig: Mapping[str, Any] = {"name": campaign.name, **_stated(campaign.rig, _RIG)}
     savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
@@ -80,7 +84,22 @@ def _numbers(campaign: Campaign, run: Run) -> dict[str, float | None]:
 
 
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
-    return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad}
+    given: dict[str, Any] = {} if run.drive is None else {run.drive.column: run.drive.values}
+    return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad, **given}
+
+
+def _conditions(run: Run) -> dict[str, float | str | None]:
+    """The conditions of a run by key, None where they are not stated; of a driven run those of its input too."""
+    found: dict[str, float | str | None] = {key: getattr(run, key) for key in _CONDITIONS}
+    if run.drive is not None:
+        found |= {"drive_hold": run.drive.hold, "drive_gain": run.drive.gain}
+    return found
+
+
+def _input_columns(campaign: Campaign) -> tuple[str, ...]:
+    """The input columns of any run, in the order of the format."""
+    found = {run.drive.column for run in campaign.runs if run.drive is not None}
+    return tuple(name for name in INPUT_COLUMNS if name in found)
 
 
 def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
@@ -91,7 +110,8 @@ def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
         width = len(str(len(campaign.runs)))  # programs sort groups by name
         for number, run in enumerate(campaign.runs, 1):
             group = file.create_group(f"run-{number:0{width}d}")
-            group.attrs.update({"id": run.id, **_stated(run, _CONDITIONS)})
+            stated = {key: value for key, value in _conditions(run).items() if value is not None}
+            group.attrs.update({"id": run.id, **stated})
             for name, values in _record(campaign, run).items():
                 group.create_dataset(name, data=values, compression="gzip", shuffle=True)
 

@@ -113,10 +113,7 @@ def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = Tr
         TunnelError: a swing, time step or period outside its range, or fewer than ten samples per cycle.
     """
     step, per_cycle = record.sample_interval, record.yaw_rad.size / cycles
-    swing = 0.5 * float(np.ptp(record.yaw_rad))
-    if angle:
-        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
-    _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
+    plausible_sampling(record, where, angle=angle)
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:
         raise TunnelError(
@@ -125,6 +122,21 @@ def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = Tr
             where=where,
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )
+
+
+def plausible_sampling(record: Record, where: str, *, angle: bool = True) -> None:
+    """Refuse a record whose swing or time step appears to be in a wrong unit.
+
+    Args:
+        angle: whether the reading is an angle; rates and accelerations may have any size.
+
+    Raises:
+        TunnelError: a swing or time step outside its range.
+    """
+    step, swing = record.sample_interval, 0.5 * float(np.ptp(record.yaw_rad))
+    if angle:
+        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
+    _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
 
 
 def _check(said: str, value: float, allowed: Range, where: str) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
+from tunnel_sim.vocabulary.drive import INPUT_COLUMNS
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.plugins import added_to, loading
 
@@ -27,7 +28,7 @@ COLUMNS: Mapping[str, tuple[str, ...]] = {
 }
 """The columns that may hold the reading, by the sensor's quantity; the first one is written."""
 
-USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names))
+USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names), *INPUT_COLUMNS)
 """The columns of a run file that are read; others are left alone."""
 
 

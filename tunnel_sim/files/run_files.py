@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +24,31 @@ from tunnel_sim.files.reading import check_count, decoded, read_regular
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
+from tunnel_sim.vocabulary.drive import INPUT_COLUMNS, Drive, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.record import Array, Record
 
 RUN_FORMATS = ("parquet", "csv")
 """Formats that are written."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunTableValues:
+    """What a run file holds.
+
+    Args:
+        time_s: sample times, shape (n,), s; None without a column time_s.
+        reading: shape (n,), rad, rad/s or rad/s².
+        column: the reading's, one of those in `COLUMNS`.
+        input_column: of a driven run; None of a free decay.
+        input: shape (n,), in the unit of its column; None of a free decay.
+    """
+
+    time_s: Array | None
+    reading: Array
+    column: str
+    input_column: InputColumn | None = None
+    input: Array | None = None
 
 
 def read_table(
@@ -37,8 +58,8 @@ def read_table(
     timed: bool = False,
     quantity: Quantity = "angle",
     most: int = limits.RUN_SAMPLES,
-) -> tuple[Array | None, Array, str]:
-    """Read times and readings from a run file; other columns are ignored.
+) -> RunTableValues:
+    """Read times, readings and the input of a driven run from a run file; other columns are ignored.
 
     Args:
         path: a file with one of the endings of run files.
@@ -47,8 +68,7 @@ def read_table(
         most: greatest number of samples.
 
     Returns:
-        Times in s (None without a column time_s), the reading in rad, rad/s or rad/s², and the name of its column,
-        one of those in `COLUMNS`. All values are finite.
+        What the file holds. All values are finite.
 
     Raises:
         TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
@@ -76,17 +96,21 @@ def read_table(
     return _columns(reader.read_run(content, where, most), where, timed=timed, quantity=quantity)
 
 
-def table_bytes(record: Record, path: Path, quantity: Quantity = "angle") -> bytes:
+def table_bytes(
+    record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
+) -> bytes:
     """The content of a run file with times and readings in radians; reading it gives the same numbers.
 
     Args:
         path: the ``.csv`` or ``.parquet`` file, for the format and for messages.
         quantity: what the readings are, which names their column.
+        drive: the input of a driven run.
 
     Raises:
         TunnelError: when the table cannot be encoded.
     """
-    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad})
+    given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
+    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
     # CSV values have the fewest digits that read back as the same float.
     return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
 
@@ -111,10 +135,20 @@ def _reading_column(names: Sequence[str], quantity: Quantity, where: str) -> str
     )
 
 
-def _columns(
-    held: FileTable, where: str, *, timed: bool, quantity: Quantity
-) -> tuple[Array | None, Array, str]:
+def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
+    found = [name for name in INPUT_COLUMNS if name in names]
+    if len(found) > 1:
+        raise TunnelError(
+            f"{len(found)} input columns: {' and '.join(found)}",
+            where=where,
+            remedy="a run has one input: keep its column and rename the others",
+        )
+    return found[0] if found else None
+
+
+def _columns(held: FileTable, where: str, *, timed: bool, quantity: Quantity) -> RunTableValues:
     names = held.names
+    driven = _input_column(names, where)
     column = _reading_column(names, quantity, where)
     stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
     if timed and "time_s" not in names and stray is not None:
@@ -123,7 +157,7 @@ def _columns(
             where=where,
             remedy="did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]",
         )
-    used = [name for name in ("time_s", column) if name in names]
+    used = [name for name in ("time_s", column, driven) if name in names and name is not None]
     table = held.frame.select(used)
     if held.text:
         # A text table without the blank lines at its end.
@@ -136,7 +170,8 @@ def _columns(
         )
     values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
     reading = np.deg2rad(values[column]) if "_deg" in column else values[column]
-    return values.get("time_s"), reading, column
+    given = None if driven is None else values[driven]
+    return RunTableValues(values.get("time_s"), reading, column, driven, given)
 
 
 def _numbers(series: pl.Series, text: bool, where: str) -> Array:

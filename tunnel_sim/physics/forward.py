@@ -82,6 +82,8 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
     imposed = _NONE if forcing is None else np.array(forcing.values, dtype=np.float64)
     program = np.array(settings.program, dtype=np.float64) if settings.program else _NONE
+    drive = settings.drive
+    driven = () if drive is None else (drive.values, drive.time_s)
     fields = {
         "wind": values.ctypes.data,
         "wind_count": values.size,
@@ -97,6 +99,16 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
         "step": settings.timestep,
         "steps": 1,
     }
+    if drive is not None:
+        fields |= {
+            "moment": drive.values.ctypes.data,
+            "moment_time": drive.time_s.ctypes.data,
+            "moment_count": drive.values.size,
+            "moment_scale": drive.scale,
+            "moment_delay": drive.delay,
+            "moment_held": float(drive.held),
+            "moment_on_end": float(not drive.on_body),
+        }
     if settings.rod_twist is not None:
         twist, end = settings.rod_twist, spring_end_angle(settings)
         fields |= {
@@ -109,7 +121,7 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
     names = run_dtype().names
     assert names is not None
     row = tuple(fields.get(name, 0) for name in names)  # in one go: setting fields one by one is slow
-    return np.array([row], dtype=run_dtype()), (values, imposed, program)
+    return np.array([row], dtype=run_dtype()), (values, imposed, program, *driven)
 
 
 def backlash(angle: Array, half_width: float, start: float) -> Array:

@@ -14,6 +14,8 @@ from functools import cache
 from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
+import numpy as np
+
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -125,6 +127,42 @@ class RodTwist:
         return sqrt((1.0 / (self.compliance * (1.0 - share)) + spring_stiffness) / (yaw_inertia * share))
 
 
+@dataclass(frozen=True, eq=False)
+class DriveMoment:
+    """The moment of a drive: linear or constant between its samples, constant before the first and after the last.
+
+    Args:
+        time_s: of the samples, since the run's start, shape (n,), s, increasing.
+        values: at these times, shape (n,), any unit.
+        scale: N m per unit.
+        delay: by which it acts later than its samples, s.
+        held: whether it is constant from one sample to the next; else linear.
+        on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
+    """
+
+    time_s: Array
+    values: Array
+    scale: float = 1.0
+    delay: float = 0.0
+    held: bool = False
+    on_body: bool = True
+
+    def __post_init__(self) -> None:
+        """Copy and check the samples.
+
+        Raises:
+            TunnelError: when they do not match, or one is not finite.
+        """
+        for name in ("time_s", "values"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay]])
+        if self.time_s.shape != self.values.shape or not self.time_s.size or not np.isfinite(numbers).all():
+            raise TunnelError(
+                "a drive needs as many finite values as times, and at least one",
+                remedy="correct the sampled input",
+            )
+
+
 @dataclass(frozen=True)
 class RunSettings:
     """The physics of one run.
@@ -145,6 +183,7 @@ class RunSettings:
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
         rod_twist: None for a rigid rod.
         program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
+        drive: the moment of a driven run, which the compiled integrator takes; None of a free decay.
     """
 
     spring_stiffness: float
@@ -161,6 +200,7 @@ class RunSettings:
     series: Mapping[str, Series] = field(default_factory=lambda: MappingProxyType({}))
     rod_twist: RodTwist | None = None
     program: tuple[float, ...] = ()
+    drive: DriveMoment | None = None
 
     def __post_init__(self) -> None:
         """Check names and numbers. The plugin checks the bounds of the law's parameters.

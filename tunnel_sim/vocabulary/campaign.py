@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -91,6 +92,7 @@ class Run:
         spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
+        drive: the input of a driven run, which need not start with a release; None of a free decay.
     """
 
     id: str
@@ -99,6 +101,7 @@ class Run:
     spring_stiffness: float | None = None
     air_density: float | None = None
     release_angle: float | None = None
+    drive: Drive | None = None
 
     @property
     def wind_on(self) -> bool:
@@ -118,10 +121,10 @@ class Run:
             raise TunnelError("xarray is not installed", remedy=remedy) from error
         names = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
         stated = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        readings = ("time_s", self.record.yaw_rad, {"long_name": "reading of the yaw angle"})
-        return Dataset(
-            {"yaw_rad": readings}, coords={"time_s": self.record.time_s}, attrs={"id": self.id, **stated}
-        )
+        columns = {"yaw_rad": ("time_s", self.record.yaw_rad, {"long_name": "reading of the yaw angle"})}
+        if self.drive is not None:
+            columns[self.drive.column] = ("time_s", self.drive.values, {"long_name": "input of the run"})
+        return Dataset(columns, coords={"time_s": self.record.time_s}, attrs={"id": self.id, **stated})
 
 
 def needs_density(wind_speed: float, *scales: float | None) -> bool:
@@ -156,7 +159,9 @@ class Campaign:
         count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"
         on = sum(run.wind_on for run in self.runs)
         springs = [run.spring_stiffness for run in self.runs if run.spring_stiffness is not None]
+        driven = sum(run.drive is not None for run in self.runs)
         stated = [
+            *([f"{driven} driven"] if driven else []),
             f"springs {_between(springs)} N m/rad" if springs else "no spring stated",
             f"wind {_between([run.wind_speed for run in self.runs])} m/s" if on else "wind off",
             f"{_between([run.record.duration for run in self.runs])} s",

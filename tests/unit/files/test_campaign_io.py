@@ -17,6 +17,7 @@ from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.run_files import read_table, table_bytes
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
@@ -77,7 +78,8 @@ def test_any_float_survives_a_run_file(tmp_path: Path, values: list[float], suff
     path = tmp_path / f"run{suffix}"
     record = Record(np.arange(len(values)) / 3.0, np.array(values))
     path.write_bytes(table_bytes(record, path))
-    time_s, yaw, column = read_table(path, "here")
+    held = read_table(path, "here")
+    time_s, yaw, column = held.time_s, held.reading, held.column
     assert column == "yaw_rad"
     assert time_s is not None
     assert time_s.tobytes() == record.time_s.tobytes()
@@ -285,10 +287,10 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
 ) -> None:
     folder = write_campaign(campaign(), tmp_path / "c")
 
-    def full(record: Record, path: Path, quantity: Quantity) -> bytes:
+    def full(record: Record, path: Path, quantity: Quantity, drive: Drive | None) -> bytes:
         if path.stem == "on":
             raise OSError(28, "No space left on device")
-        return table_bytes(record, path, quantity)
+        return table_bytes(record, path, quantity, drive)
 
     monkeypatch.setattr(campaign_folder, "table_bytes", full)
     for target in (folder, tmp_path / "other"):
@@ -301,10 +303,10 @@ def test_a_disk_that_fails_leaves_the_old_campaign_and_no_litter(
 def test_a_campaign_written_meanwhile_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = replace(campaign(), name="the other")
 
-    def overtaken(record: Record, path: Path, quantity: Quantity) -> bytes:
+    def overtaken(record: Record, path: Path, quantity: Quantity, drive: Drive | None) -> bytes:
         monkeypatch.setattr(campaign_folder, "table_bytes", table_bytes)
         write_campaign(other, tmp_path / "c")
-        return table_bytes(record, path, quantity)
+        return table_bytes(record, path, quantity, drive)
 
     monkeypatch.setattr(campaign_folder, "table_bytes", overtaken)
     with pytest.raises(TunnelError, match="c: the folder exists"):

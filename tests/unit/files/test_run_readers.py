@@ -59,8 +59,8 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, ending: str, place: str) -> None:
 
 def test_its_files_are_read(tmp_path: Path) -> None:
     (tmp_path / "r.lines").write_text("0.3\n-0.2\n0.1\n")
-    time_s, reading, column = read_table(tmp_path / "r.lines", "here")
-    assert (time_s, reading.tolist(), column) == (None, [0.3, -0.2, 0.1], "yaw_rad")
+    held = read_table(tmp_path / "r.lines", "here")
+    assert (held.time_s, held.reading.tolist(), held.column) == (None, [0.3, -0.2, 0.1], "yaw_rad")
 
 
 def test_its_values_are_checked_by_row(tmp_path: Path) -> None:

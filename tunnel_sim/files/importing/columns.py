@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
+from tunnel_sim.files.importing.inputs import is_input, is_stated
 from tunnel_sim.files.importing.tables import UNITS, Channel, Table, kind_of, known_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
@@ -178,7 +179,9 @@ def _readings(
     if choices.angle:
         chosen = [c for name in choices.angle for c in _chosen(block, name, "--angle", where)]
         return [channel for channel in chosen if channel is not time]
-    others = [channel for channel in _unconditional(block) if channel is not time]
+    others = [
+        c for c in _unconditional(block) if c is not time and not is_input(c) and not is_stated(c, choices)
+    ]
     moving = [channel for channel in others if _span(channel) > 0.0]
     levels = [
         [

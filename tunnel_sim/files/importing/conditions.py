@@ -19,6 +19,7 @@ from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.tables import UNITS, Channel, kind_of, split_unit
 from tunnel_sim.files.importing.text import read_cells
 from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, validate
+from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -81,6 +82,10 @@ class ImportChoices(StrictModel):
     rest: float | None = Field(
         default=None, description="the reading at rest in rad, to be subtracted from every run"
     )
+    input: OneLine | None = Field(
+        default=None, description="the name of the input's column of a driven run, or 'none'"
+    )
+    input_as: InputColumn | None = Field(default=None, description="'moment_nm', 'drive' or 'base_rad'")
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
         default=(),

@@ -20,10 +20,12 @@ from tunnel_sim.files.importing.columns import (
     sample_interval,
 )
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of, from_column, from_facts
+from tunnel_sim.files.importing.inputs import at_times, find_input
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.tables import Channel, Table, kind_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.campaign import Quantity
+from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -47,6 +49,7 @@ class RawRecord:
         columns: of conditions, by key, with the rows of the record.
         clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
         whole: whether the file itself says that it is one run.
+        input: of a driven record: what it is, and its values at the cleaned times, shape (n,); None of free decays.
     """
 
     id: str
@@ -61,6 +64,7 @@ class RawRecord:
     columns: Mapping[str, Channel]
     clock: Array
     whole: bool
+    input: tuple[InputColumn, Array] | None = None
 
     def measured(self, first: float, last: float, said: list[str]) -> dict[str, float]:
         """Conditions that columns of the file state.
@@ -131,6 +135,7 @@ def _raws(
         reading = Channel(pair.reading.name, values, pair.reading.unit)
         readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
         kept = _within(time, choices, said)
+        driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
         time, readings = time[kept], readings[kept]
         conditions = _condition_columns(table, pair, kept, said)
         names = [source.path.stem if several or not (table.part or pair.run) else "", table.part, pair.run]
@@ -145,6 +150,7 @@ def _raws(
             label = name if len(starts) == 2 else f"{name}-{place}"
             if clean.time_s.size < 2:
                 raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
+            given = None if driven is None else _input(driven, kept, time, readings, (a, b), clean, where)
             columns = {key: replace(c, values=c.values[a:b]) for key, c in conditions.items()}
             found.append(
                 RawRecord(
@@ -160,9 +166,32 @@ def _raws(
                     columns,
                     time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                     table.named and len(starts) == 2,
+                    given,
                 )
             )
     return found
+
+
+def _input(
+    driven: tuple[InputColumn, Array],
+    kept: NDArray[np.bool_],
+    time: Array,
+    readings: Array,
+    ends: tuple[int, int],
+    clean: Cleaned,
+    where: str,
+) -> tuple[InputColumn, Array]:
+    """The input at the times of a cleaned record."""
+    part = slice(*ends)
+    values = at_times(driven[1][kept][part], time[part], readings[part], clean.time_s)
+    missing = int(np.count_nonzero(~np.isfinite(values)))
+    if missing:
+        raise TunnelError(
+            f"the input {driven[0]} has no number at {missing} of {values.size} samples",
+            where=where,
+            remedy="give one value for each sample of the reading, on the same clock, or --input none",
+        )
+    return driven[0], values
 
 
 def _times(pair: ColumnPair, table: Table, choices: ImportChoices, said: list[str], where: str) -> Array:

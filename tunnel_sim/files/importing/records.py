@@ -44,6 +44,7 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
     needs_density,
 )
+from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -190,7 +191,7 @@ def _parts(
     for label, raw in named:
         time, reading = raw.cleaned.time_s, raw.cleaned.reading
         angle = raw.quantity == "angle"
-        cut = choices.cut and angle and not raw.whole
+        cut = choices.cut and angle and not raw.whole and raw.input is None
         pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             name = label if len(pieces) == 1 else f"{label}-{number}"
@@ -235,11 +236,17 @@ def _part(
             where=where,
             remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
         )
+    drive = None if raw.input is None else Drive(raw.input[0], raw.input[1][kept])
     try:
-        record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
+        if drive is None:
+            record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
+        else:
+            sensor = SensorProperties(quantity=raw.quantity)
+            record = checked_record(from_zero(time), reading, "the reading", sensor, None, where, driven=True)
+            checked_drive(drive, record, where)
     except TunnelError as error:
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
-    run = Run(name, record, **({"wind_speed": 0.0} | stated))
+    run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
 
 

@@ -1,0 +1,169 @@
+"""Driven runs on disk: what is written is read, and an input that cannot be one is refused in one line."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
+from tunnel_sim.files.exporting import export_campaign
+from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
+
+TIME = np.arange(1000) * 0.01
+INPUT = np.sin(9.0 * TIME) + 0.3 * np.cos(31.0 * TIME)
+RESPONSE = 0.1 * np.sin(9.0 * TIME - 0.7) + 0.01 * np.cos(31.0 * TIME - 2.0)
+FREE = 0.3 * np.exp(-0.1 * TIME) * np.cos(12.0 * TIME)
+
+
+def campaign(drive: Drive | None = None, spring: float | None = 16.0) -> Campaign:
+    driven = Run("driven", Record(TIME, RESPONSE), 0.0, spring, drive=drive or Drive("moment_nm", INPUT))
+    free = Run("free", Record(TIME, FREE), 0.0, 16.0, release_angle=0.3)
+    return Campaign("mixed", RigProperties(), SensorProperties(100.0), (driven, free))
+
+
+@pytest.mark.parametrize("run_format", ["csv", "parquet"])
+@pytest.mark.parametrize(
+    "drive",
+    [
+        Drive("moment_nm", INPUT, "zero"),
+        Drive("drive", INPUT, "linear", -2.5),
+        Drive("drive", INPUT),
+        Drive("base_rad", 0.1 * INPUT, "linear"),
+    ],
+)
+def test_a_mixed_campaign_is_read_as_it_was_written(tmp_path: Path, run_format: str, drive: Drive) -> None:
+    read = read_campaign(write_campaign(campaign(drive), tmp_path / "c", run_format=run_format))
+    found = read.runs[0].drive
+    assert found is not None
+    assert (found.column, found.hold, found.gain) == (drive.column, drive.hold, drive.gain)
+    assert found.values.tobytes() == drive.values.tobytes()
+    assert read.runs[1].drive is None
+    assert "1 driven" in repr(read)
+
+
+def test_a_driven_run_may_have_no_spring_and_a_free_one_may_not(tmp_path: Path) -> None:
+    read = read_campaign(write_campaign(campaign(spring=0.0), tmp_path / "c"))
+    assert read.runs[0].spring_stiffness == 0.0
+    bad = replace(campaign(), runs=(replace(campaign().runs[1], spring_stiffness=0.0),))
+    with pytest.raises(TunnelError, match="only a driven run may have no spring"):
+        write_campaign(bad, tmp_path / "d")
+
+
+CLIPPED = np.clip(INPUT, -0.6, 0.6)
+BAD = {
+    "length": (Drive("moment_nm", INPUT[:-1]), "999 samples, the record 1000"),
+    "constant": (Drive("drive", np.full(TIME.size, 3.0)), "is constant"),
+    "itself": (Drive("drive", -4.0 * RESPONSE + 1.0), "is the response itself"),
+    "saturates": (Drive("moment_nm", CLIPPED), "saturates"),
+    "nan": (Drive("moment_nm", np.where(TIME[5] == TIME, np.nan, INPUT)), "NaN"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_an_input_that_cannot_be_one_is_refused_in_one_line(tmp_path: Path, case: str) -> None:
+    drive, said = BAD[case]
+    with pytest.raises(TunnelError, match=said) as caught:
+        write_campaign(campaign(drive), tmp_path / "c")
+    assert "run 'driven'" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.parametrize("values", [np.sign(INPUT), np.round(INPUT * 20.0) / 20.0, INPUT])
+def test_square_waves_and_coarse_inputs_do_not_saturate(tmp_path: Path, values: np.ndarray) -> None:
+    write_campaign(campaign(Drive("moment_nm", values)), tmp_path / "c")
+
+
+def test_plausible_false_keeps_an_actuator_that_saturates(tmp_path: Path) -> None:
+    kept = replace(campaign(Drive("moment_nm", CLIPPED)), sensor=SensorProperties(100.0, plausible=False))
+    assert read_campaign(write_campaign(kept, tmp_path / "c")).runs[0].drive is not None
+
+
+def edited(tmp_path: Path, old: str, new: str, file: str = "campaign.toml") -> Path:
+    folder = write_campaign(campaign(), tmp_path / "c", run_format="csv")
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "file", "said"),
+    [
+        ('drive_hold = "linear"', 'drive_hold = "cubic"', "campaign.toml", "drive_hold"),
+        (
+            'drive_hold = "linear"',
+            "drive_gain = 2.0",
+            "campaign.toml",
+            "drive_gain = 2 of the column moment_nm",
+        ),
+        ("release_angle", "drive_gain = 1.0\nrelease_angle", "campaign.toml", "without an input column"),
+        ("moment_nm", "drive,base_rad", "runs/driven.csv", "2 input columns"),
+    ],
+)
+def test_a_wrong_statement_is_refused(tmp_path: Path, old: str, new: str, file: str, said: str) -> None:
+    with pytest.raises(TunnelError, match=said):
+        read_campaign(edited(tmp_path, old, new, file))
+
+
+def log(path: Path, name: str, values: np.ndarray, response: np.ndarray = RESPONSE) -> Path:
+    rows = "\n".join(f"{t:.4f},{y:.8f},{u:.8f}" for t, y, u in zip(TIME, response, values, strict=True))
+    path.write_text(f"time (s),angle (rad),{name}\n{rows}\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("moment_nm", "moment_nm"),
+        ("torque (Nm)", "moment_nm"),
+        ("shaker (V)", "drive"),
+        ("base_rad", "base_rad"),
+    ],
+)
+def test_import_finds_the_input_and_says_why(tmp_path: Path, name: str, column: str) -> None:
+    imported = read_records([log(tmp_path / "log.csv", name, INPUT)])
+    drive = imported.campaign.runs[0].drive
+    assert drive is not None
+    assert drive.column == column
+    assert np.max(np.abs(drive.values - INPUT)) < 1e-7
+    assert any("driven by" in line and "correlation" in line for line in imported.remarks())
+
+
+def test_import_takes_no_other_column_for_an_input(tmp_path: Path) -> None:
+    spring_torque = log(tmp_path / "a.csv", "torque (Nm)", -16.0 * FREE, FREE)
+    hum = log(tmp_path / "b.csv", "motor (V)", np.sin(300.0 * TIME), FREE)
+    for path in (spring_torque, hum):
+        assert read_records([path]).campaign.runs[0].drive is None
+    driven = log(tmp_path / "c.csv", "torque (Nm)", INPUT)
+    free = read_records([driven], ImportChoices(input="none", cut=False)).campaign.runs[0]
+    assert free.drive is None
+    stated = read_records([driven], ImportChoices(input="torque", input_as="drive")).campaign.runs[0].drive
+    assert stated is not None
+    assert stated.column == "drive"
+
+
+def test_an_input_on_another_clock_is_refused(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", "moment_nm", INPUT)
+    lines = path.read_text().splitlines()
+    lines[1::2] = [line.rsplit(",", 1)[0] + "," for line in lines[1::2]]
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(TunnelError, match="has no number at 500 of 1000 samples"):
+        read_records([path])
+
+
+@pytest.mark.parametrize("kind", ["mat", "csv", "xlsx", "hdf5"])
+def test_export_writes_the_input_and_import_reads_it(tmp_path: Path, kind: str) -> None:
+    path = export_campaign(campaign(), tmp_path / f"c.{kind}", kind)
+    runs = {run.id: run for run in read_records([path], ImportChoices(cut=False)).campaign.runs}
+    driven = [run for run in runs.values() if run.drive is not None]
+    assert len(driven) == 1
+    assert driven[0].drive is not None
+    assert np.max(np.abs(driven[0].drive.values - INPUT)) < 1e-15 * (kind == "xlsx") + 1e-300
+    assert len(runs) == 2

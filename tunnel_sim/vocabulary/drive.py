@@ -1,0 +1,140 @@
+"""The input of a driven run: a known moment, an input of unknown gain, or the motion of the spring's root."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record, read_only
+
+Hold = Literal["zero", "linear"]
+"""Between samples the input keeps its value, or is linear."""
+
+InputColumn = Literal["moment_nm", "drive", "base_rad"]
+"""A known moment on the body, N m; an input of unknown gain, any unit; the angle of the spring's root, rad."""
+
+INPUT_COLUMNS: tuple[InputColumn, ...] = ("moment_nm", "drive", "base_rad")
+"""The columns of a run file that may hold its input."""
+
+_CONSTANT = 1e-9  # of the largest value, within which an input counts as constant
+_ITSELF = 1e-7  # share of the variance by which an input must differ from every multiple of the response
+_FLAT = 3  # equal extreme values in a row that a clipped input has
+_CLIPPED = 0.01  # share of the samples at an extreme, from which on it is clipped
+_LEVELS = 0.6  # share of the samples at both extremes, above which they are the levels of a square wave
+_NEIGHBOURS = 5.0  # samples at the extreme for each one within a hundredth of the range of it
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """The input of a run at the samples of its record.
+
+    Args:
+        column: what it is.
+        values: at the times of the record, shape (n,): N m, any unit, or rad, as ``column`` says.
+        hold: between the samples.
+        gain: N m per unit of a ``drive``; None where it is not stated.
+    """
+
+    column: InputColumn
+    values: Array
+    hold: Hold = "linear"
+    gain: float | None = None
+
+    def __post_init__(self) -> None:
+        """Copy the values and make them read-only."""
+        object.__setattr__(self, "values", read_only(self.values))
+
+    @property
+    def on_body(self) -> bool:
+        """Whether it is a moment on the body; else it acts through the spring."""
+        return self.column != "base_rad"
+
+    @property
+    def unit(self) -> str:
+        """Of the values."""
+        return {"moment_nm": "N m", "drive": "units", "base_rad": "rad"}[self.column]
+
+
+def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = True) -> None:
+    """Refuse an input that cannot be that of its record.
+
+    Args:
+        record: of the response.
+        where: file and run, for messages.
+        judged: whether an input that looks clipped is refused too.
+
+    Raises:
+        TunnelError: an input of another length than the record, constant, clipped, or the response itself.
+    """
+    values, name = drive.values, drive.column
+    if values.shape != record.yaw_rad.shape:
+        raise TunnelError(
+            f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}",
+            where=where,
+            remedy="give the input at the times of the record, one value for each sample",
+        )
+    if not np.isfinite(values).all():
+        raise TunnelError(
+            f"the input {name} holds NaN or an infinity", where=where, remedy="give all its values"
+        )
+    span = float(np.ptp(values))
+    if span <= _CONSTANT * float(np.abs(values).max()):
+        raise TunnelError(
+            f"the input {name} is constant",
+            where=where,
+            remedy=f"leave the column out if the run is a free decay, or record what drives it in {name}",
+        )
+    x, y = values - values.mean(), record.yaw_rad - record.yaw_rad.mean()
+    alike = float(x @ y) ** 2 / max(float(x @ x) * float(y @ y), 1e-300)
+    if 1.0 - alike < _ITSELF:
+        raise TunnelError(
+            f"the input {name} is the response itself, up to a factor",
+            where=where,
+            remedy=f"record what drives the body in {name}, not the sensor's reading",
+        )
+    if judged and _is_clipped(values, span):
+        raise TunnelError(
+            f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
+            where=where,
+            remedy="record the input in a wider range; where the actuator itself saturates, state "
+            "plausible = false under [sensor] to keep it",
+        )
+
+
+def _is_clipped(values: Array, span: float) -> bool:
+    """Whether an input stands at an extreme for some samples again and again, and is seldom near it."""
+    ends = (float(values.min()), float(values.max()))
+    at = [values == end for end in ends]
+    if np.mean(at[0] | at[1]) > _LEVELS:
+        return False
+    for end, there in zip(ends, at, strict=True):
+        count = int(np.count_nonzero(there))
+        near = int(np.count_nonzero(np.abs(values - end) < 0.01 * span)) - count
+        flat = there[2:] & there[1:-1] & there[:-2]
+        stands = int(np.count_nonzero(flat)) * _FLAT > count
+        if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
+            return True
+    return False
+
+
+def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | None, where: str) -> None:
+    """Refuse a run without a spring that nothing drives.
+
+    Args:
+        spring_stiffness: as stated, N m/rad; None where it is not.
+        drive: the run's input; None of a free run.
+        where: file and run, for messages.
+
+    Raises:
+        TunnelError: a stiffness of zero in a free run, which does not oscillate.
+    """
+    if spring_stiffness == 0.0 and drive is None:
+        raise TunnelError(
+            "'spring_stiffness' = 0 is not greater than 0, and only a driven run may have no spring",
+            where=where,
+            remedy="give spring_stiffness as a positive number in N m/rad, or the run file an input column "
+            f"{', '.join(INPUT_COLUMNS[:-1])} or {INPUT_COLUMNS[-1]}",
+        )
