@@ -37,7 +37,7 @@ def test_the_probabilities_are_those_of_the_decision():
     for key, (left, _) in SETS.items():
         remains = misfit(left, by_chance)
         closed = log(max(1.0 - remains / gap, 0.0) + 0.02)
-        odds[key] = exp(0.2 + 0.21 * gap - 2.0 * log(1.0 + remains) + 2.0 * closed)
+        odds[key] = exp(0.6 + 0.21 * gap - 2.0 * log(1.0 + remains) + 2.0 * closed)
     total = sum(weights.values())
     against = sum(weights[key] * odds[key] for key in SETS) / total
     expected = {
