@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,16 @@ _MOMENT_SCALE = 100.0
 _FASTER_AIR = 4.0  # at most 100 m/s, where the standard rig has 25 m/s
 _MAINS_SCALES = (0.3, 9.0)  # between these the mains lie above the motion and below half the sample rate
 
+CIRCUMSTANCES = ("few_runs", "coloured", "uneven_stamps", "scaled")
+
 
 def draw_circumstances(
-    rng: np.random.Generator, conditions: Conditions, *, probability: float, mains: bool = False
+    rng: np.random.Generator,
+    conditions: Conditions,
+    *,
+    probability: float,
+    mains: bool = False,
+    certain: Collection[str] = (),
 ) -> Conditions:
     """Change each circumstance with the same probability, independently of the others.
 
@@ -24,15 +32,21 @@ def draw_circumstances(
         conditions: of the standard rig.
         probability: of each change.
         mains: whether mains hum acts, so that the sample rate must resolve it.
+        certain: the changes that are made whatever the probability, of ``CIRCUMSTANCES``.
 
     Returns:
         Conditions of a rig of another scale, with few springs and speeds, coloured noise, or uneven time stamps.
     """
     found = conditions
-    for change in (_few_runs, _coloured, _uneven_stamps):
-        if rng.random() < probability:
-            found = change(rng, found)
-    return _scaled(rng, found, mains) if rng.random() < probability else found
+    for name, change in zip(CIRCUMSTANCES, (_few_runs, _coloured, _uneven_stamps), strict=False):
+        if rng.random() < (1.0 if name in certain else probability):
+            changed = change(rng, found)
+            while changed is found and name in certain:  # a wind speed that the springs kept do not have
+                changed = change(rng, found)
+            found = changed
+    return (
+        _scaled(rng, found, mains) if rng.random() < (1.0 if "scaled" in certain else probability) else found
+    )
 
 
 def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:

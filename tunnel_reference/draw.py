@@ -73,12 +73,14 @@ class Mixture:
         rare: probability that any other form is a rare one (0 for tuning sets).
         variety: probability of another scale, of few runs, of coloured noise and of uneven time stamps, each.
         small: probability of a small effect beside those that matter, and of a second one beside the first.
+        certain: circumstances that every campaign has, of `tunnel_reference.circumstances.CIRCUMSTANCES`.
     """
 
     textbook: float = 0.5
     rare: float = 0.5
     variety: float = 0.25
     small: float = 0.25
+    certain: tuple[str, ...] = ()
 
 
 def draw_campaign(
@@ -101,7 +103,11 @@ def draw_campaign(
     names = draw_families(rng, number, families)
     small = draw_families(rng, number + _small_number(rng, mixture.small), names)[number:] if names else ()
     conditions = draw_circumstances(
-        rng, draw_conditions(rng), probability=mixture.variety, mains="mains_hum" in (*names, *small)
+        rng,
+        draw_conditions(rng),
+        probability=mixture.variety,
+        mains="mains_hum" in (*names, *small),
+        certain=mixture.certain,
     )
     effects = tuple(
         _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)

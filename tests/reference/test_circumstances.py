@@ -9,7 +9,7 @@ import pytest
 
 from tests.reference.rigs import rig
 from tunnel_reference import make
-from tunnel_reference.circumstances import draw_circumstances
+from tunnel_reference.circumstances import CIRCUMSTANCES, draw_circumstances
 from tunnel_reference.draw import BEYOND, CampaignDraw, EffectDraw, Mixture, draw_campaign, redraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import read_motion
@@ -129,3 +129,21 @@ def test_kinds_have_their_number_of_effects_and_small_ones_beside(kind, number):
     assert again.kind == kind
     assert [e.form.family for e in again.effects[:1]] == [e.form.family for e in draw.effects[:1]]
     assert redraw(draw).seed == again.seed
+
+
+@pytest.mark.parametrize("name", CIRCUMSTANCES)
+def test_a_certain_circumstance_is_in_every_campaign_and_the_others_in_none(name):
+    for seed in range(30):
+        c = draw_campaign(
+            np.random.default_rng(seed),
+            kind="single",
+            mixture=Mixture(variety=0.0, small=0.0, certain=(name,)),
+        ).conditions
+        has = {
+            "few_runs": c.runs <= 6 and np.unique(c.spring_stiffness).size <= 2,
+            "coloured": c.coloured_share > 0.0,
+            "uneven_stamps": c.clock_jitter > 0.0 or c.stamp_step > 0.0,
+            "scaled": c.time_scale != 1.0,
+        }
+        assert has[name]
+        assert not any(has[other] for other in CIRCUMSTANCES if other not in (name, "few_runs"))

@@ -1,0 +1,129 @@
+"""An entry's side: what an answer is, and how a program of this folder answers all campaigns of a set.
+
+An entry is any program that writes one JSON file for each campaign; ``answer.schema.json`` says what is in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from diagnosis.blind.files import campaign_folders, write_document
+from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.processes import in_processes
+from tunnel_sim.vocabulary.errors import TunnelError
+
+SCHEMA = Path(__file__).parent / "answer.schema.json"
+UNKNOWN = "unknown"
+NAMES: tuple[str, ...] = tuple(sorted(kind.name for kind in ALL_EFFECTS))
+"""The vocabulary of causes; `unknown` is one more label."""
+
+Answer = Callable[[Path], dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class About:
+    """What a method is, for the table.
+
+    Args:
+        title: its name in the table.
+        setting: the documented setting that was used, in a sentence.
+        names: causes that it can name, `unknown` among them where it can say so.
+        not_seen: tracks that it cannot see, which have "–" in the table.
+    """
+
+    title: str
+    setting: str
+    names: Sequence[str] = (*NAMES, UNKNOWN)
+    not_seen: Sequence[str] = ()
+
+
+def answer_of(
+    causes: Sequence[str],
+    probability: Mapping[str, float],
+    sets: Sequence[tuple[Sequence[str], float]] = (),
+    coefficients: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """An answer as a document.
+
+    Args:
+        causes: names; empty for none, ``["unknown"]`` where a gap has no cause of the vocabulary.
+        probability: that each cause acts, by name; those left out have 0.
+        sets: sets of causes with their probabilities; empty: causes count as independent.
+        coefficients: ``before`` and ``after`` the causes are added, each ``cn_beta`` and ``cn_r`` (1/rad) with
+            ``value`` and ``std``; None: not estimated.
+    """
+    document: dict[str, Any] = {
+        "schema_version": 1,
+        "causes": sorted(causes),
+        "probability": {name: round(float(p), 6) for name, p in sorted(probability.items()) if p > 0.0},
+    }
+    if sets:
+        document["sets"] = [{"causes": sorted(names), "probability": float(p)} for names, p in sets]
+    if coefficients is not None:
+        document["coefficients"] = coefficients
+    return document
+
+
+def answer_all(
+    answer: Answer, campaigns: Path, answers: Path, *, jobs: int = 1, first: int | None = None
+) -> int:
+    """Answer the campaigns that have no answer yet, one file each.
+
+    Args:
+        answer: of one campaign's folder.
+        campaigns: folder of the campaigns.
+        answers: folder of the answers; an interrupted run is continued.
+        jobs: number of processes.
+        first: only so many campaigns, a count, by name; None: all.
+
+    Returns:
+        The number of answers that were written. A campaign on which the method fails gets ``causes`` null and the
+        error, which counts as wrong.
+    """
+    answers.mkdir(parents=True, exist_ok=True)
+    todo = [f for f in campaign_folders(campaigns)[:first] if not (answers / f"{f.name}.json").exists()]
+    work = partial(_answer_one, answer)
+    for number, (folder, document) in enumerate(in_processes(work, todo, jobs if jobs > 1 else 0), 1):
+        write_document(answers / f"{folder.name}.json", document)
+        said = "no answer" if document["causes"] is None else " + ".join(document["causes"]) or "none"
+        print(f"{number}/{len(todo)} {folder.name}: {said}, {document['seconds']:.1f} s", flush=True)
+    return len(todo)
+
+
+def _answer_one(answer: Answer, folder: Path) -> dict[str, Any]:
+    begun = time.process_time()
+    try:
+        document = answer(folder)
+    except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong
+        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
+        document = {"schema_version": 1, "causes": None, "probability": {}, "error": said}
+    return {"campaign": folder.name, **document, "seconds": round(time.process_time() - begun, 3)}
+
+
+def main(answer: Answer, arguments: Sequence[str] | None = None) -> None:
+    """Run a method as a program: ``CAMPAIGNS ANSWERS [--jobs N] [--first N]``.
+
+    Args:
+        answer: of one campaign's folder.
+        arguments: of the command line; None: the process's own.
+    """
+    parser = argparse.ArgumentParser(description="Answer campaigns, one JSON file each.")
+    parser.add_argument("campaigns", type=Path)
+    parser.add_argument("answers", type=Path)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--first", type=int)
+    given = parser.parse_args(arguments)
+    answer_all(answer, given.campaigns, given.answers, jobs=given.jobs, first=given.first)
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of an answer."""
+    found: dict[str, Any] = json.loads(SCHEMA.read_text(encoding="utf-8"))
+    return found

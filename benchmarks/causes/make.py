@@ -1,0 +1,177 @@
+"""Makes the set: campaigns by the reference simulator and the packaged records, a key apart, and the hashes
+of both.
+
+A set is a folder: ``campaigns/NAME`` (all that an entry may read), ``seal.json`` (hashes of campaigns and key) and
+``key/key.json`` (the truth). The hash of a campaign is over its numbers, not over the files of a Parquet library.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping
+from functools import partial
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from benchmarks.causes.tracks import REAL, SEED, TRACKS, VERSION, draw_all
+from diagnosis.blind.files import file_hash, read_document, write_document
+from tunnel_sim.processes import in_processes
+from tunnel_sim.vocabulary.errors import TunnelError
+
+SEAL, KEY, CAMPAIGNS = "seal.json", "key/key.json", "campaigns"
+PUBLISHED = Path(__file__).parent / f"v{VERSION}" / SEAL
+CHUNK = 10  # campaigns simulated together; larger chunks are hardly quicker
+
+
+def make(
+    out: Path,
+    *,
+    seed: int = SEED,
+    counts: Mapping[str, int] | None = None,
+    jobs: int = 1,
+    salt: str | None = None,
+    real: bool = True,
+) -> Path:
+    """Make a set; an interrupted one is continued.
+
+    Args:
+        out: its folder.
+        seed: of everything drawn; the same arguments give the same numbers.
+        counts: number of campaigns by track; None: those of ``TRACKS``.
+        jobs: number of processes.
+        salt: random text of the key, so that its hash cannot be found by trying truths; None: made from the
+            seed, as for the published set, whose key everyone can make.
+        real: whether the packaged measured records are in it.
+
+    Returns:
+        The seal's file.
+
+    Raises:
+        TunnelError: when the folder holds a finished set.
+    """
+    if (out / SEAL).exists():
+        raise TunnelError("holds a finished set", where=str(out), remedy="name another folder")
+    counts = {name: track.count for name, track in TRACKS.items()} if counts is None else counts
+    drawn = draw_all(seed, counts)
+    todo = [(i, seed, dict(counts)) for i in range(0, len(drawn), CHUNK)]
+    (out / ".making").mkdir(parents=True, exist_ok=True)
+    for (first, *_), number in in_processes(partial(_make_chunk, out), todo, jobs if jobs > 1 else 0):
+        print(f"campaigns {first + 1} to {first + number} of {len(drawn)}", flush=True)
+    truths: dict[str, Any] = {}
+    for first, *_ in todo:
+        truths |= read_document(out / ".making" / f"{first}.json", "make the set again")
+    if real:
+        truths |= _copy_records(out / CAMPAIGNS)
+    salt = hashlib.sha256(f"causes v{VERSION} {seed}".encode()).hexdigest() if salt is None else salt
+    made_with = {"version": VERSION, "seed": seed, "counts": dict(counts)}
+    (out / KEY).parent.mkdir(exist_ok=True)
+    key = write_document(
+        out / KEY, {"schema_version": 1, "salt": salt, "made_with": made_with, "truths": truths}
+    )
+    hashes = {name: data_hash(out / CAMPAIGNS / name) for name in sorted(truths)}
+    write_document(out / SEAL, {"schema_version": 1, "key_sha256": key, "campaigns_sha256": hashes})
+    shutil.rmtree(out / ".making")
+    return out / SEAL
+
+
+def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
+    """Simulate and write some campaigns; their number."""
+    from diagnosis.blind.make import _written  # what the reader refuses is drawn again, as in blind sets
+    from tunnel_reference.make import simulate_set, truth_of
+
+    first, seed, counts = task
+    chunk = draw_all(seed, counts)[first : first + CHUNK]
+    done = out / ".making" / f"{first}.json"
+    if not done.exists():
+        truths = {}
+        for one, simulated in zip(chunk, simulate_set([one.draw for one in chunk]), strict=True):
+            folder = out / CAMPAIGNS / one.name
+            shutil.rmtree(folder, ignore_errors=True)
+            truths[one.name] = {**truth_of(_written(simulated, folder, False)), "track": one.track}
+        write_document(done, truths)
+    return len(chunk)
+
+
+def _copy_records(target: Path) -> dict[str, Any]:
+    """Copy the packaged measured records; their sources' verdicts by name."""
+    from docs.studies.real_records import EXPECTED
+    from identification.datasets import MEASURED_CAMPAIGNS
+
+    truths = {}
+    for name in MEASURED_CAMPAIGNS:
+        with resources.as_file(resources.files("identification") / "data" / "measured" / name) as folder:
+            shutil.copytree(folder, target / name, dirs_exist_ok=True)
+        said = EXPECTED[name]
+        truths[name] = {
+            "track": REAL, "effects": sorted(said.causes), "small": sorted(said.also), "why": said.why,
+        }  # fmt: skip
+    return truths
+
+
+def data_hash(folder: Path) -> str:
+    """SHA-256 over what a campaign says and the numbers of its runs, in hexadecimal.
+
+    Args:
+        folder: of one campaign.
+    """
+    found = hashlib.sha256((folder / "campaign.toml").read_bytes())
+    for path in sorted((folder / "runs").iterdir()):
+        found.update(path.stem.encode() + b"\0")
+        if path.suffix == ".parquet":
+            table = pl.read_parquet(path)
+            for column in sorted(table.columns):
+                found.update(
+                    column.encode() + np.ascontiguousarray(table[column].to_numpy(), dtype="<f8").tobytes()
+                )
+        else:
+            found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
+    """Check a set against its seal, and open its key.
+
+    Args:
+        folder: of the set.
+        published: a seal to compare with, besides the set's own; None: none.
+
+    Returns:
+        The key's document.
+
+    Raises:
+        TunnelError: when a campaign or the key is not the one that was sealed.
+    """
+    seal = read_document(folder / SEAL, "make the set first: python -m benchmarks.causes make")
+    if published is not None and read_document(published, "restore it") != seal:
+        raise TunnelError("is not the published set", where=str(folder), remedy=differs(seal, published))
+    for name, known in seal["campaigns_sha256"].items():
+        if data_hash(folder / CAMPAIGNS / name) != known:
+            raise TunnelError("is not the campaign that was sealed", where=name, remedy="make the set again")
+    if file_hash(folder / KEY) != seal["key_sha256"]:
+        raise TunnelError("is not the key that was sealed", where=str(folder / KEY), remedy="restore it")
+    return read_document(folder / KEY, "restore it")
+
+
+def differs(seal: Mapping[str, Any], published: Path) -> str:
+    """How a seal differs from the published one, in words."""
+    other = json.loads(published.read_text(encoding="utf-8"))["campaigns_sha256"]
+    names = [name for name, known in seal["campaigns_sha256"].items() if other.get(name) != known]
+    return f"{len(names)} campaigns differ ({', '.join(names[:3])}); another version of NumPy may round otherwise"
+
+
+def truths_by_track(key: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Names of campaigns by track, in the order of the tracks.
+
+    Args:
+        key: its document.
+    """
+    found: dict[str, list[str]] = {name: [] for name in (*TRACKS, REAL)}
+    for name, truth in key["truths"].items():
+        found[truth["track"]].append(name)
+    return {track: sorted(names) for track, names in found.items() if names}

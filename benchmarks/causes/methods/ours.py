@@ -1,0 +1,45 @@
+"""The project's own diagnosis, as ``tunnel diagnose`` runs it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from benchmarks.causes.entry import About, answer_of, main
+
+ABOUT = About("tunnel diagnose", "as delivered, no option")
+
+
+def answer(folder: Path) -> dict[str, Any]:
+    """Diagnose one campaign.
+
+    Args:
+        folder: of the campaign.
+    """
+    from diagnosis import diagnose
+
+    found = diagnose(folder).to_json_dict()
+    sets = [(_names(c["effect"]), float(c["probability"])) for c in found["candidates"]]
+    probability = dict(found["inclusion"])
+    probability["unknown"] = sum(p for names, p in sets if names == ("unknown",))
+    total = max(sum(p for _, p in sets), 1.0)  # rounding
+    stated = {
+        when: _stated(values) for when, values in found["coefficients"].items() if when in ("before", "after")
+    }
+    return answer_of(found["causes"], probability, [(n, p / total) for n, p in sets], stated)
+
+
+def _names(effect: str) -> tuple[str, ...]:
+    return () if effect == "none" else tuple(effect.split(" + "))
+
+
+def _stated(values: dict[str, Any]) -> dict[str, Any]:
+    """The coefficients that are stated with a standard deviation."""
+    given = {name: values.get(name) for name in ("cn_beta", "cn_r")}
+    return {
+        n: {"value": v["value"], "std": v["std"]} for n, v in given.items() if v and (v["std"] or 0.0) > 0.0
+    }
+
+
+if __name__ == "__main__":
+    main(answer)

@@ -1,0 +1,219 @@
+"""The page of the benchmark: a table and a figure from the files of ``results``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.causes.tracks import REAL, SEED, TRACKS, VERSION
+
+ROOT = Path(__file__).parents[2]
+RESULTS = Path(__file__).parent / "results"
+PAGE = ROOT / "docs" / "benchmark-of-causes.md"
+FIGURE = ROOT / "docs" / "images" / "benchmark-of-causes.png"
+OURS = "ours"
+_TRACKS = (*TRACKS, REAL)
+
+
+def read_results(folder: Path = RESULTS) -> list[dict[str, Any]]:
+    """The results, those with the larger share of exact sets first.
+
+    Args:
+        folder: of one file for each method.
+    """
+    found = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
+    return sorted(found, key=lambda r: -_share(r["all"]["exact"]))
+
+
+def _share(given: Mapping[str, Any]) -> float:
+    return given["count"] / given["total"] if given["total"] else 0.0
+
+
+def write_page(results: Path = RESULTS, page: Path = PAGE, figure: Path = FIGURE) -> Path:
+    """Write page and figure.
+
+    Args:
+        results: folder of the results.
+        page: file of the page.
+        figure: file of the figure.
+
+    Returns:
+        The page's file.
+    """
+    found = read_results(results)
+    _draw(found, figure)
+    page.write_text(page_text(found, f"images/{figure.name}"), encoding="utf-8")
+    return page
+
+
+def page_text(found: Sequence[Mapping[str, Any]], image: str) -> str:
+    """The page.
+
+    Args:
+        found: results, best first.
+        image: address of the figure.
+    """
+    parts = [
+        "# Benchmark of causes\n",
+        *_where_others_win(found),
+        f"\nThe set has {sum(t.count for t in TRACKS.values())} simulated campaigns (version {VERSION}, "
+        f"seed {SEED}) and "
+        "the packaged measured records. [How it is made, and how to enter](../benchmarks/causes/README.md). "
+        "`python -m benchmarks.causes page` writes this page; nothing in it is typed by hand. Intervals are "
+        "Wilson's at 95 %. A method that cannot see a track has “–”.\n",
+        "## Sets exactly right\n",
+        _table(("method", "all", *(t.replace("_", " ") for t in _TRACKS)), [_exact(r) for r in found]),
+        f"\n![Sets exactly right by method, with intervals]({image})\n",
+        "## Causes, probabilities and time\n",
+        _table(
+            (
+                "method",
+                "causes found",
+                "of those it can name",
+                "named causes false",
+                "log score, nats",
+                "calibration error of inclusion",
+                "true set in the 90 % set",
+                "its size",
+                "s of processor, median",
+            ),
+            [_causes(r) for r in found],
+        ),
+        "\nThe log score is the mean over campaigns of the log probability of what acts and what does "
+        "not; 0 is best, and "
+        "probabilities count as at least 0.01. The 90 % set is the smallest set of answers that together "
+        "have nine tenths. "
+        "The calibration error is the smooth one of the blind check.\n",
+        "## Coefficients\n",
+        _table(
+            (
+                "method",
+                "Cnβ within 2 σ",
+                "median error before",
+                "after",
+                "Cnr within 2 σ",
+                "median error before",
+                "after",
+            ),
+            [row for r in found if (row := _coefficients(r))],
+        ),
+        "\n## The methods\n",
+        *[_about(r) for r in found],
+    ]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _where_others_win(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Tracks and scores in which another method is ahead of ours on the campaigns that both answered."""
+    ours = next((r for r in found if r["method"] == OURS), None)
+    if ours is None:
+        return ["`tunnel diagnose` has not been run on this set yet."]
+    said = []
+    for r in found:
+        both = sorted(set(r["cases"]) & set(ours["cases"]))
+        mine = sum(ours["cases"][n]["right"] for n in both)
+        other = sum(r["cases"][n]["right"] for n in both)
+        if r is not ours and other > mine:
+            said.append(
+                f"- **{r['title']}** has more exact sets: {other} against {mine} of the {len(both)} that "
+                f"both answered."
+            )
+        for track in r["tracks"]:
+            a, b = r["tracks"][track]["exact"], ours["tracks"].get(track, {}).get("exact")
+            if r is not ours and b and a["total"] == b["total"] and a["count"] > b["count"]:
+                name = track.replace("_", " ")
+                said.append(
+                    f"- **{r['title']}** is ahead on *{name}*: {a['count']} against {b['count']} of {a['total']}."
+                )
+        if (
+            r is not ours
+            and r["answered"] == ours["answered"]
+            and r["all"]["log_score"] > ours["all"]["log_score"]
+        ):
+            said.append(f"- **{r['title']}** has the better log score.")
+    head = "Where another method is ahead of `tunnel diagnose`:\n" if said else (
+        "No other method is ahead of `tunnel diagnose` on a track or in all."
+    )  # fmt: skip
+    if ours["answered"] < ours["of"]:
+        head = f"`tunnel diagnose` has answered {ours['answered']} of {ours['of']} campaigns so far. {head}"
+    return [head, *said]
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [heads, ["---"] + ["---:"] * (len(heads) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _proportion(given: Mapping[str, Any] | None, *, interval: bool = True) -> str:
+    if not given or not given["total"]:
+        return "–"
+    text = f"{given['count']}/{given['total']}"
+    if not interval:
+        return text
+    low, high = given["wilson_95"]
+    return f"{text} ({100 * low:.0f}–{100 * high:.0f} %)"
+
+
+def _title(r: Mapping[str, Any]) -> str:
+    return r["title"] if r["answered"] == r["of"] else f"{r['title']} ({r['answered']} of {r['of']} answered)"
+
+
+def _exact(r: Mapping[str, Any]) -> list[str]:
+    tracks = [_proportion(r["tracks"].get(t, {}).get("exact"), interval=False) for t in _TRACKS]
+    return [_title(r), _proportion(r["all"]["exact"]), *tracks]
+
+
+def _causes(r: Mapping[str, Any]) -> list[str]:
+    a = r["all"]
+    calibrated = a["inclusion_calibration"]
+    return [
+        _title(r), _proportion(a["found"]), _proportion(r["found_of_nameable"]), _proportion(a["false"]),
+        f"{a['log_score']:.2f}", "–" if calibrated is None else f"{calibrated['error']:.3f}",
+        _proportion(a["covered"]), f"{a['credible_size']:.1f}", f"{a['seconds']['median']:.2g}",
+    ]  # fmt: skip
+
+
+def _coefficients(r: Mapping[str, Any]) -> list[str]:
+    given, row = r["all"]["coefficients"], [_title(r)]
+    if not given:
+        return []
+    for name in ("cn_beta", "cn_r"):
+        before, after = given.get(f"{name} before"), given.get(f"{name} after")
+        row.append(_proportion(after and after["within_2_std"]))
+        row += [
+            "–" if one is None else f"{100 * one['median_relative_error']:.2g} %" for one in (before, after)
+        ]
+    return row
+
+
+def _about(r: Mapping[str, Any]) -> str:
+    can = f" It can name {len(r['names'])} of 26 answers." if len(r["names"]) < 26 else ""
+    return (
+        f"- **{r['title']}** ([program](../benchmarks/causes/methods/{r['method']}.py), "
+        f"[result](../benchmarks/causes/results/{r['method']}.json)): {r['setting']}.{can} Processor "
+        f"time of all answers: "
+        f"{r['all']['seconds']['sum'] / 3600:.2f} h. No answer: {r['all']['no_answer']}. Answers sha256 "
+        f"`{r['answers_sha256'][:16]}…`, key `{r['key_sha256'][:16]}…`."
+    )
+
+
+def _draw(found: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """A point with its interval for each method."""
+    from matplotlib.figure import Figure
+
+    from tunnel_lab.plotting.style import save
+
+    figure = Figure(figsize=(6.4, 0.6 + 0.32 * len(found)), layout="constrained")
+    axes = figure.subplots()
+    for place, r in enumerate(reversed(found)):
+        given = r["all"]["exact"]
+        low, high = given["wilson_95"]
+        colour = "C0" if r["method"] == OURS else "0.35"
+        axes.plot([100 * low, 100 * high], [place, place], color=colour, linewidth=2)
+        axes.plot([100 * _share(given)], [place], "o", color=colour)
+    axes.set_yticks(range(len(found)), [_title(r) for r in reversed(found)])
+    axes.set_xlim(0, 100)
+    axes.set_xlabel("sets exactly right, %")
+    save(figure, path)

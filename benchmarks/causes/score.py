@@ -1,0 +1,225 @@
+"""Scores an entry by the statistics of the project's blind checks.
+
+This is the only file that turns answers into what `diagnosis.blind` counts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import heapq
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.causes.entry import NAMES, UNKNOWN, About
+from benchmarks.causes.make import SEAL, truths_by_track
+from benchmarks.causes.tracks import VERSION
+from diagnosis.blind.cases import NAMES as COEFFICIENTS
+from diagnosis.blind.cases import Case, case
+from diagnosis.blind.found import found_by_group, inclusions
+from diagnosis.blind.smooth import smooth_calibration
+from diagnosis.blind.statistics import calibration
+from identification.statistics import Proportion
+from tunnel_sim.files.json_text import as_json
+from tunnel_sim.files.reading import as_described
+from tunnel_sim.vocabulary.errors import TunnelError
+
+FLOOR = 0.01
+"""Least probability that the log score counts, and one minus the greatest: nobody knows better from so "
+"few trials."""
+WITHIN = 2.0  # standard deviations of a coefficient
+_SETS = 60  # of independent causes that are listed at most; the rest of the probability is in no credible set
+
+
+def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
+    """The answers of a folder by campaign.
+
+    Args:
+        folder: of one JSON file for each campaign.
+
+    Raises:
+        TunnelError: when there is none, or one is not an answer.
+    """
+    found = {}
+    for path in sorted(folder.glob("*.json")):
+        with as_described("is not an answer", str(path), "see benchmarks/causes/answer.schema.json"):
+            found[path.stem] = json.loads(path.read_text(encoding="utf-8"))
+            _check(found[path.stem])
+    if not found:
+        raise TunnelError(
+            "holds no answer", where=str(folder), remedy="write one JSON file for each campaign"
+        )
+    return found
+
+
+def _check(answer: Mapping[str, Any]) -> None:
+    """The rules of the schema that a score depends on, without a validator's package."""
+    labels = {*NAMES, UNKNOWN}
+    named = answer["causes"] or []
+    if not labels >= set(named) or not labels >= set(answer["probability"]):
+        raise ValueError("names a cause outside the vocabulary")
+    if UNKNOWN in named and len(named) > 1:
+        raise ValueError("'unknown' stands alone")
+    values = [*answer["probability"].values(), *(s["probability"] for s in answer.get("sets", ()))]
+    if not all(0.0 <= float(p) <= 1.0 for p in values):
+        raise ValueError("a probability is not between 0 and 1")
+    if sum(s["probability"] for s in answer.get("sets", ())) > 1.0 + 1e-6:
+        raise ValueError("the probabilities of the sets sum to more than 1")
+
+
+def likely_sets(answer: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]]:
+    """Sets of causes with their probabilities, most probable first.
+
+    Args:
+        answer: an entry's document. Where it states no sets, causes are independent, and `unknown` has its own
+            probability beside them.
+    """
+    if answer.get("sets"):
+        given = [(tuple(sorted(s["causes"])), float(s["probability"])) for s in answer["sets"]]
+        return sorted(given, key=lambda one: -one[1])
+    stated = dict(answer["probability"])
+    unknown = min(float(stated.pop(UNKNOWN, 0.0)), 1.0)
+    p = {name: float(np.clip(value, 0.0, 1.0)) for name, value in stated.items() if value > 0.0}
+    best = tuple(sorted(name for name, value in p.items() if value > 0.5))
+    top = float(np.prod([max(value, 1.0 - value) for value in p.values()]))
+    # flips of the most probable set, cheapest first: a heap of (cost, last place, flipped names)
+    costs = sorted((abs(np.log(max(v, 1e-12) / max(1.0 - v, 1e-12))), name) for name, v in p.items())
+    heap: list[tuple[float, int, tuple[str, ...]]] = [(0.0, -1, ())]
+    found: list[tuple[tuple[str, ...], float]] = [((UNKNOWN,), unknown)] if unknown else []
+    while heap and len(found) < _SETS:
+        cost, last, flipped = heapq.heappop(heap)
+        found.append((tuple(sorted(set(best) ^ set(flipped))), top * float(np.exp(-cost)) * (1.0 - unknown)))
+        for place in range(last + 1, len(costs)):
+            heapq.heappush(heap, (cost + costs[place][0], place, (*flipped, costs[place][1])))
+    return sorted(found, key=lambda one: -one[1])
+
+
+def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Case:
+    """Truth and answer of a campaign as the blind checks have them.
+
+    Args:
+        truth: from the key.
+        answer: an entry's document.
+    """
+    causes = answer["causes"]
+    own = None if causes is None else tuple(sorted(causes))
+    # the answer given comes first, as the blind checks expect; its place among equals does not matter
+    sets = sorted(likely_sets(answer), key=lambda one: (one[0] != own, -one[1])) if own is not None else []
+    document = {
+        "causes": causes,
+        "candidates": [
+            {"effect": " + ".join(names) or "none", "probability": min(p, 1.0)} for names, p in sets
+        ],
+        "inclusion": {n: float(answer["probability"].get(n, 0.0)) for n in NAMES} if own is not None else {},
+        "coefficients": answer.get("coefficients", {}),
+        "gap": {"closed": 0.0},  # not asked of an entry
+        "wall_s": float(answer.get("seconds", 0.0)),
+    }
+    return case(name, truth, document)
+
+
+def log_score(cases: Sequence[Case]) -> float | None:
+    """Mean over campaigns of the log probability of what acts and what does not, nats; 0 is best.
+
+    Args:
+        cases: truth and answer of every campaign; those without an answer count as a half for every cause.
+    """
+    stated = {c.name: dict.fromkeys(NAMES, 0.5) | c.answer["inclusion"] for c in cases}
+    scores = []
+    for c in cases:
+        p = {n: float(np.clip(v, FLOOR, 1.0 - FLOOR)) for n, v in stated[c.name].items() if n not in c.small}
+        scores.append(sum(np.log(v) if name in c.truth else np.log1p(-v) for name, v in p.items()))
+    return float(np.mean(scores)) if scores else None
+
+
+def _coefficients(cases: Sequence[Case]) -> dict[str, Any]:
+    """Errors of both coefficients before and after, where an entry states them."""
+    found: dict[str, Any] = {}
+    for name in COEFFICIENTS:
+        for when in ("before", "after"):
+            errors = [e for c in cases if (e := c.error(name, when)) is not None]
+            if errors:
+                found[f"{name} {when}"] = {
+                    "within_2_std": Proportion.of([abs(stds) <= WITHIN for stds, _ in errors]).to_json_dict(),
+                    "median_relative_error": float(np.median([abs(share) for _, share in errors])),
+                }
+    return found
+
+
+def figures(cases: Sequence[Case]) -> dict[str, Any]:
+    """All figures of some campaigns.
+
+    Args:
+        cases: truth and answer of every campaign; at least one.
+    """
+    found = found_by_group(cases)[-1].to_json_dict()  # the last group is of all
+    found.pop("group", None)
+    given = [(c.probability, c.right) for c in cases if c.probability is not None]
+    error, bins = calibration([p for p, _ in given], [right for _, right in given])
+    seconds = [float(c.answer["wall_s"]) for c in cases]
+    return {
+        "campaigns": len(cases),
+        **found,
+        "log_score": log_score(cases),
+        "inclusion_calibration": as_json(smooth_calibration(inclusions(cases))),
+        "answer_calibration": {"error": error, "bins": as_json(bins)},
+        "coefficients": _coefficients(cases),
+        "no_answer": sum(c.causes is None for c in cases),
+        "seconds": {
+            "median": float(np.median(seconds)),
+            "largest": max(seconds),
+            "sum": float(np.sum(seconds)),
+        },
+    }
+
+
+def score(
+    folder: Path, key: Mapping[str, Any], answers: Mapping[str, Mapping[str, Any]], name: str, about: About
+) -> dict[str, Any]:
+    """The score of an entry, as a file of ``results``.
+
+    Args:
+        folder: of the set.
+        key: its document, as `benchmarks.causes.make.check` returns it.
+        answers: by campaign; campaigns without one are not scored, and their number is stated.
+        name: of the method.
+        about: what it is.
+
+    Raises:
+        TunnelError: when an answer is to a campaign that the set does not have.
+    """
+    strange = sorted(set(answers) - set(key["truths"]))
+    if strange:
+        raise TunnelError(f"the set has no campaign '{strange[0]}'", where=name, remedy="answer this set's")
+    seal = json.loads((folder / SEAL).read_text(encoding="utf-8"))
+    tracks: dict[str, Any] = {}
+    every: list[Case] = []
+    for track, members in truths_by_track(key).items():
+        cases = [as_case(n, key["truths"][n], answers[n]) for n in members if n in answers]
+        if cases and track not in about.not_seen:
+            tracks[track] = figures(cases)
+        every += cases
+    nameable = [n in c.named for c in every for n in c.truth if n in about.names and n != UNKNOWN]
+    text = json.dumps(answers, sort_keys=True).encode()
+    return {
+        "schema_version": 1,
+        "version": VERSION,
+        "method": name,
+        "title": about.title,
+        "setting": about.setting,
+        "names": sorted(about.names),
+        "not_seen": sorted(about.not_seen),
+        "key_sha256": seal["key_sha256"],
+        "answers_sha256": hashlib.sha256(text).hexdigest(),
+        "answered": len(every),
+        "of": len(key["truths"]),
+        "all": figures(every),
+        "found_of_nameable": Proportion.of(nameable).to_json_dict(),
+        "tracks": tracks,
+        "cases": {
+            c.name: {"right": c.right, "causes": None if c.causes is None else list(c.causes)} for c in every
+        },
+    }

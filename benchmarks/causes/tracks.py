@@ -1,0 +1,100 @@
+"""The tracks of the benchmark: what acts in their campaigns, and how many campaigns they have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.forms import FAMILIES
+from tunnel_reference.make import plan_kinds
+
+VERSION = 1
+SEED = 20271001
+REAL = "real"
+_ANY = {"single": 0.4, "pair": 0.25, "three": 0.15, "none": 0.1, "outside": 0.1}
+_RANDOM = ("buffeting", "vortex_shedding")
+
+
+@dataclass(frozen=True)
+class Track:
+    """A part of the set.
+
+    Args:
+        count: number of campaigns.
+        kinds: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
+        certain: circumstances of every campaign, of `tunnel_reference.circumstances.CIRCUMSTANCES`.
+        first: families of which one acts in every campaign, in turn; empty: all.
+        about: what it is, in a few words.
+    """
+
+    count: int
+    kinds: Mapping[str, float]
+    about: str
+    certain: tuple[str, ...] = ()
+    first: tuple[str, ...] = field(default=())
+
+
+TRACKS: Mapping[str, Track] = {
+    "none": Track(24, {"none": 1.0}, "the nominal model is true"),
+    "one": Track(40, {"single": 1.0}, "one effect of the vocabulary, every one at least once"),
+    "two": Track(24, {"pair": 1.0}, "two effects"),
+    "three_and_four": Track(24, {"three": 0.5, "four": 0.5}, "three or four effects"),
+    "outside": Track(24, {"outside": 1.0}, "an effect that belongs to no family: the answer is `unknown`"),
+    "few_runs": Track(16, _ANY, "one or two springs, still air and one wind speed", ("few_runs",)),
+    "random_moments": Track(
+        16, {"single": 0.5, "pair": 0.3, "three": 0.2}, "turbulence or vortices, alone or beside others", (),
+    _RANDOM ),
+    "other_scales": Track(16, _ANY, "rigs up to 30 times as fast or slow, moments to 100 times", ("scaled",)),
+    "coloured_and_uneven": Track(
+        16, _ANY, "coloured noise; rounded or jittered time stamps", ("coloured", "uneven_stamps")
+    ),
+}  # fmt: skip
+"""The simulated tracks; the packaged measured records are one more, ``real``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """One campaign to simulate.
+
+    Args:
+        name: as in the set; it says nothing of the track.
+        track: of ``TRACKS``.
+        draw: the campaign before its effects are scaled.
+    """
+
+    name: str
+    track: str
+    draw: CampaignDraw
+
+
+def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
+    """Draw the simulated campaigns.
+
+    Args:
+        seed: of all random numbers; the same arguments give the same campaigns.
+        counts: number of campaigns by track.
+
+    Returns:
+        The campaigns by name, tracks mixed.
+    """
+    drawn = [(track, draw) for track, count in counts.items() for draw in _track(seed, track, count)]
+    order = np.random.default_rng([seed, len(TRACKS)]).permutation(len(drawn))
+    return [Drawn(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
+
+
+def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
+    """The campaigns of a track; families come in turn, so that their frequencies differ by at most one."""
+    track, number = TRACKS[name], list(TRACKS).index(name)
+    rng = np.random.default_rng([seed, number])
+    pool = np.array(track.first or FAMILIES)
+    turns = [str(f) for _ in range(-(-count // len(pool))) for f in rng.permutation(pool)]
+    mixture = Mixture(variety=0.0, certain=track.certain)
+    draws = []
+    for index, kind in enumerate(plan_kinds(count, dict(track.kinds))):
+        families = () if kind in ("none", "outside") else (turns[index],)
+        own = np.random.default_rng([seed, number, index])
+        draws.append(draw_campaign(own, kind=kind, mixture=mixture, families=families))
+    return draws

@@ -1,0 +1,203 @@
+"""The benchmark of causes. Truth: a set of three campaigns of known causes, and answers worked out by hand."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from benchmarks.causes import make as making
+from benchmarks.causes.__main__ import main
+from benchmarks.causes.entry import NAMES, About, answer_all, answer_of, schema
+from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
+from benchmarks.causes.methods import METHODS
+from benchmarks.causes.page import page_text
+from benchmarks.causes.score import figures, likely_sets, read_answers, score
+from benchmarks.causes.tracks import TRACKS, draw_all
+from tests.reference.rigs import rig
+from tunnel_reference import draw
+from tunnel_sim.vocabulary.errors import TunnelError
+
+EXAMPLES = Path(__file__).parents[2] / "benchmarks/causes/examples"
+COUNTS = {"none": 1, "one": 2}
+
+
+def made(folder, **more):
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(draw, "draw_conditions", lambda _rng: c)
+        make(folder, seed=3, counts=COUNTS, real=False, **more)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("causes") / "set")
+
+
+def perfect(small):
+    truths = check(small)["truths"]
+    return {
+        name: {"campaign": name, **answer_of(t["effects"], dict.fromkeys(t["effects"], 1.0))}
+        for name, t in truths.items()
+    }
+
+
+def test_the_published_set_has_every_effect_alone_and_its_tracks():
+    drawn = draw_all(1, {name: track.count for name, track in TRACKS.items()})
+    alone = {d.draw.effects[0].form.family for d in drawn if d.track == "one"}
+    assert alone == set(NAMES)
+    assert len(drawn) == 200
+    assert len({d.name for d in drawn}) == 200
+    for d in drawn:
+        c = d.draw.conditions
+        assert (c.time_scale != 1.0) == (d.track == "other_scales")
+        assert (c.coloured_share > 0.0) == (d.track == "coloured_and_uneven")
+        families = {e.form.family for e in d.draw.effects if not e.small}
+        assert d.track != "random_moments" or families & {"buffeting", "vortex_shedding"}
+
+
+def test_the_same_seed_makes_the_same_set_also_where_it_was_interrupted(small, tmp_path, monkeypatch):
+    folder = tmp_path / "set"
+    monkeypatch.setattr(making, "data_hash", lambda _path: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        made(folder)
+    monkeypatch.undo()
+    monkeypatch.setattr("tunnel_reference.make.simulate_set", lambda _draws: 1 / 0)  # nothing is made again
+    made(folder)
+    assert (folder / "seal.json").read_bytes() == (small / "seal.json").read_bytes()
+
+
+def test_the_truth_is_in_the_key_only(small):
+    for folder in (small / CAMPAIGNS).iterdir():
+        assert {path.name for path in folder.iterdir()} == {"campaign.toml", "runs"}
+    with pytest.raises(TunnelError, match="finished set"):
+        make(small)
+
+
+def test_changed_numbers_and_a_changed_key_are_noticed(small, tmp_path):
+    folder = Path(shutil.copytree(small, tmp_path / "set"))
+    one = sorted((folder / CAMPAIGNS).iterdir())[0]
+    before = data_hash(one)
+    text = (one / "campaign.toml").read_text()
+    (one / "campaign.toml").write_text(text + "\n# touched\n")
+    assert data_hash(one) != before
+    with pytest.raises(TunnelError, match="not the campaign that was sealed"):
+        check(folder)
+    (one / "campaign.toml").write_text(text)
+    (folder / KEY).write_text((folder / KEY).read_text().replace('"track"', '"trick"'))
+    with pytest.raises(TunnelError, match="not the key that was sealed"):
+        check(folder)
+
+
+def test_a_perfect_entry_has_perfect_scores(small):
+    found = score(small, check(small), perfect(small), "perfect", About("perfect", "the key"))
+    assert found["all"]["exact"]["count"] == 3
+    assert found["tracks"]["one"]["found"] == found["tracks"]["one"]["found"] | {"count": 2, "total": 2}
+    assert found["all"]["false"]["count"] == 0
+    assert found["all"]["covered"]["count"] == 3
+    assert found["all"]["credible_size"] == 1.0
+    assert found["all"]["log_score"] == pytest.approx(25 * np.log(0.99))
+
+
+def test_wrong_missing_and_impossible_answers(small, tmp_path):
+    answers = perfect(small)
+    first = sorted(answers)[0]
+    answers[first] = {"campaign": first, "causes": None, "probability": {}}
+    found = score(small, check(small), answers, "one fails", About("", ""))
+    assert found["all"]["exact"]["count"] == 2
+    assert found["all"]["no_answer"] == 1
+    partial = score(
+        small, check(small), {first: answers[first]}, "partial", About("", "", not_seen=("none",))
+    )
+    assert partial["answered"] == 1
+    assert "none" not in partial["tracks"]
+    for bad in (
+        {"causes": ["elephant"], "probability": {}},
+        {"causes": ["unknown", "mains_hum"], "probability": {}},
+        {"causes": [], "probability": {"mains_hum": 1.5}},
+        {"causes": [], "probability": {}, "sets": [{"causes": [], "probability": 0.7}] * 2},
+    ):
+        (tmp_path / "c0001.json").write_text(json.dumps(bad))
+        with pytest.raises(TunnelError, match="is not an answer"):
+            read_answers(tmp_path)
+    with pytest.raises(TunnelError, match="no campaign 'nowhere'"):
+        score(small, check(small), {"nowhere": answers[first]}, "", About("", ""))
+
+
+def test_independent_causes_make_sets():
+    sets = likely_sets({"probability": {"mains_hum": 0.9, "free_play": 0.4, "unknown": 0.1}})
+    assert dict(sets) == pytest.approx(
+        {
+            ("mains_hum",): 0.9 * 0.9 * 0.6,
+            ("free_play", "mains_hum"): 0.9 * 0.9 * 0.4,
+            (): 0.9 * 0.1 * 0.6,
+            ("free_play",): 0.9 * 0.1 * 0.4,
+            ("unknown",): 0.1,
+        }
+    )
+    assert [p for _, p in sets] == sorted((p for _, p in sets), reverse=True)
+
+
+def test_coefficients_count_within_two_standard_deviations(small):
+    from benchmarks.causes.score import as_case
+
+    truth = next(t for t in check(small)["truths"].values() if not t["effects"])
+    near = {"value": truth["cn_beta"] * 1.01, "std": truth["cn_beta"] * 0.006}
+    far = {"value": truth["cn_beta"] * 1.01, "std": truth["cn_beta"] * 0.004}
+    answers = [answer_of([], {}, coefficients={"before": {"cn_beta": far}, "after": {"cn_beta": near}})] * 2
+    found = figures([as_case("c", truth, a) for a in answers])["coefficients"]
+    assert found["cn_beta before"]["within_2_std"]["count"] == 0
+    assert found["cn_beta after"]["within_2_std"]["count"] == 2
+    assert found["cn_beta after"]["median_relative_error"] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("command", [[sys.executable, "entry.py"], ["sh", "entry.sh"]])
+def test_the_examples_write_valid_answers(small, tmp_path, command):
+    subprocess.run(
+        [command[0], str(EXAMPLES / command[1]), str(small / CAMPAIGNS), str(tmp_path / "a")], check=True
+    )
+    found = read_answers(tmp_path / "a")
+    assert set(found) == set(check(small)["truths"])
+    for answer in found.values():
+        jsonschema.validate(answer, schema())
+    out = tmp_path / "score.json"
+    assert main(["score", str(small), str(tmp_path / "a"), "--title", "mine", "--out", str(out)]) == 0
+    assert json.loads(out.read_text())["title"] == "mine"
+
+
+@pytest.mark.parametrize("method", ["spike_and_slab", "lisdd", "nearest_template", "always_unknown"])
+def test_methods_write_valid_answers_and_continue(small, tmp_path, method):
+    import importlib
+
+    module = importlib.import_module(f"benchmarks.causes.methods.{method}")
+    assert answer_all(module.answer, small / CAMPAIGNS, tmp_path, first=2) == 2
+    assert answer_all(module.answer, small / CAMPAIGNS, tmp_path) == 1
+    for answer in read_answers(tmp_path).values():
+        jsonschema.validate(answer, schema())
+        assert answer["causes"] is not None, answer
+
+
+def test_every_method_has_a_file_of_at_most_250_lines():
+    folder = EXAMPLES.parent / "methods"
+    assert {path.stem for path in folder.glob("*.py")} - {"__init__"} == set(METHODS)
+    for path in folder.glob("*.py"):
+        assert len(path.read_text().splitlines()) <= 250, path
+
+
+def test_the_page_says_first_where_another_method_is_ahead(small):
+    answers = perfect(small)
+    best = score(small, check(small), answers, "best", About("best", ""))
+    worst = {name: {**a, "causes": ["unknown"]} for name, a in answers.items()}
+    ours = score(small, check(small), worst, "ours", About("tunnel diagnose", ""))
+    text = page_text([best, ours], "figure.png")
+    assert text.index("**best** has more exact sets: 3 against 0") < text.index("## Sets exactly right")
+    assert "No other method is ahead" in page_text(
+        [score(small, check(small), answers, "ours", About("", ""))], ""
+    )
