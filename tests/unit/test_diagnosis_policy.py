@@ -21,7 +21,7 @@ SETS = {
 def misfit(left, scales):
     """Sum of logarithms over the channels, with the leak from the others."""
     above = [max(x, 0.0) for x in left]
-    return sum(log(1.0 + (x + 0.05 * (sum(above) - x)) / s) for x, s in zip(above, scales, strict=True))
+    return sum(log(1.0 + (x + 0.02 * (sum(above) - x)) / s) for x, s in zip(above, scales, strict=True))
 
 
 def test_the_probabilities_are_those_of_the_decision():
