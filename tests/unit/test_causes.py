@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import subprocess
@@ -201,3 +202,13 @@ def test_the_page_says_first_where_another_method_is_ahead(small):
     assert "No other method is ahead" in page_text(
         [score(small, check(small), answers, "ours", About("", ""))], ""
     )
+
+
+def test_the_published_metadata_belongs_to_the_published_seal():
+    folder = EXAMPLES.parent / "v1"
+    seal = (folder / "seal.json").read_bytes()
+    croissant = json.loads((folder / "croissant.json").read_text())
+    assert croissant["distribution"][0]["sha256"] == hashlib.sha256(seal).hexdigest()
+    assert len(json.loads(seal)["campaigns_sha256"]) == 206
+    for path in (EXAMPLES.parent / "results").glob("*.json"):
+        assert json.loads(path.read_text())["key_sha256"] == json.loads(seal)["key_sha256"], path
