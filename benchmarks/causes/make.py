@@ -82,7 +82,7 @@ def make(
 
 def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
     """Simulate and write some campaigns; their number."""
-    from diagnosis.blind.make import _written  # what the reader refuses is drawn again, as in blind sets
+    from diagnosis.blind.make import written  # what the reader refuses is drawn again, as in blind sets
     from tunnel_reference.make import simulate_set, truth_of
 
     first, seed, counts = task
@@ -93,7 +93,7 @@ def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
         for one, simulated in zip(chunk, simulate_set([one.draw for one in chunk]), strict=True):
             folder = out / CAMPAIGNS / one.name
             shutil.rmtree(folder, ignore_errors=True)
-            truths[one.name] = {**truth_of(_written(simulated, folder, False)), "track": one.track}
+            truths[one.name] = {**truth_of(written(simulated, folder, False)), "track": one.track}
         write_document(done, truths)
     return len(chunk)
 

@@ -104,14 +104,26 @@ def _write_campaigns(
     for start in range(0, count, CHUNK):
         for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
             name = f"c{len(truths) + 1:0{width}d}"
-            truths[name] = truth_of(_written(simulated, folder / name, show_steps))
+            truths[name] = truth_of(written(simulated, folder / name, show_steps))
             if progress is not None:
                 progress(len(truths), count)
     return truths
 
 
-def _written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
-    """The campaign that was written: one that the reader refuses, as for too few cycles, is drawn again."""
+def written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
+    """Write a simulated campaign; one that the reader refuses, as for too few cycles, is drawn again.
+
+    Args:
+        simulated: the campaign.
+        folder: to write, named as the campaign is to be.
+        show_steps: whether the steps of a second simulation are shown.
+
+    Returns:
+        The campaign that was written.
+
+    Raises:
+        TunnelError: when the reader refuses several draws in turn.
+    """
     for attempt in range(ATTEMPTS):
         try:
             write_campaign(as_campaign(simulated, folder.name), folder)

@@ -1,9 +1,9 @@
-"""LISDD's recipe (arXiv 2606.23215) as far as its abstract defines it, on the residual moment.
+"""LISDD's recipe (arXiv 2606.23215) from a summary of it, on the residual moment.
 
 Localise: the regimes of the motion in which the residual exceeds the noise. Identify: among the terms that
 act there, the set of up to three that predicts a held-out third best, by trying all. Decide: F-tests of its
 terms on a third that neither chose them nor fitted them, with the false-discovery rate controlled (Benjamini and
-Hochberg 1995). What the abstract leaves open is chosen here and said in `ABOUT`.
+Hochberg 1995). What the summary leaves open is chosen here and said in `ABOUT`.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ ABOUT = About(
     f"terms with {ACTS:g} of their "
     f"power there; all sets of up to {MOST}, a larger one where it leaves {GAIN:g} of the gap less on "
     f"the held-out third; "
-    f"thirds by blocks of 1/{BLOCKS} of a run; F-tests at a false-discovery rate of {LEVEL}; our reading "
-    f"of the abstract",
+    f"thirds by blocks of 1/{BLOCKS} of a run; F-tests at a false-discovery rate of {LEVEL}; from a "
+    f"summary of the recipe, not from its authors' program",
     (*NAMES, UNKNOWN),
     NOT_SEEN,
 )
