@@ -51,7 +51,7 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             raise TunnelError(
                 f"the run {why}, which is not diagnosed yet",
                 where=f"{campaign.name}, run '{run.id}'",
-                remedy="identify it with output_error, or leave the run out",
+                remedy="leave the run out",
             )
     mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
     if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):

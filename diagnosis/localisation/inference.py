@@ -118,7 +118,10 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         return Finding(
             "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
         )
-    return _by_band(nominal, found, condition) or _between_runs(nominal, found) or _by_drift(found)
+    decided = _by_band(nominal, found, condition) or _between_runs(nominal, found)
+    if decided is None and all(run.drive is not None for run in nominal.problem.data.runs):
+        return Finding(None, "every run is driven, so that no decay shows it")
+    return decided or _by_drift(found)
 
 
 def _by_band(nominal: Fit, found: Survey, condition: str | None) -> Finding | None:

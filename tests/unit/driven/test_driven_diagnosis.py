@@ -71,6 +71,8 @@ def test_cubic_stiffness_is_named() -> None:
     found = diagnose(campaign(2.0, stated=None), kinds=kinds)
     assert found.causes == ("cubic_stiffness",)
     assert found.gap.closed > 0.95
+    assert found.where.words is not None
+    assert "along the decay" not in found.where.words
 
 
 def test_a_moving_root_is_refused_in_one_line() -> None:
