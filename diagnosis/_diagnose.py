@@ -17,6 +17,13 @@ from diagnosis.answer.own_units import in_own_units
 from diagnosis.answer.where import localise
 from diagnosis.attribution.decide import UNKNOWN
 from diagnosis.detection.comparable import comparable_runs
+from diagnosis.detection.driven import (
+    NOT_SOUGHT,
+    gain_words,
+    kinds_for,
+    refuse_undiagnosable,
+    refuse_without_resonance,
+)
 from diagnosis.detection.limit_cycles import diagnosable
 from diagnosis.detection.noise_remarks import noise_remarks
 from diagnosis.detection.own_model import SLIDE, reach, with_law
@@ -60,13 +67,7 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
-    driven = next((run.id for run in campaign.runs if run.drive is not None), None)
-    if driven is not None:
-        raise TunnelError(
-            "the run is driven, and driven runs are not diagnosed yet",
-            where=f"{campaign.name}, run '{driven}'",
-            remedy="identify it with output_error, or leave the driven runs out",
-        )
+    refuse_undiagnosable(campaign, own_model=model is not None)
     kinds = known_effects() if kinds is None else kinds
     campaign = campaign if model is None else with_law(campaign, model.law)
     with answering_with(kinds):
@@ -107,12 +108,15 @@ def _diagnose(
     found = diagnosable(campaign)
     if not found.limit_cycles:
         refuse_hopeless(found.campaign)
+        refuse_without_resonance(found.campaign)
     campaign, left_out = comparable_runs(found.campaign)
     if campaign.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
         said = f"A second mode is the only effect of the sensor that is tried on {campaign.sensor.quantity}s."
         left_out = (*left_out, said)
+    kinds, said_of_drive = kinds_for(campaign, kinds)
+    left_out = (*left_out, *said_of_drive)
     if campaign.law is not None and campaign.law.slide:
         left_out = (*left_out, SLIDE)
     try:
@@ -127,15 +131,19 @@ def _diagnose(
     where, maps = localise(study)
     remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
     patched, unpatched = (None, ()) if model is None else _patched(study, model)
+    left_out = (*left_out, *gain_words(campaign, study.chosen))
     assembled = assemble(study, where, maps, (*left_out, *unpatched), patched, known)
     sized = replace(assembled, remarks=remarks, sizes=cause_sizes(study) if study.named else ())
     sized = replace(sized, data=found.campaign)
     answer = in_own_units(sized, study.similarity)
     if found.limit_cycles:
         return limit_cycle_answer(answer, found.remarks)
-    if progress is not None:
-        progress("what no effect explains")
-    answer = _with_closable(answer, study)
+    if said_of_drive:  # its laws are sought along free decays
+        answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
+    else:
+        if progress is not None:
+            progress("what no effect explains")
+        answer = _with_closable(answer, study)
     # below one half a set of effects comes first, though each of them may be less probable than none
     odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
     likeliest = max(odds, key=odds.__getitem__, default="")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,7 +32,9 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
 
 
 def _size(study: Study, fit: Fit, kind: type[Effect]) -> CauseSize | None:
-    problem, data = fit.problem, fit.problem.data
+    problem = fit.problem
+    data = problem.data.undriven()
+    problem = replace(problem, data=data)
     runs = range(len(data.runs))
     shown = [i for i in runs if data.runs[i].wind_on] if kind.condition == "wind_on" else []
     # the softest spring, where a moment of any size does most

@@ -19,10 +19,12 @@ from diagnosis.fitting.problem import (
 from diagnosis.fitting.run_data import RunData
 from diagnosis.policy import CONFIRMATION_TOLERANCE
 from diagnosis.result import Confirmation
-from tunnel_sim.physics.run_settings import Motion, released_by_spring_end
+from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +111,9 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
     """Block means of the reading that the MuJoCo model predicts.
 
-    Effects of the sensor act on every sample before it is averaged; the fits, which average first, only
-    approximate that.
+    The MuJoCo model does not take the input of a driven run, which the forward integrator predicts in the same
+    short steps. Effects of the sensor act on every sample before it is averaged; the fits, which average first,
+    only approximate that.
 
     Args:
         common: common parameters of every run, shape (runs, common).
@@ -130,12 +133,22 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
         by_interval.setdefault(case.run.interval, []).append(case)
     blocks: dict[str, Array] = {}
     for interval, group in by_interval.items():
-        motions = simulate_motions(
-            campaign_rig(problem.data), [case.physics for case in group], 1.0 / interval
-        )
-        for case, motion in zip(group, motions, strict=True):
+        rig = campaign_rig(problem.data)
+        free = [case for case in group if case.run.drive is None]
+        motions = simulate_motions(rig, [case.physics for case in free], 1.0 / interval) if free else ()
+        for case, motion in zip(free, motions, strict=True):
             blocks[case.run.id] = case.reading(motion)
+        for case in group:
+            if case.run.drive is not None:
+                blocks[case.run.id] = case.reading(_driven_motion(rig, case.physics, interval))
     return [blocks[run.id] for run in problem.data.runs]
+
+
+def _driven_motion(rig: Rig, physics: RunSettings, interval: float) -> Motion:
+    try:
+        return forward_motion(rig, physics, 1.0 / interval)
+    except ValueError as error:
+        raise TunnelError(str(error), remedy="do not rely on the fitted parameters") from error
 
 
 class _Case:

@@ -49,8 +49,8 @@ def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
 
     Returns:
         Ids by group. Runs with the same wind and spring go to different groups, and the runs kept always include
-        every spring, wind-off runs and wind-on runs: the others could not be predicted without them. The only run
-        of its kind is in no group.
+        every spring, wind-off runs, wind-on runs and an input of unknown gain: the others could not be predicted
+        without them. The only run of its kind is in no group.
     """
     order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
     free = [run for run in order if _covers(data, [run])]
@@ -71,6 +71,8 @@ def _covers(data: Data, left_out: list[RunData]) -> bool:
     """Whether the other runs have every spring, and wind on and off, as all runs have."""
     gone = {run.id for run in left_out}
     kept = [run for run in data.runs if run.id not in gone]
+    if {run.gain_free for run in data.runs} != {run.gain_free for run in kept}:
+        return False
     springs = {run.spring_stiffness for run in data.runs} == {run.spring_stiffness for run in kept}
     return springs and {run.wind_on for run in data.runs} == {run.wind_on for run in kept}
 

@@ -77,6 +77,8 @@ def planned_run(
         duration=duration,
         start=0.0,
         samples=None,
+        drive=None,
+        gain_free=False,
     )
 
 

@@ -40,9 +40,10 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
     Returns:
         A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
         the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
-        its first quarter.
+        its first quarter. Driven runs are left out.
     """
-    return tuple(words for run in campaign.runs if (words := _second_mode(run.id, run.record)))
+    free = [run for run in campaign.runs if run.drive is None]
+    return tuple(words for run in free if (words := _second_mode(run.id, run.record)))
 
 
 def left_vectors(values: Array) -> Array:

@@ -99,7 +99,7 @@ BLIND_SPOTS = (
 
 
 def blind_spots(
-    *, springs: int, speeds: int, wind_off: bool, wind_on: bool, normalised: bool
+    *, springs: int, speeds: int, wind_off: bool, wind_on: bool, normalised: bool, driven: bool = False
 ) -> tuple[str, ...]:
     """What these runs cannot show.
 
@@ -109,9 +109,10 @@ def blind_spots(
         wind_off: whether there are runs with the wind off.
         wind_on: whether there are runs with the wind on.
         normalised: whether the stiffness is not stated.
+        driven: whether there are driven runs.
 
     Returns:
-        Clauses; those that apply to every free decay come last.
+        Clauses; those that apply to every campaign come last.
     """
     found = []
     if normalised:
@@ -128,4 +129,7 @@ def blind_spots(
         )
     if wind_on and not wind_off:
         found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
+    if driven:
+        found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
+        return (*found, *BLIND_SPOTS[1:])
     return (*found, *BLIND_SPOTS)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from statistics import median
 
-from diagnosis.fitting.similarity import frequency
+from diagnosis.fitting.similarity import free_frequency
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
@@ -64,11 +64,9 @@ def _in_another_mode(runs: Sequence[Run]) -> list[Run]:
     still: dict[float | None, list[float]] = defaultdict(list)
     for run in runs:
         if not run.wind_on:
-            still[run.spring_stiffness].append(frequency(run.record))
+            still[run.spring_stiffness].append(free_frequency(run))
     windy = [run for run in runs if run.wind_on and run.spring_stiffness in still]
-    return [
-        run for run in windy if frequency(run.record) > ANOTHER_MODE * median(still[run.spring_stiffness])
-    ]
+    return [run for run in windy if free_frequency(run) > ANOTHER_MODE * median(still[run.spring_stiffness])]
 
 
 def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
@@ -92,7 +90,7 @@ def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
 
 def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
     """Groups of runs with about the same frequency, lowest first."""
-    found = sorted(((frequency(run.record), run) for run in runs), key=lambda pair: pair[0])
+    found = sorted(((free_frequency(run), run) for run in runs), key=lambda pair: pair[0])
     groups = [[found[0][1]]]
     for (last, _), (now, run) in itertools.pairwise(found):
         if now > SAME_SPRING * last:

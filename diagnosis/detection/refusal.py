@@ -20,6 +20,8 @@ def refuse_hopeless(campaign: Campaign) -> None:
         TunnelError: for the first such run.
     """
     for run in campaign.runs:
+        if run.drive is not None:
+            continue
         status = identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
         if status in _HOPELESS:
             what, _, remedy = status.value.partition(": ")

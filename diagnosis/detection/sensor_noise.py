@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from diagnosis.detection.driven_noise import driven_variance
 from diagnosis.detection.noise_colour import Colour
 from diagnosis.detection.scattered_noise import scattered_variance
 from diagnosis.fitting.prepare import BLOCK_INTERVAL
 from diagnosis.fitting.run_data import Data
 from diagnosis.fitting.similarity import frequency
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
-from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
@@ -166,9 +167,16 @@ def campaign_noise(campaign: Campaign) -> Noise:
         standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
     """
     fastest = max((frequency(run.record) for run in campaign.runs if not run.record.uniform), default=None)
-    measured = {run.id: estimate_variance(run.record, fastest) for run in campaign.runs}
+    measured = {run.id: _measured(run, fastest) for run in campaign.runs}
     found = _stated_or_estimated(campaign, measured)
     return replace(found, measured={run: value for run, (value, _) in measured.items()})
+
+
+def _measured(run: Run, fastest: float | None) -> tuple[float, float]:
+    """Variance of a run's noise, rad², and its relative standard deviation."""
+    if run.drive is None:
+        return estimate_variance(run.record, fastest)
+    return driven_variance(run.record.yaw_rad, run.drive.values, _FLOOR_FROM / run.record.sample_rate)
 
 
 def _stated_or_estimated(campaign: Campaign, measured: Mapping[str, tuple[float, float]]) -> Noise:
@@ -320,8 +328,11 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
     Returns:
         Trends of the variance of fourth divided differences of the reading in windows of 20 ms, pooled over the
         runs that are not shorter than five windows. Their null distribution is simulated
-        (`diagnosis.detection.noise_under_null`).
+        (`diagnosis.detection.noise_under_null`). Not judged where a run is driven: its motion may be as fast as the
+        noise.
     """
+    if any(run.drive is not None for run in campaign.runs):
+        return NoiseTrend(0.0, 0.0, 0.0, judged=False)
     long = [run.record for run in campaign.runs if run.record.duration > _SHORTEST]
     values = trend_statistics([(record.yaw_rad[None], _sample_times(record)) for record in long])
     if values is None:

@@ -9,6 +9,8 @@ import numpy as np
 
 from diagnosis.fitting.normal_equations import Products, damped_step, normal_equations
 from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.run_data import Data
+from diagnosis.fitting.similarity import REFERENCE_STIFFNESS
 from tunnel_sim.vocabulary.record import Array
 
 _MAX_ITERATIONS = 25
@@ -273,6 +275,7 @@ def difference_steps(problem: Problem, common: Array) -> Array:
         "cn_beta": _AIR_STIFFNESS / stiffness_load,
         "cn_r": _AIR_DAMPING / damping_load,
         "zero": 1.0,
+        "drive_gain": _gain_scale(data),
     }
     for kind in problem.effects:
         for info in kind.parameters():
@@ -284,6 +287,14 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     _, upper = problem.bounds
     steps[common + steps > upper] *= -1.0
     return steps
+
+
+def _gain_scale(data: Data) -> float:
+    """A small gain of the input, by what it does on the reference spring, N m per unit."""
+    largest = max(
+        (float(np.max(np.abs(r.drive.values))) for r in data.runs if r.drive is not None), default=1.0
+    )
+    return 1e-2 * REFERENCE_STIFFNESS * data.swing / largest
 
 
 def sensitivities(

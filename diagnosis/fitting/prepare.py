@@ -9,6 +9,7 @@ import numpy as np
 from diagnosis.fitting.run_data import Data, RunData
 from diagnosis.fitting.samples import Samples
 from diagnosis.fitting.similarity import AS_MEASURED, Similarity
+from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 #: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
@@ -39,15 +40,20 @@ def prepare(
     rig = campaign.rig
     held = {} if campaign.law is None else campaign.law.held
     dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
+    runs = (
+        _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval, dense=dense)
+        for run in campaign.runs
+    )
+    normalised = any(run.spring_stiffness is None for run in campaign.runs)
     return Data(
         runs=tuple(
-            _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval, dense=dense)
-            for run in campaign.runs
+            data if run.drive is None else _driven(data, run, normalised=normalised)
+            for data, run in zip(runs, campaign.runs, strict=True)
         ),
         frontal_area=rig.frontal_area or similarity.area,
         reference_length=rig.reference_length or similarity.time,
         width=rig.width or 0.0,
-        normalised=any(run.spring_stiffness is None for run in campaign.runs),
+        normalised=normalised,
         yaw_inertia=rig.yaw_inertia,
         own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held,
         similarity=similarity,
@@ -80,6 +86,22 @@ def _prepare_run(
         derivative=derivative,
         samples=samples,
     )
+
+
+def _driven(data: RunData, run: Run, *, normalised: bool) -> RunData:
+    """A driven run with its input.
+
+    Per unit inertia, a known moment has an unknown gain too: one over the inertia.
+    """
+    assert run.drive is not None
+    known = run.drive.column == "moment_nm" or run.drive.gain is not None
+    moment = DriveMoment(
+        run.record.time_s - run.record.time_s[0],
+        run.drive.values,
+        scale=1.0 if run.drive.gain is None else run.drive.gain,
+        held=run.drive.hold == "zero",
+    )
+    return dataclasses.replace(data, drive=moment, gain_free=normalised or not known)
 
 
 def without_start(data: Data) -> Data:

@@ -32,7 +32,7 @@ _AIR = (
     "air_density", "cn_beta", "cn_r", "moment_cubic", "damping_quadratic", "aero_lag", "flow_angle",
     "shedding_amplitude",
 )  # fmt: skip
-_POINTERS = ("wind", "forcing", "program")
+_POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,9 @@ class Problem:
         first = "stiffness" if self.data.normalised else "yaw_inertia"
         spring = () if self.data.law is None else ("added_stiffness",)
         air = ("cn_beta", "cn_r") if self.data.wind_on else ()
-        names = (first, "mechanical_damping", *spring, *air, *(() if self.data.own_zeros else ("zero",)))
+        gain = ("drive_gain",) if self.data.gain_free else ()
+        zero = () if self.data.own_zeros else ("zero",)
+        names = (first, "mechanical_damping", *spring, *air, *gain, *zero)
         return tuple(name for name in names if name not in self._held)
 
     @cached_property
@@ -192,6 +194,7 @@ class Problem:
             duration=run.duration,
             parameters={} if law is None else {"friction_moment": law.friction},
             program=self.data.program,
+            drive=run.moment(value.get("drive_gain", 1.0)),
         )
 
     def chain(
@@ -279,7 +282,8 @@ class _Job:
         physics = released_by_spring_end(self.chain.physics())
         if problem.rod_followed:
             physics = condensed(physics, problem.data)
-        slow = None if problem.rod_followed else slow_motion(physics, rig)
+        driven = physics.drive is not None
+        slow = None if problem.rod_followed or driven else slow_motion(physics, rig)
         self.ringing = None if slow is None else slow.ringing
         if slow is None:
             self.row, self.keep_alive = forward_run(physics)
@@ -289,10 +293,11 @@ class _Job:
         self.blocks = run.reading.size + blocks_beyond(physics, run)
         substeps = fit_substeps(physics, run.interval)
         # a derivative of the angle would show where steps are joined
-        rough = substeps > 1 or physics.rod_twist is not None or run.derivative > 0
+        rough = substeps > 1 or physics.rod_twist is not None or run.derivative > 0 or driven
         stride = 1 if rough else fit_stride(rig, physics, run.interval)
-        law = physics.law(rig)
-        law, step = compensated(law, run.wind_speed, stride * run.interval / substeps)
+        law, step = physics.law(rig), stride * run.interval / substeps
+        if not driven:  # a longer step would shift the motion against its input
+            law, step = compensated(law, run.wind_speed, step)
         if physics.wind_speed == 0.0 and not physics.series:
             law |= dict.fromkeys(_AIR, 0.0)
         self.steps = substeps, stride

@@ -12,7 +12,7 @@ from diagnosis.fitting.samples import Samples, hermite_basis, hermite_means
 from diagnosis.fitting.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.fitting.whitening import WHITE, colour, colouring, response, whiten
 from tunnel_sim.physics.expression import Expression, parse
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
@@ -46,6 +46,8 @@ class RunData:
         whitening: filter that makes the noise of the block means white, its first tap 1, shape (order + 1,).
         innovations: numerator and denominator of the filter that then makes the response to a random moment white,
             which begins at rest with the run; None where there is no such moment.
+        drive: the moment of a driven run, its times since the start of the record; None of a free decay.
+        gain_free: whether the common gain multiplies that moment.
     """
 
     id: str
@@ -62,11 +64,41 @@ class RunData:
     samples: Samples | None = None
     whitening: Array = field(default_factory=lambda: WHITE)
     innovations: tuple[Array, Array] | None = None
+    drive: DriveMoment | None = None
+    gain_free: bool = False
 
     @property
     def conditions(self) -> tuple[object, ...]:
-        """What the moment law and its integration depend on: spring, wind and sampling."""
-        return self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
+        """What the moment law and its integration depend on: spring, wind, sampling and input."""
+        free = self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
+        return free if self.drive is None else (*free, id(self.drive), self.start)
+
+    def moment(self, gain: float) -> DriveMoment | None:
+        """The moment of the input from the first block on; None of a free decay.
+
+        Args:
+            gain: that multiplies it where it is not known.
+        """
+        if self.drive is None:
+            return None
+        scale = self.drive.scale * (gain if self.gain_free else 1.0)
+        first = max(round(self.start / self.interval) * self.block - 1, 0)
+        seen = slice(first, first + (self.reading.size + 1) * self.block + 2)
+        return dataclasses.replace(
+            self.drive,
+            time_s=self.drive.time_s[seen],
+            values=self.drive.values[seen],
+            scale=scale,
+            delay=self.drive.delay - self.start,
+        )
+
+    @property
+    def input_means(self) -> Array:
+        """Block means of the input of a driven run, shape (n,), in its own unit."""
+        assert self.drive is not None
+        first = round(self.start / self.interval) * self.block
+        values = self.drive.values[first : first + self.reading.size * self.block]
+        return np.asarray(values.reshape(-1, self.block).mean(axis=1), np.float64)
 
     @property
     def wind_on(self) -> bool:
@@ -255,6 +287,8 @@ class Data:
             then keeps its aerodynamic parameters.
         similarity: how the campaign was made from the measured one.
         law: of the joint in a model of one's own; None: spring and damper.
+        driven: whether the runs are part of a campaign with an input of unknown gain, though none of these may
+            have one: the model then keeps the gain.
     """
 
     runs: tuple[RunData, ...]
@@ -267,6 +301,12 @@ class Data:
     windy: bool = False
     similarity: Similarity = AS_MEASURED
     law: JointLaw | None = None
+    driven: bool = False
+
+    @property
+    def gain_free(self) -> bool:
+        """Whether any run of the campaign has an input of unknown gain."""
+        return self.driven or any(run.gain_free for run in self.runs)
 
     @cached_property
     def program(self) -> tuple[float, ...]:
@@ -320,7 +360,13 @@ class Data:
         Args:
             runs: some of the runs, or further ones.
         """
-        return dataclasses.replace(self, runs=runs, windy=self.wind_on)
+        return dataclasses.replace(self, runs=runs, windy=self.wind_on, driven=self.gain_free)
+
+    def undriven(self) -> Data:
+        """The same runs as free decays, whose model has the same parameters."""
+        if all(run.drive is None for run in self.runs):
+            return self
+        return self.with_runs(tuple(dataclasses.replace(r, drive=None, gain_free=False) for r in self.runs))
 
     def subset(self, keep: tuple[str, ...]) -> Data:
         """The runs of the given ids.

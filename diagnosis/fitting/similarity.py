@@ -14,8 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.signal.driven import driven_start
 from identification.signal.frequency import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
 from tunnel_sim.vocabulary.units import dimension
@@ -104,7 +106,7 @@ def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
         stated the inertia is 1 before and after.
     """
     still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
-    time = float(np.median([frequency(run.record) for run in still])) / REFERENCE_FREQUENCY
+    time = float(np.median([free_frequency(run) for run in still])) / REFERENCE_FREQUENCY
     springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
     normalised = len(springs) < len(campaign.runs)
     moment = time**-2 if normalised else REFERENCE_STIFFNESS / float(np.median(springs))
@@ -136,6 +138,23 @@ def frequency(record: Record) -> float:
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     size = _PADDING * swing.size
     return peak_of_swing(swing, size) * record.sample_rate / size
+
+
+def free_frequency(run: Run) -> float:
+    """The frequency at which a run would swing freely.
+
+    Returns:
+        That of its decay, Hz; of a driven run, whose motion may follow its input, that of the resonance between
+        them, or of the peak of the motion where they show none.
+    """
+    found = (
+        None if run.drive is None else driven_start(run.record.time_s, run.record.yaw_rad, run.drive.values)
+    )
+    return (
+        frequency(run.record)
+        if found is None or found[1] <= 0.0
+        else float(np.sqrt(found[1])) / (2.0 * np.pi)
+    )
 
 
 def _rig(rig: RigProperties, change: Similarity) -> RigProperties:
@@ -183,4 +202,12 @@ def _run(run: Run, change: Similarity) -> Run:
         run,
         record=record,
         spring_stiffness=None if spring is None else spring * change.moment,
+        drive=None if run.drive is None else _drive(run.drive, change),
     )
+
+
+def _drive(drive: Drive, change: Similarity) -> Drive:
+    """An input, whose own times are those of its record."""
+    if drive.column == "drive":
+        return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
+    return dataclasses.replace(drive, values=drive.values * change.similar(1.0, "N m"))

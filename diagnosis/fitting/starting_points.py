@@ -17,6 +17,7 @@ from diagnosis.fitting.run_data import Data, RunData, departure
 from diagnosis.fitting.spectra import Line, mains_line, shedding_line
 from diagnosis.policy import GROSS_MISFIT
 from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.driven import driven_start
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.effects import Effect
@@ -38,6 +39,8 @@ def decays_start(data: Data) -> Point | None:
     Returns:
         As `nominal_start`; None where a run has no decay of its own.
     """
+    if any(run.drive is not None for run in data.runs):
+        return None
     decays = []
     for run in data.runs:
         record = Record(run.times, run.reading)
@@ -53,14 +56,19 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     """A starting point for the nominal model.
 
     Args:
-        decays: of the runs, where they are known; else their frequencies are those of their spectra.
+        decays: of the runs, where they are known; else their frequencies are those of their spectra, or of a
+            driven run that of the resonance between input and motion.
 
     Returns:
         Inertia and aerodynamic stiffness by linear regression of the runs' frequencies, a small damping, and
         the releases from the first samples.
     """
+    driven = [None if run.drive is None else _driven_start(run) for run in data.runs]
     omega2 = np.array(
-        [(2.0 * np.pi * _frequency(run)) ** 2 for run in data.runs]
+        [
+            (2.0 * np.pi * _frequency(run)) ** 2 if response is None else response[1]
+            for run, response in zip(data.runs, driven, strict=True)
+        ]
         if decays is None
         else [decay.stiffness for decay in decays]
     )
@@ -72,11 +80,12 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     zeros = own if data.own_zeros else [common] * len(own)
     release = np.array([[np.mean(r.reading[:3]) - z, 0.0, z] for r, z in zip(data.runs, zeros, strict=True)])
     release, zero = (release, ()) if data.own_zeros else (release[:, :2], (common,))
+    found = [one for one in driven if one is not None]
+    losses = [2.0 * one[0] for one in found if one[0] > 0.0]
+    loss = float(np.median(losses)) if losses else 0.01 * float(np.sqrt(typical))
+    gain: tuple[float, ...] = (_gain_start(data, driven),) if data.gain_free else ()
     if data.normalised:
-        return Point(
-            np.array([typical, 0.01 * float(np.sqrt(typical)), *_still(data), *zero]),
-            release,
-        )
+        return Point(np.array([typical, loss, *_still(data), *gain, *zero]), release)
     spring = _seen_stiffness(data, swing)
     pressure = np.array([data.air_moment(run) for run in data.runs])
     # Kr = Izz ω² + pressure Cnβ, with equal relative errors
@@ -86,10 +95,27 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     solution = np.linalg.lstsq(design, moving, rcond=None)[0]
     inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median((spring / omega2)[moving > 0.0]))
     air = (float(solution[1]), 0.0) if data.wind_on else ()
-    damping = 0.01 * inertia * float(np.sqrt(typical))
+    damping = inertia * loss if losses else 0.01 * inertia * float(np.sqrt(typical))
+    gain = tuple(inertia * one for one in gain)
     names = Problem(dataclasses.replace(data, law=None)).nominal_names
-    start = dict(zip(names, [inertia, damping, *air, *zero], strict=True)) | {"added_stiffness": 0.0}
+    start = dict(zip(names, [inertia, damping, *air, *gain, *zero], strict=True)) | {"added_stiffness": 0.0}
     return Point(np.array([start[name] for name in Problem(data).nominal_names]), release)
+
+
+def _driven_start(run: RunData) -> tuple[float, float, float] | None:
+    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit); None where the run shows no resonance."""
+    found = driven_start(run.times, run.reading, run.input_means)
+    return None if found is None or found[1] <= 0.0 else found
+
+
+def _gain_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> float:
+    """The gain of the input per unit inertia, by its median over the runs."""
+    gains = [
+        found[2] / run.drive.scale
+        for run, found in zip(data.runs, driven, strict=True)
+        if found is not None and run.gain_free and run.drive is not None
+    ]
+    return float(np.median(gains)) if gains else 0.0
 
 
 def _seen_stiffness(data: Data, swing: Array) -> Array:

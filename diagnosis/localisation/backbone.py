@@ -62,7 +62,7 @@ def backbones(fit: Fit, starts: Sequence[float] = ()) -> list[Backbone]:
         starts: time that the fit left out at the start of every record, s; nothing where empty.
 
     Returns:
-        One per run, in order; without windows where a run decays too quickly for any.
+        One per run, in order; without windows where a run decays too quickly for any, or is driven.
     """
     return [
         _backbone(fit, i, run, starts[i] if starts else 0.0) for i, run in enumerate(fit.problem.data.runs)
@@ -71,6 +71,8 @@ def backbones(fit: Fit, starts: Sequence[float] = ()) -> list[Backbone]:
 
 def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     inertia, damping, stiffness = linear_coefficients(fit, index)
+    if run.drive is not None:
+        return _of_driven(run, Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia))
     decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
     std = float(run.noise_at(resonance(fit, index)))
     reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
@@ -93,6 +95,12 @@ def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
         None if settled is None else settled.decay.zeta,
         None if settled is None else float(np.mean((settled.residual / std) ** 2)) - 1.0,
     )
+
+
+def _of_driven(run: RunData, decay: Decay) -> Backbone:
+    none = np.zeros(0)
+    nominal = decay.omega_n / (2.0 * np.pi), decay.zeta
+    return Backbone(run.id, none, none, none, none, none, none, *nominal, None, None, None)
 
 
 def drift(curves: list[Backbone]) -> tuple[float, float]:

@@ -59,7 +59,9 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     lone = _lone_run(found)
     if lone is not None and lone not in off:
         return Finding(None, f"whether it needs wind cannot be determined from one run alone ({lone})")
-    data = replace(nominal.problem.data.subset(off), windy=False)  # without coefficients these runs lack
+    data = replace(
+        nominal.problem.data.subset(off), windy=False, driven=False
+    )  # without coefficients these runs lack
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
@@ -116,7 +118,10 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         return Finding(
             "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
         )
-    return _by_band(nominal, found, condition) or _between_runs(nominal, found) or _by_drift(found)
+    decided = _by_band(nominal, found, condition) or _between_runs(nominal, found)
+    if decided is None and all(run.drive is not None for run in nominal.problem.data.runs):
+        return Finding(None, "every run is driven, so that no decay shows it")
+    return decided or _by_drift(found)
 
 
 def _by_band(nominal: Fit, found: Survey, condition: str | None) -> Finding | None:

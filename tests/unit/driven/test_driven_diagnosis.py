@@ -1,0 +1,100 @@
+"""Driven runs in the diagnosis. The truth is the equation of motion, integrated by SciPy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from diagnosis import diagnose
+from diagnosis.fitting.least_squares import fit
+from diagnosis.fitting.prepare import prepare
+from diagnosis.fitting.problem import Point, Problem
+from diagnosis.fitting.similarity import similar_campaign
+from diagnosis.fitting.starting_points import nominal_start
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
+
+RATE, INERTIA, DAMPING, SPRING, GAIN, NOISE = 100.0, 0.1, 0.05, 16.0, 0.5, 3e-4
+TIME = np.arange(1200) / RATE
+
+
+def driven_run(name: str, seed: int, cubic: float, *, stated: float | None = SPRING) -> Run:
+    """A run driven by a multisine from 1 to 3 Hz, which is linear between its samples."""
+    rng = np.random.default_rng(seed)
+    lines = np.arange(1.0, 3.0, 1.0 / TIME[-1])
+    phases = rng.uniform(0.0, 2.0 * np.pi, lines.size)
+    values = 0.2 * np.cos(2.0 * np.pi * np.outer(TIME, lines) + phases).sum(axis=1)
+
+    def slope(t: float, y: np.ndarray) -> list[float]:
+        moment = GAIN * np.interp(t, TIME, values) - SPRING * (y[0] + cubic * y[0] ** 3) - DAMPING * y[1]
+        return [y[1], moment / INERTIA]
+
+    angle = solve_ivp(
+        slope, (0.0, TIME[-1]), [0.02, 0.0], "RK45", TIME, rtol=1e-7, atol=1e-9, max_step=0.02
+    ).y[0]
+    reading = angle + NOISE * rng.standard_normal(TIME.size)
+    return Run(name, Record(TIME, reading), 0.0, spring_stiffness=stated, drive=Drive("drive", values))
+
+
+def campaign(cubic: float, *, stated: float | None = SPRING) -> Campaign:
+    runs = tuple(driven_run(f"r{i}", i, cubic, stated=stated) for i in range(2))
+    return Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), runs)
+
+
+@pytest.mark.parametrize("stated", [SPRING, None])
+def test_the_nominal_model_of_linear_runs_is_found(stated: float | None) -> None:
+    similar, change = similar_campaign(campaign(0.0, stated=stated))
+    data = prepare(similar, {run.id: NOISE**2 for run in similar.runs}, change)
+    found = fit(Problem(data), nominal_start(data))
+    gain = change.own(found.value("drive_gain"), "N m")
+    expected = GAIN if stated is not None else GAIN / INERTIA
+    assert abs(gain / expected - 1.0) < 5e-3
+    assert abs(found.excess) < 0.15
+
+
+def test_a_part_of_a_run_keeps_its_input() -> None:
+    similar, change = similar_campaign(campaign(0.0))
+    data = prepare(similar, {run.id: NOISE**2 for run in similar.runs}, change)
+    found = fit(Problem(data), nominal_start(data))
+    later = data.with_runs(tuple(run.part(300) for run in data.runs))
+    start = Point(found.point.common, np.zeros_like(found.point.release))
+    again = fit(Problem(later), start)
+    assert abs(again.excess) < 0.15
+
+
+def test_cubic_stiffness_is_named() -> None:
+    kinds = [effect_class(name) for name in ("cubic_stiffness", "coulomb_friction", "sensor_nonlinearity")]
+    found = diagnose(campaign(2.0, stated=None), kinds=kinds)
+    assert found.causes == ("cubic_stiffness",)
+    assert found.gap.closed > 0.95
+    assert found.where.words is not None
+    assert "along the decay" not in found.where.words
+
+
+def test_a_moving_root_is_refused_in_one_line() -> None:
+    given = campaign(0.0)
+    run = given.runs[0]
+    assert run.drive is not None
+    moving = replace(run, drive=Drive("base_rad", run.drive.values))
+    with pytest.raises(TunnelError, match="spring's root"):
+        diagnose(replace(given, runs=(moving,)))
+
+
+def test_known_moments_and_free_decays_are_fitted_together() -> None:
+    given = campaign(0.0)
+    first = given.runs[0]
+    assert first.drive is not None
+    known = replace(first, drive=Drive("moment_nm", GAIN * first.drive.values))
+    omega, rate = np.sqrt(SPRING / INERTIA - (0.5 * DAMPING / INERTIA) ** 2), 0.5 * DAMPING / INERTIA
+    decay = 0.2 * np.exp(-rate * TIME) * np.cos(omega * TIME)
+    free = Run("free", Record(TIME, decay), 0.0, spring_stiffness=SPRING)
+    similar, change = similar_campaign(replace(given, runs=(known, free)))
+    data = prepare(similar, {run.id: NOISE**2 for run in similar.runs}, change)
+    found = fit(Problem(data), nominal_start(data))
+    assert "drive_gain" not in found.problem.names
+    assert abs(change.own(found.value("yaw_inertia"), "kg m2") / INERTIA - 1.0) < 1e-3
+    assert found.excess < 0.15
