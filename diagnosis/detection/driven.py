@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 from diagnosis.fitting.least_squares import Fit
 from identification.signal.driven import driven_start
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
-_NOT_TRIED = (
-    "On driven runs these effects are not tried: {}. They are defined by the release of a free decay."
-)
+_ROD = the_effect(channel="stiffness", autonomous=False)
+_NOT_TRIED = "On driven runs these effects are not tried yet: {}."
 _NOT_BY_MUJOCO = (
     "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
     "take their input."
@@ -88,17 +87,14 @@ def kinds_for(
         kinds: the effects to answer with.
 
     Returns:
-        All of them, and no sentence, where no run is driven; else those that do not depend on a release, and
+        All of them, and no sentence, where no run is driven; else those that can be fitted to driven runs, and
         sentences that name the others.
     """
     if all(run.drive is None for run in campaign.runs):
         return tuple(kinds), ()
-    kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind.name == _ROD))
+    kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
     gone = [kind.name for kind in kinds if kind not in kept]
     return kept, (*((_NOT_TRIED.format(", ".join(gone)),) if gone else ()), _NOT_BY_MUJOCO)
-
-
-_ROD = "rod_flexibility"
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:

@@ -77,7 +77,7 @@ class RunData:
         """The moment of the input from the first block on; None of a free decay.
 
         Args:
-            gain: that multiplies it where it is not known.
+            gain: of an input whose gain is not known, N m per unit of the input; of others it does not matter.
         """
         if self.drive is None:
             return None
