@@ -10,7 +10,7 @@ from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
-_ROD = the_effect(channel="stiffness", autonomous=False)
+_ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
 _NOT_BY_MUJOCO = (
     "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
