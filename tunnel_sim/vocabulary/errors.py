@@ -70,7 +70,7 @@ EXTRAS = {
     "docs": ("sphinx", "furo", "myst_nb"),
     "train": ("stable_baselines3",),
 }
-"""The modules of each extra of ``pyproject.toml``."""
+"""The modules of each extra of ``pyproject.toml`` that a command needs."""
 
 
 def library(name: str, use: str, extra: str, where: str = "") -> Any:

@@ -89,7 +89,11 @@ def test_a_command_that_lacks_its_extra_says_which(
 
 def test_the_extras_are_those_of_the_installation() -> None:
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert set(EXTRAS) == set(declared["optional-dependencies"]) - {"dev", "mutation"}
+    assert set(EXTRAS) == set(declared["optional-dependencies"]) - {
+        "dev",
+        "mutation",
+        "benchmark",
+    }  # of the source tree
     own = {module.replace("_", "-").lower() for names in EXTRAS.values() for module in names}
     assert not own & {text.split(">")[0].split("[")[0].strip().lower() for text in declared["dependencies"]}
 
