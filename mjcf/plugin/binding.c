@@ -37,15 +37,6 @@ static mjtNum wind_speed_at(const mjModel* m, const mjData* d, const vwt_ids* se
   return speed > 0 ? speed : 0;
 }
 
-// The live drive at a time within the step, N m: its moment at the step's start and its slope are live inputs.
-static mjtNum drive_at(const mjModel* m, const mjData* d, const vwt_state* state, mjtNum time, int on_end) {
-  if (m->nuserdata < VWT_DRIVE + 3 || (d->userdata[VWT_DRIVE + 2] != 0) != on_end) {
-    return 0;
-  }
-  const mjtNum start = state->started == 0 ? time : state->time;
-  return d->userdata[VWT_DRIVE] + d->userdata[VWT_DRIVE + 1] * (time - start);
-}
-
 static vwt_motion present_motion(const mjModel* m, const mjData* d, const vwt_ids* self) {
   vwt_motion now = {d->time, d->qpos[m->jnt_qposadr[self->joint]], d->qvel[self->dof], 0, 0};
   if (self->twist_dof >= 0) {
@@ -86,13 +77,13 @@ static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self,
       .lagged = p->aero_lag != 0 ? lagged_at(m, d, self, p, state, at) : 0,
       .forcing = self->forcing < 0 ? 0 : series_at(m, self->forcing, self->forcing_interval, at->time),
   };
-  return vwt_air_moment(p, &air) + drive_at(m, d, state, at->time, 0);
+  return vwt_air_moment(p, &air);
 }
 
 // The mechanism's moment, with the moment stated as an expression.
 static mjtNum mechanism_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                               const vwt_state* state, const vwt_motion* at) {
-  const mjtNum built_in = vwt_mechanism_moment(p, at->angle, at->rate) + drive_at(m, d, state, at->time, 1);
+                               const vwt_motion* at) {
+  const mjtNum built_in = vwt_mechanism_moment(p, at->angle, at->rate);
   if (self->program < 0) {
     return built_in;
   }
@@ -103,7 +94,7 @@ static mjtNum mechanism_moment(const mjModel* m, const mjData* d, const vwt_ids*
 
 static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
                               const vwt_state* state, const vwt_motion* at) {
-  return (vwt_moments){air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, state, at)};
+  return (vwt_moments){air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at)};
 }
 
 // All moments on the rod's upper end except friction, including those of MuJoCo's spring, damper and twisted rod.
@@ -182,7 +173,7 @@ void vwt_sense_moment(const mjModel* m, mjData* d, const vwt_ids* self, const vw
   vwt_parameters p;
   read_parameters(m, d, self, &p);
   const vwt_motion now = present_motion(m, d, self);
-  const mjtNum moment = air_moment(m, d, self, &p, state, &now) - drive_at(m, d, state, now.time, 0);
+  const mjtNum moment = air_moment(m, d, self, &p, state, &now);
   for (int i = 0; i < m->nsensor; i++) {
     if (m->sensor_type[i] == mjSENS_PLUGIN && m->sensor_plugin[i] == instance) {
       d->sensordata[m->sensor_adr[i]] = moment;

@@ -65,10 +65,6 @@ typedef struct {
 // The law's last parameters are attributes of joint and body: they are read there and must not be given as numerics.
 enum { VWT_OWN = VWT_INDEX_spring_stiffness };
 
-// Place in mjData.userdata of the live drive: moment at the step's start (N m), slope (N m/s), and whether it acts on
-// the rod's upper end (1) or on the body (0).
-enum { VWT_DRIVE = 1 };
-
 // Finds the ids that the instance refers to, or raises an error.
 void vwt_find_ids(const mjModel* m, int instance, vwt_ids* found);
 

@@ -40,7 +40,8 @@ void vwt_step_with_friction(Step* s, double h);
 void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at, int samples, double* angle,
               double* rate);
 
-// Runs that `vwt_forward` may integrate side by side: constant wind, rigid rod, no imposed moment or drive, no presliding.
+// Runs that `vwt_forward` may integrate side by side: constant wind, rigid rod, no imposed moment, no drive, no
+// presliding.
 enum { VWT_LANES = 4 };
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run);
 int vwt_alike(const vwt_run* one, const vwt_run* other);
