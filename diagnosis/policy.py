@@ -107,7 +107,7 @@ SET_PRICE, FORM_PRICE = 3.0, 1.0
 #: given a false sensor nonlinearity at 7e-4.
 MODEL_ERROR = 1e-3
 #: Share of what is left in the other channels that counts in a channel: an error of the phase, squared, is one of
-#: the amplitude. Tuned.
+#: the amplitude. Tuned, together with the number of the odds below, with all open records in sight (0007).
 LEAK = 0.02
 #: χ² of a channel by which a set with a needless effect may be better than one without. By chance alone two numbers
 #: lower it by more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of 900.
@@ -116,7 +116,8 @@ NEEDLESS_CHI2 = 20.0
 CHANCE_STDS = 2.0
 #: Logarithm of the odds that the effects of a set are the causes: a number, and by how much it rises with the
 #: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
-#: logistic regression on fits with and without the true effects, simulated and measured (0007).
+#: logistic regression on fits with and without the true effects, simulated and measured; the first number was
+#: raised afterwards, with all open records in sight (0007).
 UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = 0.6, 0.21, 2.0, 2.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
 #: then counts as one with two numbers less: a spring would have to soften by chance, and as much as gravity does.
