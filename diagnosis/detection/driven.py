@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.detection.driven_noise import LEAST_SAMPLES
 from diagnosis.fitting.least_squares import Fit
 from identification.signal.driven import driven_start
 from tunnel_sim.effects import Effect, the_effect
@@ -46,6 +47,13 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             why = f"is driven, and its sensor reads {campaign.sensor.quantity}s"
         elif not run.record.uniform:
             why = "is driven, and its samples are not evenly spaced"
+        elif run.record.yaw_rad.size < LEAST_SAMPLES:
+            raise TunnelError(
+                f"the run is driven and has {run.record.yaw_rad.size} samples: too few to tell its noise from its "
+                "response",
+                where=f"{campaign.name}, run '{run.id}'",
+                remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
+            )
         if why:
             raise TunnelError(
                 f"the run {why}, which is not diagnosed yet",
@@ -90,7 +98,7 @@ def kinds_for(
         All of them, and no sentence, where no run is driven; else those that can be fitted to driven runs, and
         sentences that name the others.
     """
-    if all(run.drive is None for run in campaign.runs):
+    if not campaign.driven:
         return tuple(kinds), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
     gone = [kind.name for kind in kinds if kind not in kept]

@@ -7,6 +7,10 @@ from scipy.special import gammaincinv
 
 from tunnel_sim.vocabulary.record import Array
 
+#: From here on the median is taken over eight windows or more. Simulated records of known noise then have no bias
+#: beyond chance (3 %); with 200 samples the variance is 17 % too large, and with 130 five times and more.
+LEAST_SAMPLES = 500
+
 _LINES = 24  # of a window
 _DEGREE = 2  # of the polynomials of the response to the input, and of the ends of the record
 _FROM = 0.1  # of the sampling rate: the lowest frequency used where the record allows no higher one
@@ -21,7 +25,7 @@ def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, f
     input where the body is not linear, which a median over the windows ignores as far as they are few.
 
     Args:
-        reading: shape (n,), rad.
+        reading: shape (n,), n at least `LEAST_SAMPLES`, rad.
         values: of the input at the same times, shape (n,).
         low: lowest frequency used, a share of the sampling rate.
 

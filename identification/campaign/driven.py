@@ -106,7 +106,9 @@ def _driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     tied = not run.drive.on_body  # the root's motion acts through the spring: its gain is k
     link = np.eye(3)[:, :2] + (np.eye(3, 2, -1) * [[0.0], [0.0], [1.0]]) if tied else np.eye(3)
     found = _fit([run], [link], np.array(start)[: link.shape[1]], own_zeros=True)
-    if not found.converged or not found.parameters[1] > 0.0:
+    # a record shows no resonance above half its sample rate
+    fastest = np.pi / float(np.diff(reading.time).min())
+    if not found.converged or not 0.0 < found.parameters[1] < fastest**2:
         return FittedRun(reading, None, None, RunEstimate(run.id, (Status.NOT_CONVERGED,)))
     size = link.shape[1]
     order = [0, 1, *range(size, size + _OWN), *range(2, size)]

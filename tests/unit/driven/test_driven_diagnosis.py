@@ -7,11 +7,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose
+from diagnosis.detection.driven_noise import LEAST_SAMPLES, driven_variance
 from diagnosis.fitting.least_squares import fit
 from diagnosis.fitting.prepare import prepare
 from diagnosis.fitting.problem import Point, Problem
 from diagnosis.fitting.similarity import similar_campaign
 from diagnosis.fitting.starting_points import nominal_start
+from identification.signal.driven import driven_rows
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
@@ -82,6 +84,30 @@ def test_a_moving_root_is_refused_in_one_line() -> None:
     moving = replace(run, drive=Drive("base_rad", run.drive.values))
     with pytest.raises(TunnelError, match="spring's root"):
         diagnose(replace(given, runs=(moving,)))
+
+
+def test_too_few_samples_to_tell_noise_from_response_are_refused() -> None:
+    given = campaign(0.0)
+    run, size = given.runs[0], LEAST_SAMPLES - 1
+    assert run.drive is not None
+    short = Record(run.record.time_s[:size], run.record.yaw_rad[:size])
+    cut = replace(run, record=short, drive=replace(run.drive, values=run.drive.values[:size]))
+    with pytest.raises(TunnelError, match=f"driven and has {size} samples") as caught:
+        diagnose(replace(given, runs=(cut,)))
+    assert f"{LEAST_SAMPLES} samples or more" in str(caught.value)
+
+
+def test_the_noise_of_the_shortest_record_is_that_which_was_added() -> None:
+    omega, step, found = 2.0 * np.pi * 1.6, 0.01, []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        time, given = step * np.arange(LEAST_SAMPLES), rng.normal(size=LEAST_SAMPLES)
+        response = driven_rows(time, given, 0.025 * omega, omega**2, held=False)[0]
+        level = 1e-3 * response.std()
+        variance, relative = driven_variance(response + level * rng.normal(size=time.size), given, 0.6)
+        found.append((variance / level**2 - 1.0) / relative)
+    # the mean of 40 values of unit variance: beyond this once in ten thousand
+    assert abs(np.mean(found)) < 3.9 / np.sqrt(40.0)
 
 
 def test_known_moments_and_free_decays_are_fitted_together() -> None:

@@ -187,6 +187,17 @@ def test_its_standard_deviations_are_those_of_the_scatter() -> None:
     assert 40.0 < float(np.sum(np.square(scores))) < 137.0
 
 
+@pytest.mark.parametrize("seed", [4, 7, 12, 18, 19])
+def test_a_resonance_above_half_the_sample_rate_is_no_estimate(seed: int) -> None:
+    # a moment on the body, said to be the angle of the root: without a limit these fits end at 1e7 rad/s and more
+    rng, time = np.random.default_rng(seed), np.arange(3000) / 100.0
+    given = np.sin(2.0 * np.pi * 1.5 * time) + 0.3 * rng.normal(size=time.size)
+    reading = 10.0 * driven_rows(time, given, 0.25, 100.0, held=True)[0] + 1e-4 * rng.normal(size=time.size)
+    wrong = Run("r", Record(time, reading), 0.0, 10.0, drive=Drive("base_rad", given))
+    with pytest.raises(TunnelError, match="no run could be identified"):
+        identify(Campaign("wrong", RigProperties(), SensorProperties(), (wrong,)))
+
+
 def test_a_run_without_a_spring_stated_gives_frequency_and_damping() -> None:
     free = campaign(("drive",))
     bare = replace(free, runs=(replace(free.runs[0], spring_stiffness=None),))
