@@ -129,10 +129,9 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
             frequency = refine_frequency(campaign, line)
             cleaned, noise, hum = _without_hum(campaign, frequency, noise)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
-        # a second mode is missed from the start on, and its decay is counted from there
-        # and the start of a driven run is no release
-        free = all(run.drive is None for run in campaign.runs)
-        cut = free and is_gross(nominal) and second_mode_alone(nominal, kinds) is None
+        # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
+        missed = is_gross(nominal) and not campaign.driven
+        cut = missed and second_mode_alone(nominal, kinds) is None
         if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
         nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
@@ -160,8 +159,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     """The study with sets of effects and random moments fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
     first = second_mode_alone(found.nominal, fitted) if is_gross(found.nominal) else None
-    free = all(run.drive is None for run in found.campaign.runs)  # an input holds the phase of the motion
-    if fitted and free and first is None and is_gross(found.nominal):
+    # an input holds the phase of the motion, so that no stretches are needed
+    if fitted and first is None and is_gross(found.nominal) and not found.campaign.driven:
         return _weigh_in_stretches(found, fitted, clock)
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima

@@ -118,7 +118,7 @@ def assemble(
             wind_off=any(not run.wind_on for run in data.runs),
             wind_on=data.wind_on,
             normalised=data.normalised,
-            driven=any(run.drive is not None for run in data.runs),
+            driven=data.driven,
         ),
         seconds=seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},

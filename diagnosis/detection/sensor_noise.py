@@ -331,7 +331,7 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
         (`diagnosis.detection.noise_under_null`). Not judged where a run is driven: its motion may be as fast as the
         noise.
     """
-    if any(run.drive is not None for run in campaign.runs):
+    if campaign.driven:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)
     long = [run.record for run in campaign.runs if run.record.duration > _SHORTEST]
     values = trend_statistics([(record.yaw_rad[None], _sample_times(record)) for record in long])

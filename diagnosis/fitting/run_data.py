@@ -287,8 +287,8 @@ class Data:
             then keeps its aerodynamic parameters.
         similarity: how the campaign was made from the measured one.
         law: of the joint in a model of one's own; None: spring and damper.
-        driven: whether the runs are part of a campaign with an input of unknown gain, though none of these may
-            have one: the model then keeps the gain.
+        keeps_gain: whether the runs are part of a campaign with an input of unknown gain, though none of these
+            may have one: the model then keeps the gain.
     """
 
     runs: tuple[RunData, ...]
@@ -301,12 +301,17 @@ class Data:
     windy: bool = False
     similarity: Similarity = AS_MEASURED
     law: JointLaw | None = None
-    driven: bool = False
+    keeps_gain: bool = False
+
+    @property
+    def driven(self) -> bool:
+        """Whether any of the runs has an input."""
+        return any(run.drive is not None for run in self.runs)
 
     @property
     def gain_free(self) -> bool:
         """Whether any run of the campaign has an input of unknown gain."""
-        return self.driven or any(run.gain_free for run in self.runs)
+        return self.keeps_gain or any(run.gain_free for run in self.runs)
 
     @cached_property
     def program(self) -> tuple[float, ...]:
@@ -360,11 +365,11 @@ class Data:
         Args:
             runs: some of the runs, or further ones.
         """
-        return dataclasses.replace(self, runs=runs, windy=self.wind_on, driven=self.gain_free)
+        return dataclasses.replace(self, runs=runs, windy=self.wind_on, keeps_gain=self.gain_free)
 
     def undriven(self) -> Data:
         """The same runs as free decays, whose model has the same parameters."""
-        if all(run.drive is None for run in self.runs):
+        if not self.driven:
             return self
         return self.with_runs(tuple(dataclasses.replace(r, drive=None, gain_free=False) for r in self.runs))
 

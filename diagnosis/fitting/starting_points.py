@@ -39,7 +39,7 @@ def decays_start(data: Data) -> Point | None:
     Returns:
         As `nominal_start`; None where a run has no decay of its own.
     """
-    if any(run.drive is not None for run in data.runs):
+    if data.driven:
         return None
     decays = []
     for run in data.runs:

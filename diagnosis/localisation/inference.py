@@ -59,9 +59,8 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     lone = _lone_run(found)
     if lone is not None and lone not in off:
         return Finding(None, f"whether it needs wind cannot be determined from one run alone ({lone})")
-    data = replace(
-        nominal.problem.data.subset(off), windy=False, driven=False
-    )  # without coefficients these runs lack
+    # without coefficients and a gain that these runs lack
+    data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:

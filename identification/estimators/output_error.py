@@ -73,7 +73,7 @@ class OutputError:
         """
         for run in campaign.runs:
             loads(run, campaign.rig)  # refuses a wind-on run without density before any work is done
-        if any(run.drive is not None for run in campaign.runs):
+        if campaign.driven:
             return driven_estimate(campaign, self.name)
         fitted = [
             identify_run(run, campaign.sensor, cycles_per_window=self.cycles_per_window)

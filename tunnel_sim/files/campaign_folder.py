@@ -17,12 +17,8 @@ from pydantic import Field
 
 from tunnel_sim.files.json_text import json_text
 from tunnel_sim.files.plausible import (
-    enough_cycles,
-    increasing_times,
-    plausible_run,
-    plausible_sampling,
+    checked_record,
     plausible_values,
-    same_unit,
 )
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
 from tunnel_sim.files.run_files import RUN_FORMATS, RunTableValues, read_table, table_bytes
@@ -48,7 +44,6 @@ from tunnel_sim.vocabulary.campaign import (
 )
 from tunnel_sim.vocabulary.drive import Drive, Hold, checked_drive, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.record import Array, Record
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
@@ -410,44 +405,6 @@ def _drive(run: RunTable, held: RunTableValues, where: str) -> Drive | None:
             remedy="give drive_gain of a column drive only, in N m per unit, not zero",
         )
     return Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
-
-
-def checked_record(
-    time_s: Array,
-    reading: Array,
-    column: str,
-    sensor: SensorProperties,
-    release_angle: float | None,
-    where: str,
-    *,
-    driven: bool = False,
-) -> Record:
-    """The record of a run, unless it is refused.
-
-    Args:
-        time_s: sample times, shape (n,), s.
-        reading: shape (n,), rad, rad/s or rad/s².
-        column: that the readings are from, for messages.
-        sensor: what is stated of the sensor.
-        release_angle: as stated, rad.
-        driven: whether the run has an input: it need not oscillate at a frequency of its own.
-
-    Raises:
-        TunnelError: times that do not increase, too few cycles of a free decay, or what looks like a wrong unit.
-    """
-    increasing_times(time_s, sensor.sample_rate, where)
-    angle, judged = sensor.derivative == 0, sensor.plausible is not False
-    if judged and angle:
-        same_unit(reading, column, release_angle, where)
-    record = Record(time_s, reading)
-    if driven:
-        if judged:
-            plausible_sampling(record, where, angle=angle)
-        return record
-    cycles = enough_cycles(record, where)
-    if judged:
-        plausible_run(record, cycles, where, angle=angle)
-    return record
 
 
 def _check_records(campaign: Campaign, folder: Path) -> None:

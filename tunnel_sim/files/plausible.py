@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record, count_cycles
 
@@ -100,6 +101,44 @@ def plausible_values(values: Mapping[str, Any], where: str) -> None:
         allowed = RANGES.get(key)
         if allowed is not None and value is not None:
             _check(f"{key} = {value:g} {allowed.unit}", value, allowed, where)
+
+
+def checked_record(
+    time_s: Array,
+    reading: Array,
+    column: str,
+    sensor: SensorProperties,
+    release_angle: float | None,
+    where: str,
+    *,
+    driven: bool = False,
+) -> Record:
+    """The record of a run, unless it is refused.
+
+    Args:
+        time_s: sample times, shape (n,), s.
+        reading: shape (n,), rad, rad/s or rad/s².
+        column: that the readings are from, for messages.
+        sensor: what is stated of the sensor.
+        release_angle: as stated, rad.
+        driven: whether the run has an input: it need not oscillate at a frequency of its own.
+
+    Raises:
+        TunnelError: times that do not increase, too few cycles of a free decay, or what looks like a wrong unit.
+    """
+    increasing_times(time_s, sensor.sample_rate, where)
+    angle, judged = sensor.derivative == 0, sensor.plausible is not False
+    if judged and angle:
+        same_unit(reading, column, release_angle, where)
+    record = Record(time_s, reading)
+    if driven:
+        if judged:
+            plausible_sampling(record, where, angle=angle)
+        return record
+    cycles = enough_cycles(record, where)
+    if judged:
+        plausible_run(record, cycles, where, angle=angle)
+    return record
 
 
 def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = True) -> None:

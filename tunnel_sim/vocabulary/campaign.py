@@ -154,6 +154,11 @@ class Campaign:
     description: str = ""
     law: JointLaw | None = None
 
+    @property
+    def driven(self) -> bool:
+        """Whether any run has an input."""
+        return any(run.drive is not None for run in self.runs)
+
     def __repr__(self) -> str:
         """The runs, their conditions, and where to go from here, in three lines."""
         count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"

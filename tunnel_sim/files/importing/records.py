@@ -11,7 +11,7 @@ from typing import Any
 
 import tomli_w
 
-from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, checked_record, write_campaign
+from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, write_campaign
 from tunnel_sim.files.importing.cleaning import (
     RecordPiece,
     find_runs,
@@ -32,7 +32,7 @@ from tunnel_sim.files.importing.conditions import (
 )
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.source import Source, read_source
-from tunnel_sim.files.plausible import plausible_values
+from tunnel_sim.files.plausible import checked_record, plausible_values
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.toml_input import one_line, shown, validate
 from tunnel_sim.vocabulary import limits
