@@ -22,11 +22,11 @@ from rich.console import Console
 from rich.table import Table
 
 from diagnosis import diagnose
-from diagnosis.detection.sensor_noise import campaign_noise
-from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Problem, campaign_rig
-from diagnosis.fitting.starting_points import StartingPoint, nominal_start, starting_points
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Problem, campaign_rig
+from diagnosis.likelihood.starting_points import StartingPoint, nominal_start, starting_points
+from diagnosis.noise.sensor_noise import campaign_noise
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.virtual_campaign import simulate_campaign

@@ -16,9 +16,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from diagnosis.blind.files import KEY
-from diagnosis.investigate import investigate
-from diagnosis.law.explain import closable
+from diagnosis.blind.sets import KEY
+from diagnosis.remainder.explain import closable
+from diagnosis.search.investigate import investigate
 from identification.statistics import Proportion
 from tunnel_sim.files.campaign_folder import read_campaign
 

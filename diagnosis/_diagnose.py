@@ -9,29 +9,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.answer.assemble import assemble
-from diagnosis.answer.cause_sizes import cause_sizes
-from diagnosis.answer.limit_cycles import limit_cycle_answer, refused_limit_cycles
-from diagnosis.answer.other_modes import second_modes
-from diagnosis.answer.own_units import in_own_units
-from diagnosis.answer.where import localise
-from diagnosis.attribution.decide import UNKNOWN
-from diagnosis.detection.comparable import comparable_runs
-from diagnosis.detection.driven import (
+from diagnosis.answer.assemble import assemble, localise
+from diagnosis.answer.candidates import cause_sizes
+from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
+from diagnosis.answer.units import in_own_units
+from diagnosis.diagnosable import (
     NOT_SOUGHT,
+    SLIDE,
+    comparable_runs,
+    diagnosable,
     gain_words,
     kinds_for,
+    reach,
+    refuse_hopeless,
     refuse_undiagnosable,
     refuse_without_resonance,
+    with_law,
 )
-from diagnosis.detection.limit_cycles import diagnosable
-from diagnosis.detection.noise_remarks import noise_remarks
-from diagnosis.detection.own_model import SLIDE, reach, with_law
-from diagnosis.detection.refusal import refuse_hopeless
-from diagnosis.investigate import Progress, investigate
-from diagnosis.law.explain import closable
-from diagnosis.patch import UNPATCHED
+from diagnosis.noise.gap import noise_remarks
+from diagnosis.patched import UNPATCHED
+from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
+from diagnosis.search.investigate import Progress, investigate
+from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import as_campaign
@@ -39,8 +39,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from diagnosis.patch import PatchedModel
-    from diagnosis.study import Study
+    from diagnosis.patched import PatchedModel
+    from diagnosis.search.investigate import Study
     from tunnel_sim.engine.joint_model import JointModel
 
 
@@ -168,7 +168,7 @@ def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:
 
 def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[str, ...]]:
     """The patched model, or none and a sentence that says why."""
-    from diagnosis.answer.patched_model import patched_model  # only here: MuJoCo is slow to load
+    from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
 
     try:
         return patched_model(study, model), ()

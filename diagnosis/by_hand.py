@@ -11,19 +11,17 @@ import numpy as np
 from diagnosis.answer.candidates import candidates
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.answer.next_run import separating_run
-from diagnosis.answer.own_units import own_next_run
 from diagnosis.answer.reported import excess_base
-from diagnosis.answer.subsets import one_more
-from diagnosis.answer.waterfall import both_ends
-from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.hypothesis import Hypothesis, polish, restricted
+from diagnosis.answer.units import own_next_run
+from diagnosis.answer.waterfall import both_ends, one_more
 from diagnosis.closure import share_closed
-from diagnosis.detection.comparable import comparable_runs
-from diagnosis.detection.limit_cycles import diagnosable
-from diagnosis.fitting.least_squares import Fit, FitError, fit
-from diagnosis.investigate import nominal_study
-from diagnosis.names import plain
+from diagnosis.decision import plain
+from diagnosis.diagnosable import comparable_runs, diagnosable
+from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.result import ParameterEstimate
+from diagnosis.search.hypothesis import Hypothesis, polish, restricted
+from diagnosis.search.investigate import nominal_study
+from diagnosis.search.weigh import Weighed
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -1,12 +1,80 @@
-"""How far the gap closes with each cause, and what remains after all of them, and their JSON."""
+"""How far the gap closes: in which units, with each cause, and what more could be closed; with their JSON."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from identification.printing import TextTable, significant
+from tunnel_sim.effects import known_effects
 from tunnel_sim.files.json_text import as_json
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What turns an excess into a misfit.
+
+    Args:
+        noise: standard deviation of one sample's noise, against which excesses are measured, in ``unit``.
+        swing: root mean square of the readings about the mean of each run, in ``unit``.
+        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
+    """
+
+    noise: float
+    swing: float
+    unit: str
+
+    def rms(self, excess: float) -> float:
+        """Root mean square of what a model leaves beyond the noise.
+
+        Args:
+            excess: in noise variances of a sample; below zero it is chance.
+
+        Returns:
+            In ``unit``.
+        """
+        return self.noise * math.sqrt(max(excess, 0.0))
+
+
+def unit_shown(unit: str) -> tuple[str, float]:
+    """The unit in which readings are shown to people.
+
+    Args:
+        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
+
+    Returns:
+        Its mark, and the factor on values in ``unit``.
+    """
+    return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
+
+
+def misfit_of(document: Mapping[str, Any]) -> Misfit | None:
+    """The misfit of a diagnosis' document; None where it has none, as a document of an earlier version."""
+    given = document["gap"].get("misfit")
+    return None if given is None else Misfit(given["noise"], given["swing"], given["unit"])
+
+
+def rms_shown(misfit: Misfit, excess: float) -> str:
+    """A misfit to three digits, such as ``0.134°``.
+
+    Args:
+        excess: in noise variances of a sample, a ratio.
+    """
+    mark, factor = unit_shown(misfit.unit)
+    value = factor * misfit.rms(excess)
+    return f"{significant(value, 3) if value else '0'}{mark if mark == '°' else f' {mark}'}"
+
+
+def of_swing(misfit: Misfit, excess: float) -> str:
+    """A misfit as a share of the swing in words, such as ``2.1 % of the swing``.
+
+    Args:
+        excess: in noise variances of a sample, a ratio.
+    """
+    share = 100.0 * misfit.rms(excess) / misfit.swing if misfit.swing > 0.0 else 0.0
+    return f"{significant(share, 2) if share else '0'} % of the swing"
 
 
 def share_closed(before: float, after: float) -> float:
@@ -92,3 +160,165 @@ class Rest:
     material: bool
     moves: Mapping[str, Move]
     words: str
+
+
+KINDS: Mapping[str, str] = {
+    "angle": "a moment of the angle alone",
+    "rate": "a moment of the rate alone",
+    "state": "a moment of angle and rate",
+    "wind": "a moment of angle and rate with the wind",
+    "time": "a moment in time, alike in all runs",
+    "reading": "an error of the reading, alike in all runs",
+    "line": "a steady line in the reading, of a phase of its own in every run",
+    "between": "a stiffness, damping or moment of each run's own",
+    "event": "a moment in time of each run's own",
+    "wander": "a wandering or jumping zero of each run's own",
+    "noise": "nothing smooth: the rest is noise",
+}
+"""Kinds of what may be missing, in words; ``noise`` where none of the others closes much."""
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """How much one kind could close at most.
+
+    Args:
+        kind: of `KINDS`.
+        closed: share of what is left, on readings held out of the fit; negative where the prediction is worse.
+        std: its standard deviation from the scatter of the runs, a share.
+        held_out: what was held out, in words.
+    """
+
+    kind: str
+    closed: float
+    std: float
+    held_out: str
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The missing moment, or error of the reading, where it depends on one quantity or two.
+
+    Args:
+        over: the quantities: ``angle`` (rad), ``rate`` (rad/s) or ``time`` (s).
+        places: of every quantity, where the curve is given.
+        values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or rate
+            belongs to the model's own coefficients, and is taken out.
+        std: their standard deviations, in ``unit``.
+        unit: of values and standard deviations.
+    """
+
+    over: tuple[str, ...]
+    places: tuple[tuple[float, ...], ...]
+    values: tuple[float, ...]
+    std: tuple[float, ...]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Law:
+    """A formula that explains what is missing, fitted like any other effect.
+
+    Args:
+        effect: table of an effects file that states it.
+        parameters: value and standard deviation by name, in the unit that the table states.
+        closed: share of what is left that it closes, on runs held out of the fit.
+        std: its standard deviation from the scatter of the runs, a share.
+    """
+
+    effect: Mapping[str, Any]
+    parameters: Mapping[str, tuple[float, float]]
+    closed: float
+    std: float
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name; of the parameters ``value`` and ``std``."""
+        parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
+        effect = as_json(self.effect)
+        return {"effect": effect, "parameters": parameters, "closed": self.closed, "std": self.std}
+
+
+@dataclass(frozen=True)
+class Closable:
+    """What could be closed of what the answer leaves.
+
+    Args:
+        excess: that the answer leaves in the fitted runs, in noise variances of a sample.
+        ceilings: by kind.
+        kind: the simplest that closes about as much as any, of `KINDS`.
+        words: the same in a sentence or two.
+        curve: of that kind; None where it has none.
+        law: a formula; None where none is supported.
+        events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
+    """
+
+    excess: float
+    ceilings: tuple[Ceiling, ...]
+    kind: str
+    words: str
+    curve: Curve | None = None
+    law: Law | None = None
+    events: tuple[Mapping[str, Any], ...] = field(default=())
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields, in JSON's types."""
+        return {
+            "excess": self.excess,
+            "ceilings": as_json(self.ceilings),
+            "kind": self.kind,
+            "words": self.words,
+            "events": as_json(self.events),
+            "curve": as_json(self.curve),
+            "law": as_json(self.law),
+        }
+
+
+def closable_words(document: Mapping[str, Any]) -> str:
+    """What could be closed, in words.
+
+    Returns:
+        A line; empty where there is no gap, or it was not found.
+    """
+    if found := document.get("closable"):
+        return f"What could be closed: {found['words']}"
+    rest = document.get("rest")
+    if not rest or not document["causes"]:
+        return ""
+    if not rest["significant"]:
+        return f"What could be closed: nothing beyond chance (p = {rest['p_value']:.2g})."
+    if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
+        return "What could be closed is not stated: beside a random moment any law would close something."
+    return ""
+
+
+def closable_table(document: Mapping[str, Any]) -> TextTable:
+    """How much each kind could close.
+
+    Returns:
+        A table of shares in per cent with one standard deviation; without rows where nothing remains beyond chance.
+    """
+    found = document.get("closable") or {"ceilings": ()}
+    rows = [
+        (KINDS[one["kind"]], percent(max(one["closed"], 0.0), one["std"]), one["held_out"])
+        for one in found["ceilings"]
+    ]
+    return TextTable(
+        "Share of what is left that could be closed at most",
+        ("by", "share", "held out"),
+        tuple(rows),
+        ("share",),
+    )
+
+
+def percent(share: float, std: float | None = None) -> str:
+    """A share in per cent with its standard deviation.
+
+    Args:
+        share: a fraction.
+        std: likewise; None: not given.
+
+    Returns:
+        Text such as ``94.2 ± 0.6 %``; a standard deviation beyond 100 % is not resolved further.
+    """
+    beside = "" if std is None else f" ± {min(max(100.0 * std, 0.1), 100.0):.1f}"
+    return f"{min(100.0 * share, 100.0):.1f}{beside} %"

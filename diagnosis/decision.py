@@ -6,9 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.names import plain
 from diagnosis.policy import CREDIBLE, DECIDED_FROM
 from tunnel_sim.effects import known_effects
+
+
+def plain(*names: str) -> str:
+    """Effect names as words: ``mains hum, free play and coulomb friction``."""
+    *first, last = (name.replace("_", " ") for name in names)
+    return f"{', '.join(first)} and {last}" if first else last
+
 
 Answers = Sequence[tuple[str, float]]
 _SHOWN = 5  # answers in words; the document lists all

@@ -10,10 +10,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.starting_points import unabsorbed
-from diagnosis.investigate import fit_nominal
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.starting_points import unabsorbed
+from diagnosis.search.investigate import fit_nominal
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, SensorModel, Truth

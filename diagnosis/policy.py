@@ -35,7 +35,7 @@ COLOUR_THROUGHOUT = 0.75
 #: follow the motion. Judgement: power that does would then differ by a factor of four.
 COLOUR_AMPLITUDES = 2.0
 #: Where a gap remains, the noise counts as coloured only if its spectrum beyond this multiple of the motion's
-#: frequency is. Judgement: `diagnosis.detection.gap.BANDS` count as the motion's up to there.
+#: frequency is. Judgement: `diagnosis.noise.gap.BANDS` count as the motion's up to there.
 BEYOND_THE_MOTION = 3.5
 #: Stated noise is often rounded to one digit, which changes its square by up to this factor. Arithmetic.
 ROUNDED_NOISE = 1.5

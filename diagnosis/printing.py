@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from diagnosis.closable import closable_table, closable_words
-from diagnosis.misfit import misfit_of, of_swing, rms_shown
-from diagnosis.names import plain
-from diagnosis.patch import patch_lines, patch_table
+from diagnosis.closure import closable_table, closable_words, misfit_of, of_swing, rms_shown
+from diagnosis.decision import plain
+from diagnosis.patched import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 from identification.status import Remark

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from diagnosis.closable import Closable
-from diagnosis.closure import Rest, Waterfall
+from diagnosis.closure import Closable, Misfit, Rest, Waterfall
 from diagnosis.decision import Decision, decision
-from diagnosis.misfit import Misfit
-from diagnosis.patch import PatchedModel
+from diagnosis.patched import PatchedModel
 from diagnosis.printing import diagnosis_brief, diagnosis_parts
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from diagnosis.answer.subsets import one_more
-from diagnosis.detection.comparable import comparable_runs
-from diagnosis.detection.limit_cycles import diagnosable
-from diagnosis.investigate import nominal_study
+from diagnosis.answer.waterfall import one_more
+from diagnosis.diagnosable import comparable_runs, diagnosable
+from diagnosis.search.investigate import nominal_study
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
 

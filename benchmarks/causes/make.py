@@ -20,7 +20,7 @@ import numpy as np
 import polars as pl
 
 from benchmarks.causes.tracks import REAL, SEED, TRACKS, VERSION, draw_all
-from diagnosis.blind.files import file_hash, read_document, write_document
+from diagnosis.blind.sets import file_hash, read_document, write_document
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -82,7 +82,7 @@ def make(
 
 def _make_chunk(out: Path, task: tuple[int, int, dict[str, int]]) -> int:
     """Simulate and write some campaigns; their number."""
-    from diagnosis.blind.make import written  # what the reader refuses is drawn again, as in blind sets
+    from diagnosis.blind.sets import written  # what the reader refuses is drawn again, as in blind sets
     from tunnel_reference.make import simulate_set, truth_of
 
     first, seed, counts = task

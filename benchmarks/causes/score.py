@@ -17,11 +17,9 @@ import numpy as np
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
 from benchmarks.causes.tracks import VERSION
+from diagnosis.blind.calibration import calibration, smooth_calibration
 from diagnosis.blind.cases import NAMES as COEFFICIENTS
-from diagnosis.blind.cases import Case, case
-from diagnosis.blind.found import found_by_group, inclusions
-from diagnosis.blind.smooth import smooth_calibration
-from diagnosis.blind.statistics import calibration
+from diagnosis.blind.cases import Case, case, found_by_group, inclusions
 from identification.statistics import Proportion
 from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described

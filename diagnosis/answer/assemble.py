@@ -1,4 +1,4 @@
-"""From a study to the answer: the gap on held-out runs, coefficients, rivals and text."""
+"""From a study to the answer: where, the gap on held-out runs, coefficients, rivals and text."""
 
 from __future__ import annotations
 
@@ -11,33 +11,65 @@ from typing import Any
 import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
-from diagnosis.answer.cautions import cautions
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.next_run import separating_run
-from diagnosis.answer.own_units import own_estimate
-from diagnosis.answer.pulls import coefficient_move
-from diagnosis.answer.reference_sizes import size_note, sized_coefficients
 from diagnosis.answer.reported import excess_base, gap_summary, held_out_totals, report_fits
-from diagnosis.answer.rest import rest
-from diagnosis.answer.small_swings import coefficient_names
-from diagnosis.answer.verdict import blind_spots, cnr_note, verdict
+from diagnosis.answer.small_swings import coefficient_move, coefficient_names
+from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
+from diagnosis.answer.verdict import blind_spots, cautions, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
-from diagnosis.attribution.decide import UNKNOWN, Weighed
+from diagnosis.answer.what_remains import rest
 from diagnosis.decision import decision
-from diagnosis.fitting.least_squares import Fit
-from diagnosis.localisation.maps import Maps
-from diagnosis.patch import PatchedModel
-from diagnosis.policy import RIVAL_PROBABILITY
-from diagnosis.result import (
-    Coefficients,
-    Diagnosis,
-    NoiseSummary,
-    ParameterEstimate,
-    Where,
-)
-from diagnosis.study import Study
-from tunnel_sim.effects import Effect
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.patched import PatchedModel
+from diagnosis.policy import INTERVAL_SHARE, RIVAL_PROBABILITY
+from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, ParameterEstimate, Where
+from diagnosis.search.investigate import Study, located
+from diagnosis.search.weigh import UNKNOWN, Weighed, main_effect
+from diagnosis.where.excess import bands_beyond_chance
+from diagnosis.where.maps import Maps
+from diagnosis.where.place import blow_interval
+from diagnosis.where.survey import with_answer
+from diagnosis.where.words import agreement, describe, nowhere
+from tunnel_sim.effects import Effect, effect_class
+
+
+def localise(study: Study) -> tuple[Where, Maps]:
+    """Say where the nominal model departs from the runs.
+
+    The place is that of the residuals alone. The causes only have to agree with it.
+
+    Returns:
+        The answer in fields and in words, and the maps it is read from.
+    """
+    place = located(study)
+    found = place.survey
+    answer = None if study.chosen is study.nominal else study.chosen
+    maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
+    if not study.causes:
+        return Where(None, None, words=nowhere(found)), maps
+    where = Where(
+        channel=place.channel.value,
+        condition=place.condition.value,
+        runs=place.runs,
+        time_s=blow_interval(found, INTERVAL_SHARE) or found.maps.time.interval(),
+        amplitude_rad=found.maps.amplitude.interval(),
+        frequency_hz=found.frequency_interval,
+    )
+    bands = bands_beyond_chance(found.maps.bands)
+    words = describe(where, found, bands, place.channel, place.condition)
+    return replace(where, words=f"{words} {agreement(where, _compared(study))}".rstrip()), maps
+
+
+def _compared(study: Study) -> list[type[Effect]]:
+    """The causes that have to agree with the place: the main one, and those read off the records."""
+    if not study.named:
+        return []
+    shares = {answer.effects: answer.share for answer in study.weighed}
+    main = [main_effect(study.fitted, shares)] if study.fitted else []
+    return [effect_class(name) for name in (*main, *study.read_off)]
+
 
 _CUT_RECORDS = (
     "The nominal model misses the motion grossly, so each record is used only from its second passage through the "

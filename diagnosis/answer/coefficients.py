@@ -8,26 +8,75 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
-from diagnosis.answer.determined import meant_coefficient
-from diagnosis.answer.mixture import Mixture
-from diagnosis.answer.pulls import coefficient_move
+from diagnosis.answer.candidates import meant_coefficient
 from diagnosis.answer.small_causes import Beside, alone, beside
 from diagnosis.answer.small_swings import (
     JOINT_UNITS,
+    coefficient_move,
     coefficient_names,
     coefficient_value,
     stiffness_names,
+    wind_on_runs,
 )
-from diagnosis.answer.wind_on_runs import wind_on_runs
-from diagnosis.attribution.decide import UNKNOWN
-from diagnosis.fitting.least_squares import Fit
+from diagnosis.likelihood.least_squares import Fit
 from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD, RIVAL_PROBABILITY
 from diagnosis.result import ParameterEstimate
-from diagnosis.study import Study
+from diagnosis.search.investigate import Study
+from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+_REACH = 8.5  # standard deviations beyond which a normal distribution has no probability in 64 bits
+_HALVINGS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """A mixture of normal distributions.
+
+    Args:
+        weights: their probabilities, which sum to 1, shape (n,).
+        means: in the quantity's unit, shape (n,).
+        variances: about their means, in the unit squared, shape (n,).
+    """
+
+    weights: Array
+    means: Array
+    variances: Array
+
+    @property
+    def mean(self) -> float:
+        """Mean of the mixture."""
+        return float(self.weights @ self.means)
+
+    @property
+    def between(self) -> float:
+        """Variance of the means."""
+        return float(self.weights @ (self.means - self.mean) ** 2)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation, by the law of total variance: within and between the distributions."""
+        return math.sqrt(float(self.weights @ self.variances) + self.between)
+
+    def quantile(self, share: float) -> float:
+        """The value below which the mixture has a given probability.
+
+        Args:
+            share: the probability, above 0 and below 1.
+        """
+        stds = np.sqrt(self.variances)
+        low, high = float(np.min(self.means - _REACH * stds)), float(np.max(self.means + _REACH * stds))
+        widths = np.maximum(stds, 1e-300)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            below = float(self.weights @ ndtr((middle - self.means) / widths))
+            low, high = (middle, high) if below < share else (low, middle)
+        return 0.5 * (low + high)
+
 
 _UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1", **JOINT_UNITS}
 _SOURCES = ("noise", "misfit", "small causes", "air density", "unseen form", "freed form", "rivals")
@@ -113,7 +162,7 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         mean over the answers and over the sets of small causes beside them (`diagnosis.answer.small_causes`), with
         their probabilities. The variance is that within and that between them (the law of total variance). Within,
         it is the fit's own, what is left (the scatter of the runs where it is beyond chance, or half the difference
-        between two halves of the data, `diagnosis.answer.pulls`, if that is greater), the rounding of the air
+        between two halves of the data, `diagnosis.answer.small_swings`, if that is greater), the rounding of air
         density, the part of the causes' forms that no free decay shows, and half the change made by freeing the
         forms: another family of forms may change as much. By the same rule ``unknown`` adds half the change from
         the nominal model. The central interval of 0.95 is given where it is not that of a normal distribution. No

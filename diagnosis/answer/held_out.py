@@ -1,17 +1,17 @@
-"""How far the gap closes on runs that were not used for the fit."""
+"""How far the gap closes on readings that were not used for the fit: runs, or stretches of time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.fitting.least_squares import Fit, FitError, clip, scaled_residuals
-from diagnosis.fitting.normal_equations import damped_step
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import Data, RunData
+from diagnosis.likelihood.least_squares import Fit, FitError, clip, damped_step, scaled_residuals
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array
 
 FOLDS = 3
@@ -172,3 +172,57 @@ def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list
         if before - cost < _GAIN * before:
             break
     return point, residuals
+
+
+_STRETCHES = 9  # in a run: each a ninth of it, or a cycle where the run is short
+
+Turns = Sequence[NDArray[np.int64]]
+
+
+def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
+    """In which turn every block of every run is left out of the fit.
+
+    See docs/decisions/0016-held-out-cause-by-cause.md.
+
+    Args:
+        nominal: gives the runs and their cycles.
+        ids: of the runs to divide into stretches.
+
+    Returns:
+        By run, shape (n,): the turn, or −1 in the other runs. Every third stretch is left out in the same turn.
+    """
+    found = []
+    for index, run in enumerate(nominal.problem.data.runs):
+        count = run.reading.size
+        cycles = int(run.duration * resonance(nominal, index))
+        stretches = min(max(cycles, FOLDS), _STRETCHES)
+        turn = (np.arange(count) * stretches // count) % FOLDS
+        found.append(np.where(run.id in ids, turn, -1))
+    return found
+
+
+def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
+    """Refit without each turn's stretches, and predict them. No parameter sees the readings left out.
+
+    Args:
+        whole: the fit of all blocks, from which the smaller fits start.
+        turns: from `turns_of`.
+
+    Returns:
+        By id of the runs that are divided: reading minus prediction in noise standard deviations, every block
+        predicted by the fit that has not seen it, unless that fit failed.
+    """
+    runs = whole.problem.data.runs
+    found = {
+        run.id: r.copy() for run, r, turn in zip(runs, whole.residuals, turns, strict=True) if turn[0] >= 0
+    }
+    for number in range(FOLDS if found else 0):
+        out = [turn == number for turn in turns]
+        try:
+            _, residuals = fit_seen(whole, [~left for left in out])
+        except np.linalg.LinAlgError:
+            continue
+        for run, residual, left in zip(runs, residuals, out, strict=True):
+            if left.any():
+                found[run.id][left] = residual[left]
+    return found

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.normal_equations import project_release
-from diagnosis.fitting.problem import Point
-from diagnosis.fitting.run_data import RunData
+from diagnosis.likelihood.least_squares import Fit, project_release
+from diagnosis.likelihood.problem import Point
+from diagnosis.likelihood.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
 
 _ANGLES = (0.35, 0.14)  # rad

@@ -10,11 +10,9 @@ from itertools import combinations
 
 import numpy as np
 
-from diagnosis.answer.small_swings import coefficient_gradient, coefficient_names
-from diagnosis.answer.wind_on_runs import wind_on_runs
-from diagnosis.fitting.least_squares import Fit
-from diagnosis.fitting.normal_equations import normal_equations
-from diagnosis.fitting.starting_points import StartingPoint, is_gross, project_out, starting_points
+from diagnosis.answer.small_swings import coefficient_gradient, coefficient_names, wind_on_runs
+from diagnosis.likelihood.least_squares import Fit, normal_equations
+from diagnosis.likelihood.starting_points import StartingPoint, is_gross, project_out, starting_points
 from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, OWN_EVIDENCE
 from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import Effect

@@ -4,9 +4,8 @@
 the fits use), `answer_set` diagnoses them without the key, `score_set` checks all hashes, opens the key and counts.
 """
 
-from diagnosis.blind.answer import answer_set, answers_folder
-from diagnosis.blind.make import make_blind
 from diagnosis.blind.score import Score, score_set
+from diagnosis.blind.sets import answer_set, answers_folder, make_blind
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture
 from tunnel_reference.make import parse_shares
 

@@ -9,22 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.attribution.decide import UNKNOWN
-from diagnosis.blind.answer import answers_folder
-from diagnosis.blind.cases import NAMES, Case, case, label
-from diagnosis.blind.files import (
+from diagnosis.blind.calibration import CalibrationBin, SmoothCalibration, calibration, smooth_calibration
+from diagnosis.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
+from diagnosis.blind.sets import (
     KEY,
     SEAL,
+    answers_folder,
     campaign_folders,
     file_hash,
     folder_hash,
     read_document,
     read_hashes,
 )
-from diagnosis.blind.found import Found, found_by_group, inclusions
-from diagnosis.blind.smooth import SmoothCalibration, smooth_calibration
-from diagnosis.blind.statistics import CalibrationBin, calibration
 from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
+from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
 from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described

@@ -30,11 +30,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from diagnosis import diagnose, policy
-from diagnosis import investigate as investigation
-from diagnosis.attribution import decide
-from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
-from diagnosis.fitting.channels import ChannelMisfit
+from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.policy import DECIDED_FROM
+from diagnosis.search import investigate as investigation
+from diagnosis.search import weigh as decide
+from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -27,9 +27,9 @@ sys.exit(lint_imports(no_cache=True))
 
 #: What runs the engine or Gymnasium itself and says so; no command of ``tunnel`` but its own loads it.
 ENGINE_ROOMS = (
-    "diagnosis.answer.joint_law",
-    "diagnosis.answer.native_closure",
-    "diagnosis.answer.patched_model",
+    "diagnosis.patch.joint_law",
+    "diagnosis.patch.patched_model",
+    "diagnosis.patch.patched_model",
     "tunnel_lab.envs.",
     "tunnel_lab.show.live",
     "tunnel_lab.show.live",
@@ -84,7 +84,7 @@ def test_the_import_contracts_hold() -> None:
         ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
         ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
         ("identification/statistics.py", "import identification.signal.peaks"),
-        ("diagnosis/result.py", "import diagnosis.study"),
+        ("diagnosis/result.py", "import diagnosis.search.investigate"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.run_settings"),
         ("tunnel_lab/cli.py", "import tunnel_reference.forms"),
         ("tunnel_lab/bench/work.py", "import tunnel_lab.cli"),
@@ -124,7 +124,7 @@ def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
     # Inside functions, in a process of their own where they draw; live, the engine runs in front of the user.
     shown = {f"tunnel_lab.show.{name}" for name in ("film", "live", "overlay", "stepper", "web", "window")}
     # A model of one's own, with the causes written into it, is simulated by the engine itself.
-    assert outside <= shown | {"diagnosis.patch", "diagnosis.answer.patched_model"}
+    assert outside <= shown | {"diagnosis.patched", "diagnosis.patch.patched_model"}
 
 
 def test_reading_and_identifying_a_campaign_never_imports_the_engine() -> None:

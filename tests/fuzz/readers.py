@@ -273,7 +273,7 @@ def _digest(content: bytes) -> str:
 
 
 def _seal_of_key(folder: Path, key: bytes, changed: str, rng: Rng) -> None:
-    from diagnosis.blind.files import folder_hash
+    from diagnosis.blind.sets import folder_hash
 
     seal = {"key_sha256": _digest(key), "campaigns_sha256": {"c1": folder_hash(folder / "c1")}}
     content = _json(seal, rng) if changed == "seal" and rng.random() < 0.5 else as_json(seal, rng)
@@ -281,7 +281,7 @@ def _seal_of_key(folder: Path, key: bytes, changed: str, rng: Rng) -> None:
 
 
 def _answer(folder: Path, changed: str, rng: Rng) -> None:
-    from diagnosis.blind.files import folder_hash
+    from diagnosis.blind.sets import folder_hash
 
     document = seeds.answer_document() | {"data_sha256": folder_hash(folder / "c1")}
     content = _json(document, rng) if changed == "answer" else as_json(document, rng)

@@ -13,9 +13,9 @@ import pytest
 from scipy.stats import binom
 
 from diagnosis import diagnose
-from diagnosis.blind.make import make_blind
-from diagnosis.investigate import investigate
+from diagnosis.blind.sets import make_blind
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
+from diagnosis.search.investigate import investigate
 from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_records
 from tests.reference.rigs import rig
 from tunnel_reference import draw

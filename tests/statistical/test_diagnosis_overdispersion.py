@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.attribution.random_moments import follows_the_motion, overdispersion
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.search.random_moments import follows_the_motion, overdispersion
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 

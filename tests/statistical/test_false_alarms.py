@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.detection import gap
-from diagnosis.detection.noise_under_null import level_p_value, trend_p_values
-from diagnosis.detection.sensor_noise import campaign_noise, noise_trend
-from diagnosis.fitting.prepare import prepare
-from diagnosis.investigate import fit_nominal
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.noise import gap
+from diagnosis.noise.gap import level_p_value, trend_p_values
+from diagnosis.noise.sensor_noise import campaign_noise, noise_trend
+from diagnosis.search.investigate import fit_nominal
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 

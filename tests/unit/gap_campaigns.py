@@ -6,19 +6,18 @@ import dataclasses
 
 import numpy as np
 
-from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.detection.gap import GapTest, judge
-from diagnosis.detection.mains import Hum
-from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
-from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import Data, RunData
-from diagnosis.fitting.similarity import Similarity
-from diagnosis.fitting.starting_points import nominal_start
-from diagnosis.investigate import fit_nominal
-from diagnosis.study import COARSE_STEP, HUM, Study
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.noise.gap import GapTest, judge
+from diagnosis.noise.mains import Hum
+from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import COARSE_STEP, HUM, Study, fit_nominal
+from diagnosis.search.weigh import Weighed
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record

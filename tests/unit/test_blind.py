@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.blind import answer, answer_set, answers_folder, make_blind, score_set
+from diagnosis.blind import answer_set, answers_folder, make_blind, score_set
+from diagnosis.blind import sets as answer
 from identification.statistics import Proportion
 from tests.reference.rigs import rig
 from tests.unit.gone_reader import unheard
@@ -113,7 +114,7 @@ def test_an_interrupted_making_leaves_nothing(tmp_path, monkeypatch):
     def interrupted(*_args, **_kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("diagnosis.blind.make.simulate_set", interrupted)
+    monkeypatch.setattr("diagnosis.blind.sets.simulate_set", interrupted)
     with pytest.raises(KeyboardInterrupt):
         make_blind(tmp_path / "set", count=1, seed=1)
     assert list(tmp_path.iterdir()) == []
@@ -128,7 +129,7 @@ def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch
             raise TunnelError("about 1.3 cycles of oscillation, fewer than three")
         return write_campaign(campaign, folder)
 
-    monkeypatch.setattr("diagnosis.blind.make.write_campaign", refuses_the_first)
+    monkeypatch.setattr("diagnosis.blind.sets.write_campaign", refuses_the_first)
     c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
     key = make_blind(

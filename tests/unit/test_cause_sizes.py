@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.answer.cause_sizes import cause_sizes
-from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.spectra import linear_coefficients
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.answer.candidates import cause_sizes
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import CauseSize
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from, known_effects

@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.fitting.channels import CHANNELS, misfit
-from diagnosis.fitting.spectra import resonance
+from diagnosis.likelihood.residuals import CHANNELS, misfit, resonance
 from tests.unit.gap_campaigns import campaign, nominal
 
 

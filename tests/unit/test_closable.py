@@ -11,20 +11,19 @@ import tomli_w
 from scipy.signal import lfilter
 
 from diagnosis import _diagnose, diagnose
-from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.closable import KINDS, Ceiling, closable_table, closable_words
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.spectra import linear_coefficients
-from diagnosis.fitting.starting_points import starting_points
-from diagnosis.investigate import investigate
-from diagnosis.law.ceiling import Evidence, Rest
-from diagnosis.law.explain import chosen_kind, closable
-from diagnosis.law.formula import Formula, choose, effect_of, effect_table
-from diagnosis.law.library import Term, terms
-from diagnosis.law.line import steady_line
-from diagnosis.law.paths import paths
-from diagnosis.law.ridge import Rows, best_ridge, held_out, normal, ratio, total
+from diagnosis.closure import KINDS, Ceiling, closable_table, closable_words
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.remainder.ceiling import Evidence, Rest
+from diagnosis.remainder.curve import steady_line
+from diagnosis.remainder.explain import chosen_kind, closable
+from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
+from diagnosis.remainder.paths import paths
+from diagnosis.remainder.ridge import Rows, best_ridge, held_out, normal, ratio, total
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import investigate
+from diagnosis.search.weigh import Weighed
 from tests.reference.rigs import rig
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
@@ -317,7 +316,7 @@ def test_terms_of_the_state_are_taken_where_those_of_angle_or_rate_close_less(
         name: None if gained is None else Formula((), (), False, np.zeros(0), gained)
         for name, gained in found.items()
     }
-    monkeypatch.setattr("diagnosis.law.formula._chosen", lambda _, of, __: formulas[of])
+    monkeypatch.setattr("diagnosis.remainder.formula._chosen", lambda _, of, __: formulas[of])
     expected = {"own": formulas[kind], "wider": formulas["state"], None: None}[chosen]
     assert choose(None, kind, 10.0) is expected
 
@@ -348,7 +347,7 @@ def test_the_simplest_kind_that_closes_as_much_is_chosen(common, single, kind):
 
 @pytest.mark.parametrize("kind", ["angle", "rate", "state", "wind", "time", "reading"])
 def test_every_term_has_a_unit_and_a_value(kind, detent):
-    from diagnosis.law.bases import ranges
+    from diagnosis.remainder.bases import ranges
 
     r = ranges(paths(detent[0].nominal))
     places = {"b": 0.1, "y": 0.1, "r": 1.0, "t": 2.0, "V": 20.0, "Kr": 21.0, "omega": 14.0}

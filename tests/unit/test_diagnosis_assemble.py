@@ -11,13 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.interpolate import CubicSpline
 
 from diagnosis._diagnose import diagnose, vocabulary
-from diagnosis.answer.assemble import assemble
+from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import candidates
 from diagnosis.answer.reported import excess_base
-from diagnosis.answer.where import localise
-from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.investigate import investigate
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import investigate
+from diagnosis.search.weigh import Weighed
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, with_blow
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.detection.mains import refine_frequency, remove_hum
-from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.problem import Point, Problem
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.result import ParameterEstimate
 from identification.printing import estimated
 from tests.unit.gap_campaigns import INTERVAL, NOISE, campaign, nominal

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.detection.comparable import comparable_runs
-from diagnosis.fitting.similarity import frequency
+from diagnosis.diagnosable import comparable_runs
+from diagnosis.likelihood.nondimensional import frequency
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
 from tunnel_sim.vocabulary.record import Record

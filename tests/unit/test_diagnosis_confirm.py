@@ -5,16 +5,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnosis.answer import confirm as module
-from diagnosis.answer.cautions import cautions
-from diagnosis.answer.confirm import Comparison, compare, confirm
+from diagnosis.answer import reported as module
 from diagnosis.answer.held_out import predict_held_out, refit_releases
-from diagnosis.answer.reported import report_fits
-from diagnosis.detection.sensor_noise import campaign_noise
-from diagnosis.fitting.least_squares import Fit, fit, sensitivities
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import Data, RunData
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
+from diagnosis.answer.verdict import cautions
+from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.noise.sensor_noise import campaign_noise
 from diagnosis.policy import CONFIRMATION_TOLERANCE
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from

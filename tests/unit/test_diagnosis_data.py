@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.fitting.prepare import prepare, without_start
-from diagnosis.fitting.run_data import hermite_means
+from diagnosis.likelihood.prepare import prepare, without_start
+from diagnosis.likelihood.run_data import hermite_means
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 

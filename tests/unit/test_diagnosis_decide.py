@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from diagnosis.attribution.decide import UNKNOWN, FittedSet, main_effect, misfit_scale, weigh
-from diagnosis.fitting.channels import CHANNELS, ChannelMisfit
+from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
 from diagnosis.policy import LEAK, MODEL_ERROR, RIVAL_PROBABILITY, SET_PRICE, STEEPNESS
+from diagnosis.search.weigh import UNKNOWN, FittedSet, main_effect, misfit_scale, weigh
 
 NAMES = ("a", "b", "c", "d", "e")
 COUNT = np.array([200.0, 200.0, 24.0, 24.0, 210.0, 29_000.0])

@@ -7,17 +7,19 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import lsq_linear
 
-from diagnosis.fitting.least_squares import (
+from diagnosis.likelihood.least_squares import (
     FitError,
+    bounded_step,
     clip,
     fit,
+    normal_equations,
+    project_release,
     scaled_residuals,
     sensitivities,
 )
-from diagnosis.fitting.normal_equations import bounded_step, normal_equations, project_release
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Point, Problem, condensed
-from diagnosis.fitting.starting_points import nominal_start
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Point, Problem, condensed
+from diagnosis.likelihood.starting_points import nominal_start
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import campaign, nominal

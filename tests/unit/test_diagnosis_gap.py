@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom, kstest
 
-from diagnosis.detection import gap  # its test_gap would be collected here by name
-from diagnosis.detection.sensor_noise import Noise, NoiseTrend
-from diagnosis.fitting.spectra import resonance
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.noise import gap  # its test_gap would be collected here by name
+from diagnosis.noise.sensor_noise import Noise, NoiseTrend
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from tests.unit.gap_campaigns import campaign, nominal
 

@@ -7,16 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.attribution import grow as growth
-from diagnosis.attribution.decide import weigh
-from diagnosis.attribution.grow import exchange, grow, prune, without
-from diagnosis.attribution.hypothesis import Hypothesis, with_forms
-from diagnosis.fitting.channels import ChannelMisfit, misfit
-from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.problem import Point
-from diagnosis.fitting.spectra import resonance
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.problem import Point
+from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.policy import MOST_CAUSES
+from diagnosis.search import grow as growth
+from diagnosis.search.grow import exchange, grow, prune, without
+from diagnosis.search.hypothesis import Hypothesis, with_forms
+from diagnosis.search.weigh import weigh
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from diagnosis import read_model
-from diagnosis.answer.joint_law import found_law
-from diagnosis.answer.native_closure import _left
-from diagnosis.detection.own_model import with_law
-from diagnosis.fitting.least_squares import scaled_residuals
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.similarity import similar_campaign
+from diagnosis.diagnosable import with_law
+from diagnosis.likelihood.least_squares import scaled_residuals
+from diagnosis.likelihood.nondimensional import similar_campaign
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.patch.joint_law import found_law
+from diagnosis.patch.patched_model import _left
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.detection.mains import find_hum, refine_frequency, remove_hum
-from diagnosis.fitting.spectra import mains_line
-from diagnosis.investigate import nominal_study
+from diagnosis.likelihood.residuals import mains_line
+from diagnosis.noise.mains import find_hum, refine_frequency, remove_hum
+from diagnosis.search.investigate import nominal_study
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 from tests.unit.gap_campaigns import nominal

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.next_run import planned_run, separating_run, separation
-from diagnosis.fitting.least_squares import fit, sensitivities
-from diagnosis.fitting.normal_equations import normal_equations
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.likelihood.least_squares import fit, normal_equations, sensitivities
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.starting_points import starting_points
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from diagnosis.detection.sensor_noise import (
+from diagnosis.noise.sensor_noise import (
     accuracy,
     campaign_noise,
     estimate_variance,

@@ -7,13 +7,12 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from diagnosis.detection import gap
-from diagnosis.detection.noise_colour import _steady, noise_colour
-from diagnosis.detection.noise_remarks import noise_remarks
-from diagnosis.detection.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
-from diagnosis.detection.wandering_zero import zero_wanders
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.problem import Problem
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.noise import gap
+from diagnosis.noise.colour import _steady, noise_colour, zero_wanders
+from diagnosis.noise.gap import noise_remarks
+from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.policy import COLOUR_FALSE_ALARM_RATE
 from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
 from tests.unit.test_diagnosis_process_noise import buffeted

@@ -10,11 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
-from diagnosis.detection.own_model import reach, with_law
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.similarity import similar_campaign
-from diagnosis.investigate import fit_nominal, investigate
-from diagnosis.patch import NativeClosure
+from diagnosis.diagnosable import reach, with_law
+from diagnosis.likelihood.nondimensional import similar_campaign
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.patched import NativeClosure
+from diagnosis.search.investigate import fit_nominal, investigate
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError

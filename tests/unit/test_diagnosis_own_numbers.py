@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from diagnosis.fitting.least_squares import Fit, fit
-from diagnosis.fitting.own_numbers import ringing, skip
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.per_run_parameters import ringing, skip
+from diagnosis.likelihood.starting_points import starting_points
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import Effect, effect_from

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.attribution.grow_in_stretches import _of_each, grow_in_stretches
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.fitting.least_squares import FitError, fit_at
-from diagnosis.fitting.prepare import prepare, without_long_rest, without_rest, without_start
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.spectra import resonance
-from diagnosis.fitting.starting_points import is_gross, starting_points
-from diagnosis.investigate import fit_nominal, investigate
-from diagnosis.law.bases import COMMON, SINGLE, ranges
-from diagnosis.law.paths import paths
+from diagnosis.likelihood.least_squares import FitError, fit_at
+from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.starting_points import is_gross, starting_points
+from diagnosis.remainder.bases import COMMON, SINGLE, ranges
+from diagnosis.remainder.paths import paths
+from diagnosis.search.grow import _of_each, grow_in_stretches
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import fit_nominal, investigate
 from identification import identify
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_reference import moments
@@ -219,9 +219,9 @@ def test_rests_stay_where_the_rest_of_the_runs_cannot_be_fitted(monkeypatch):
     def refuse(*_args):
         raise FitError("too short")
 
-    monkeypatch.setattr("diagnosis.investigate.fit", refuse)
+    monkeypatch.setattr("diagnosis.search.investigate.fit", refuse)
     fitted = nominal(stopped())
-    monkeypatch.setattr("diagnosis.investigate.fit_nominal", lambda _data: fitted)
+    monkeypatch.setattr("diagnosis.search.investigate.fit_nominal", lambda _data: fitted)
     found = investigate(stopped(), [effect_class("coulomb_friction")])
     assert found.rested == ()
     assert [run.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6

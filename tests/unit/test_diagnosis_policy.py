@@ -5,8 +5,8 @@ from math import exp, log
 import numpy as np
 import pytest
 
-from diagnosis.attribution.decide import FittedSet, weigh
-from diagnosis.fitting.channels import ChannelMisfit
+from diagnosis.likelihood.residuals import ChannelMisfit
+from diagnosis.search.weigh import FittedSet, weigh
 
 COUNT = np.array([100.0, 100.0, 10.0, 10.0, 110.0, 10_000.0])
 MOTION = 4e7

@@ -8,19 +8,22 @@ from scipy.linalg import expm
 from scipy.signal import lfilter, lsim
 from scipy.stats import binom
 
-from diagnosis.attribution import random_moments
-from diagnosis.attribution.grow import grow
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.attribution.innovation_tests import bursts, departure_from_white, is_steady_noise, of_all_runs
-from diagnosis.attribution.process_noise import (
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.search import random_moments
+from diagnosis.search.grow import grow
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.process_noise import (
     Spectrum,
+    bursts,
+    departure_from_white,
     fit_turbulence,
     fit_wandering_shedding,
+    is_steady_noise,
+    of_all_runs,
     with_response,
 )
-from diagnosis.attribution.random_moments import weigh_random_moments, wind_off_excess
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.search.random_moments import weigh_random_moments, wind_off_excess
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis._diagnose import diagnose, vocabulary
-from diagnosis.answer.own_units import own_parameters
-from diagnosis.answer.reference_sizes import parameter_unit, size_note, sized_coefficients
-from diagnosis.fitting.similarity import similar_campaign
+from diagnosis.answer.units import own_parameters, parameter_unit, size_note, sized_coefficients
+from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.result import ParameterEstimate
 from identification import identify
 from tests.reference import free_decays

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from diagnosis.detection.rounding import rounding_errors, with_rounding
-from diagnosis.detection.sensor_noise import (
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.residuals import misfit
+from diagnosis.noise.rounding import rounding_errors, with_rounding
+from diagnosis.noise.sensor_noise import (
     campaign_noise,
     lattice_step,
     reading_levels,
     reading_step,
     typical_step,
 )
-from diagnosis.fitting.channels import misfit
-from diagnosis.fitting.prepare import prepare
-from diagnosis.investigate import fit_nominal, investigate
+from diagnosis.search.investigate import fit_nominal, investigate
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 from tests.unit.gap_campaigns import judged

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.answer.own_units import own_next_run
-from diagnosis.fitting.similarity import (
+from diagnosis.answer.units import own_next_run
+from diagnosis.likelihood.nondimensional import (
     REFERENCE_FREQUENCY,
     REFERENCE_STIFFNESS,
     Similarity,
     frequency,
     similar_campaign,
 )
-from diagnosis.investigate import investigate
+from diagnosis.search.investigate import investigate
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting
 from tests.unit.gap_campaigns import campaign

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.attribution.hypothesis import _within
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.spectra import residual_spectra, resonance, shedding_line
-from diagnosis.fitting.starting_points import is_gross, nominal_start, project_out, starting_points
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.residuals import residual_spectra, resonance, shedding_line
+from diagnosis.likelihood.starting_points import is_gross, nominal_start, project_out, starting_points
+from diagnosis.search.hypothesis import _within
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal

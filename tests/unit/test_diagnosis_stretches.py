@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from diagnosis.attribution.grow_in_stretches import grow_in_stretches
-from diagnosis.fitting.least_squares import FitError, fit
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.similarity import REFERENCE_FREQUENCY
-from diagnosis.fitting.stretches import fit_longer, in_stretches, long_stretch, spread_out
-from diagnosis.investigate import fit_nominal
+from diagnosis.likelihood.least_squares import FitError, fit
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
+from diagnosis.likelihood.prepare import fit_longer, in_stretches, long_stretch, spread_out
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.search.grow import grow_in_stretches
+from diagnosis.search.investigate import fit_nominal
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
@@ -64,11 +64,13 @@ def test_a_stretch_moves_as_it_does_alone(kind, data):
 
 
 def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
-    monkeypatch.setattr("diagnosis.fitting.stretches._LONG", 6)  # these runs are shorter than two of eighteen
+    monkeypatch.setattr(
+        "diagnosis.likelihood.prepare._LONG", 6
+    )  # these runs are shorter than two of eighteen
     short = in_stretches(data)
     assert spread_out(short, data).places == short.places
     sizes = [run.reading.size for run in data.runs]
-    monkeypatch.setattr("diagnosis.fitting.stretches.GROWN_ON", sum(sizes) - 1)
+    monkeypatch.setattr("diagnosis.likelihood.prepare.GROWN_ON", sum(sizes) - 1)
     found, long = spread_out(short, data), long_stretch(short)
     assert {place[0] for place in found.places if place[1] == 0} == set(range(len(sizes)))
     last = {number: max(1, round(size / long)) - 1 for number, size in enumerate(sizes)}
@@ -78,8 +80,8 @@ def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
 
 
 def test_whole_runs_are_fitted_from_some_of_their_stretches(data, monkeypatch):
-    monkeypatch.setattr("diagnosis.fitting.stretches._LONG", 6)
-    monkeypatch.setattr("diagnosis.fitting.stretches.GROWN_ON", 1000)
+    monkeypatch.setattr("diagnosis.likelihood.prepare._LONG", 6)
+    monkeypatch.setattr("diagnosis.likelihood.prepare.GROWN_ON", 1000)
     short = spread_out(in_stretches(data), data)
     found, longest = fit_longer(fit_nominal(short.data), short, data)
     assert longest.data is data
@@ -96,7 +98,7 @@ def test_releases_are_taken_over_from_shorter_stretches(data, monkeypatch):
         starts.append((problem.data, start))
         return fit(problem, start, **how)
 
-    monkeypatch.setattr("diagnosis.fitting.stretches.fit", watched)
+    monkeypatch.setattr("diagnosis.likelihood.prepare.fit", watched)
     found, longest = fit_longer(first, short, data)
     sizes = [max(run.reading.size for run in runs.runs) for runs, _ in starts]
     assert sizes == sorted(sizes)
@@ -134,7 +136,7 @@ def test_a_nominal_model_that_runs_away_on_long_stretches_stays_on_short_ones(da
     def away(*_, **__):
         raise FitError
 
-    monkeypatch.setattr("diagnosis.attribution.grow_in_stretches.fit_longer", away)
+    monkeypatch.setattr("diagnosis.search.grow.fit_longer", away)
     found = grow_in_stretches(data, fit_nominal, [effect_class("quadratic_damping")])
     assert found.hypotheses == ()
     assert max(run.reading.size for run in found.nominal.problem.data.runs) == in_stretches(data).length

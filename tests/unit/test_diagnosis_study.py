@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.reported import excess_base
-from diagnosis.attribution.decide import UNKNOWN, FittedSet, Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.detection.mains import Hum
-from diagnosis.investigate import _noise_explains, _polished, _weighed
+from diagnosis.noise.mains import Hum
 from diagnosis.policy import HUM_LEFT
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.investigate import _noise_explains, _polished, _weighed
+from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
 if TYPE_CHECKING:
-    from diagnosis.fitting.least_squares import Fit
-    from diagnosis.study import Study
+    from diagnosis.likelihood.least_squares import Fit
+    from diagnosis.search.investigate import Study
 
 
 def left(share: float) -> FittedSet:
@@ -56,7 +56,7 @@ def test_the_answer_is_polished_unless_a_random_moment_gives_it(
     study: Study, monkeypatch: pytest.MonkeyPatch, random: bool
 ) -> None:
     polished = replace(study.hypotheses[0], textbook=study.nominal)
-    monkeypatch.setattr("diagnosis.investigate.polish", lambda _: polished)
+    monkeypatch.setattr("diagnosis.search.investigate.polish", lambda _: polished)
     moment = RandomAnswer(effect_class("vortex_shedding"), None, None, left(0.4))  # type: ignore[arg-type]
     found = _polished(study.hypotheses, Weighed(("vortex_shedding",), 0.5, 0.9), (moment,) if random else ())
     assert found == (study.hypotheses if random else (polished,))

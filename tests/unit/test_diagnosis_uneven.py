@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.answer.confirm import compare
-from diagnosis.detection.mains import refine_frequency, remove_hum
-from diagnosis.detection.scattered_noise import scattered_variance
-from diagnosis.detection.sensor_noise import campaign_noise
-from diagnosis.fitting.least_squares import fit, scaled_residuals
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.run_data import hermite_basis
-from diagnosis.fitting.starting_points import nominal_start
+from diagnosis.answer.reported import compare
+from diagnosis.likelihood.least_squares import fit, scaled_residuals
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.run_data import hermite_basis
+from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.noise.mains import refine_frequency, remove_hum
+from diagnosis.noise.scattered_and_driven import scattered_variance
+from diagnosis.noise.sensor_noise import campaign_noise
 from tests.reference.free_decays import AREA, LENGTH, Setting, Truth, angle_of
 from tunnel_sim.effects.dropped_samples import DroppedSamples
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
-from diagnosis.fitting.run_data import RunData
-from diagnosis.fitting.whitening import WHITE, colour, colouring, correlate, response, whiten
+from diagnosis.likelihood.run_data import RunData
+from diagnosis.likelihood.whitening import WHITE, colour, colouring, correlate, response, whiten
 
 FILTERS = (np.array([1.0, -0.9]), np.array([1.0, -1.2, 0.6]), np.array([1.0, 0.5, 0.0, -0.3]))
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.answer.where import localise
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.answer.assemble import localise
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
 from tests.unit.diagnosis_document import document
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report.fit import fit_charts, fit_figure, fit_pages

@@ -9,18 +9,17 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.answer.where import localise
-from diagnosis.attribution.decide import Weighed
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.prepare import without_start
-from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.spectra import linear_coefficients
-from diagnosis.fitting.starting_points import nominal_start, starting_points
-from diagnosis.localisation.backbone import backbones, drift
-from diagnosis.localisation.excess import RunExcess, run_excesses, shortest_interval
-from diagnosis.localisation.inference import _between_runs, _by_band, _by_drift, _lone_run
-from diagnosis.localisation.phase_plane import apparent_moment
-from diagnosis.localisation.place import runs_beyond_chance
+from diagnosis.answer.assemble import localise
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.prepare import without_start
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.starting_points import nominal_start, starting_points
+from diagnosis.search.weigh import Weighed
+from diagnosis.where.backbone import backbones, drift
+from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
+from diagnosis.where.phase_plane import apparent_moment
+from diagnosis.where.place import _between_runs, _by_band, _by_drift, _lone_run, runs_beyond_chance
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
@@ -293,7 +292,7 @@ def test_the_band_of_most_of_the_excess_decides_the_channel(bands, condition, ch
 def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
     monkeypatch, frequency, damping, channel
 ):
-    monkeypatch.setattr("diagnosis.localisation.inference.drift", lambda _: (frequency, damping))
+    monkeypatch.setattr("diagnosis.where.place.drift", lambda _: (frequency, damping))
     assert _by_drift(SimpleNamespace(maps=SimpleNamespace(backbones=()))).value == channel
 
 

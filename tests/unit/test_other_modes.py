@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.answer.other_modes import second_modes
-from diagnosis.fitting.starting_points import is_gross
-from diagnosis.investigate import investigate
+from diagnosis.answer.other_motions import second_modes
+from diagnosis.likelihood.starting_points import is_gross
+from diagnosis.search.investigate import investigate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from diagnosis.blind.files import file_hash, read_document, read_hashes
+from diagnosis.blind.sets import file_hash, read_document, read_hashes
 from identification.estimate import Estimate, Quantity, RunEstimate
 from identification.neural.networks import read_networks, shipped_record
 from identification.neural.train import Checkpoint, read_checkpoint

@@ -6,11 +6,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from diagnosis.answer.where import localise
-from diagnosis.closable import Ceiling, Closable, Curve
-from diagnosis.closure import Step, Waterfall
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.answer.assemble import localise
+from diagnosis.closure import Ceiling, Closable, Curve, Step, Waterfall
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import (
     HELD_OUT,
     Candidate,

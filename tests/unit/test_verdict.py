@@ -9,9 +9,8 @@ from diagnosis_document import campaign, document
 
 from diagnosis.answer.reported import held_out_totals
 from diagnosis.answer.verdict import verdict
-from diagnosis.closure import Rest, Step, Waterfall
+from diagnosis.closure import Misfit, Rest, Step, Waterfall
 from diagnosis.decision import decision
-from diagnosis.misfit import Misfit
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tunnel_lab.report import advice, view

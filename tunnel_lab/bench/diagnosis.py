@@ -178,7 +178,7 @@ class _Answer:
 
     def _words(self, document: dict[str, Any]) -> None:
         from diagnosis import printing
-        from diagnosis.closable import closable_table, closable_words
+        from diagnosis.closure import closable_table, closable_words
 
         show_parts([printing.where_line(document), *printing.rival_lines(document)])
         show_parts([printing.candidates_table(document), printing.parameters_table(document)])
@@ -456,7 +456,7 @@ def write_session_report(session: Session, author: str, notes: str) -> None:
     Raises:
         TunnelError: when it cannot be written.
     """
-    from diagnosis.detection.limit_cycles import diagnosable
+    from diagnosis.diagnosable import diagnosable
     from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_folder import read_campaign
 

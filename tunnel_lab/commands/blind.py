@@ -93,7 +93,7 @@ def make(
       0 made, 2 bad input, 130 interrupted; no incomplete set is left.
     """
     from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
-    from diagnosis.blind.files import SEAL, read_document
+    from diagnosis.blind.sets import SEAL, read_document
     from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import console, say

@@ -182,7 +182,7 @@ def run(
     if model is not None and joint is not None:
         own_model = read_model(model, joint, data, split_names(free) or None, asset_dir)
     if own_model is not None and patch is not None:
-        from diagnosis.answer.patched_model import refuse_unpatchable
+        from diagnosis.patch.patched_model import refuse_unpatchable
 
         refuse_unpatchable(own_model, data, patch)
     answer = diagnose_with_progress(data, kinds, own_model)
@@ -271,7 +271,7 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
     Raises:
         TunnelError: when the answer has none, with the reason.
     """
-    from diagnosis.patch import UNPATCHED
+    from diagnosis.patched import UNPATCHED
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
@@ -285,8 +285,8 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
 def show(document: dict[str, Any]) -> None:
     """Print an answer: the verdict in words, then the figures behind it."""
     from diagnosis import printing as parts
-    from diagnosis.closable import closable_table, closable_words
-    from diagnosis.patch import patch_lines, patch_table
+    from diagnosis.closure import closable_table, closable_words
+    from diagnosis.patched import patch_lines, patch_table
     from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from diagnosis.answer.next_run import planned_run, separation
-from diagnosis.attribution.decide import Weighed
-from diagnosis.fitting.least_squares import Fit
-from diagnosis.study import Study
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.search.investigate import Study
+from diagnosis.search.weigh import Weighed
 from identification.campaign.belief import expected_belief, information_gain
 from tunnel_lab.envs.menu import Choice, Menu
 from tunnel_lab.envs.session import Knowledge

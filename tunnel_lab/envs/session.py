@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.investigate import investigate
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
-from diagnosis.study import Study
+from diagnosis.search.investigate import Study, investigate
 from identification.campaign.belief import (
     Belief,
     LinearRun,

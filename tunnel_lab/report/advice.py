@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.names import plain
+from diagnosis.decision import plain
 from diagnosis.printing import run_words
 from identification.printing import significant
 from tunnel_lab.report.view import Document, windy

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.names import plain
+from diagnosis.decision import plain
 from identification.printing import TextTable
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from diagnosis.blind import Score
-    from diagnosis.blind.smooth import SmoothCalibration
-    from diagnosis.blind.statistics import CalibrationBin
+    from diagnosis.blind.calibration import CalibrationBin, SmoothCalibration
     from identification.statistics import Proportion
 
 

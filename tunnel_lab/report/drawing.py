@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.misfit import Misfit, misfit_of, unit_shown
+from diagnosis.closure import Misfit, misfit_of, unit_shown
 from tunnel_lab.plotting.style import figure_text, styled
 from tunnel_sim.vocabulary.record import Array
 

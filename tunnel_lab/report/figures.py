@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.names import plain
+from diagnosis.decision import plain
 from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.printing import excess_std
 from identification.printing import coefficient_label, significant

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.misfit import unit_shown
+from diagnosis.closure import unit_shown
 from tunnel_lab.plotting.style import WIDTH, figure, figure_text, grid, styled, with_breaks
 from tunnel_lab.report.drawing import AFTER, BEFORE, MARK, QUIET, Document, array, run_label
 from tunnel_lab.report.where import Chart, rounded, view

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from diagnosis.misfit import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.names import plain
+from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
+from diagnosis.decision import plain
 from diagnosis.policy import LISTED_PROBABILITY
 from diagnosis.printing import held_out_excess, misfit_text
 from identification.printing import (

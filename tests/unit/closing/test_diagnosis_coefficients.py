@@ -13,21 +13,21 @@ from scipy.stats import norm
 
 from diagnosis.answer.coefficients import (
     Answers,
+    Mixture,
     Possible,
     before_the_causes,
     coefficients,
     possible_answers,
 )
-from diagnosis.answer.mixture import Mixture
-from diagnosis.answer.own_units import own_estimate
 from diagnosis.answer.small_causes import beside
-from diagnosis.attribution.decide import Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.similarity import Similarity
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.answer.units import own_estimate
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD
 from diagnosis.result import ParameterEstimate
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.weigh import Weighed
 from identification.printing import estimated
 from tests.unit.gap_campaigns import CN_BETA, CN_R, campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from

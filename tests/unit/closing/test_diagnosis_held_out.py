@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis.answer.held_out import HeldOut, folds, predict_held_out
-from diagnosis.answer.native_closure import native_closure
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.run_data import Data, RunData
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.patch.patched_model import native_closure
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.joint_patch import Start

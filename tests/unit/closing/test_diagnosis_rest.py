@@ -8,17 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.answer.candidates import meant_coefficient, meant_parameter
 from diagnosis.answer.coefficients import Answers, Possible, coefficients
-from diagnosis.answer.determined import meant_coefficient, meant_parameter
-from diagnosis.answer.pulls import coefficient_move
-from diagnosis.answer.rest import rest
-from diagnosis.answer.small_swings import coefficient_gradient, coefficient_value
-from diagnosis.answer.wind_on_runs import wind_on_runs
-from diagnosis.attribution.decide import Weighed
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.problem import Point, Problem
-from diagnosis.fitting.starting_points import nominal_start
+from diagnosis.answer.small_swings import (
+    coefficient_gradient,
+    coefficient_move,
+    coefficient_value,
+    wind_on_runs,
+)
+from diagnosis.answer.what_remains import rest
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.result import ParameterEstimate
+from diagnosis.search.weigh import Weighed
 from tests.unit.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 

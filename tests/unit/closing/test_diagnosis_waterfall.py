@@ -9,19 +9,17 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.candidates import inclusion
-from diagnosis.answer.held_out import FOLDS, fit_seen, predict_held_out
-from diagnosis.answer.held_out_stretches import predict_stretches, turns_of
+from diagnosis.answer.held_out import FOLDS, fit_seen, predict_held_out, predict_stretches, turns_of
 from diagnosis.answer.reported import Base
-from diagnosis.answer.subsets import Subsets
-from diagnosis.answer.waterfall import waterfall
-from diagnosis.attribution.decide import FittedSet, Weighed
-from diagnosis.attribution.hypothesis import Hypothesis
-from diagnosis.attribution.process_noise import ProcessNoise, Spectrum
-from diagnosis.attribution.random_moments import RandomAnswer
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.starting_points import starting_points
+from diagnosis.answer.waterfall import Subsets, waterfall
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import Candidate
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.process_noise import ProcessNoise, Spectrum
+from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.weigh import FittedSet, Weighed
 from tests.unit.gap_campaigns import NOISE, nominal, studied
 from tunnel_sim.effects import effect_class
 

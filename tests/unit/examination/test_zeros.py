@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from decays import CN_BETA, INERTIA, campaign, reading, run
 
-from diagnosis.detection.sensor_noise import campaign_noise
-from diagnosis.fitting.least_squares import fit
-from diagnosis.fitting.prepare import prepare
-from diagnosis.fitting.problem import Problem
-from diagnosis.fitting.starting_points import nominal_start
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.noise.sensor_noise import campaign_noise
 from identification import identify
 from identification.examination.examine import examine
 from identification.examination.free_motion import centre_of, with_zeros

@@ -1,0 +1,167 @@
+"""What no effect of one degree of freedom explains: a second mode, and a limit cycle in every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.policy import SECOND_MODE_LEFT
+from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
+from diagnosis.search.weigh import UNKNOWN
+from identification.examination.self_excited import in_limit_cycle
+from identification.signal.frequency import starting_frequency, thinned_reading
+from identification.status import Remark
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+
+_MOST = 1024  # thinned readings used: fifty cycles
+_LEAST = 64
+_PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a mode that decays sooner is lost in the whole
+_ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Decaying oscillations whose sum is fitted to a reading.
+
+    Args:
+        frequency: shape (m,), Hz.
+        rate: decay rates, shape (m,), 1/s.
+        amplitude: at the first reading, shape (m,), rad.
+        left: sum of squared residuals, rad².
+    """
+
+    frequency: Array
+    rate: Array
+    amplitude: Array
+    left: float
+
+
+def second_modes(campaign: Campaign) -> tuple[str, ...]:
+    """Name a second mode in each run that shows one.
+
+    Returns:
+        A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
+        the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
+        its first quarter. Driven runs are left out.
+    """
+    free = [run for run in campaign.runs if run.drive is None]
+    return tuple(words for run in free if (words := _second_mode(run.id, run.record)))
+
+
+def left_vectors(values: Array) -> Array:
+    """Left singular vectors of the Hankel matrix of evenly spaced readings.
+
+    Args:
+        values: shape (n,), rad.
+
+    Returns:
+        Shape (rows, rows), the leading vectors first.
+    """
+    rows = int(values.size * _ROWS)
+    hankel = np.lib.stride_tricks.sliding_window_view(values, values.size - rows + 1)
+    return np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
+
+
+def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Modes | None:
+    """Fit a sum of decaying oscillations by the poles of a Hankel matrix.
+
+    Args:
+        values: evenly spaced readings, shape (n,), rad.
+        interval: between them, s.
+        count: number of oscillations.
+        vectors: of `left_vectors`, shape (rows, rows).
+
+    Returns:
+        The modes; None where the poles are not those of so many oscillations.
+    """
+    left = vectors[:, : 2 * count]
+    poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
+    exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)
+    upper = exponents[exponents.imag > 0.0]
+    if upper.size != count:
+        return None
+    waves = np.exp(np.outer(np.arange(values.size) * interval, upper))
+    columns = np.column_stack((waves.real, waves.imag, np.ones(values.size)))
+    weights = np.linalg.lstsq(columns, values, rcond=None)[0]
+    residual = values - columns @ weights
+    amplitude = np.hypot(weights[:count], weights[count : 2 * count])
+    return Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
+
+
+def _second_mode(name: str, record: Record) -> str:
+    frequency = starting_frequency(record)
+    if frequency is None:
+        return ""
+    reading = thinned_reading(evenly_spaced(record), frequency)
+    interval = float(reading.time[-1]) / (reading.time.size - 1)
+    for part in _PARTS:
+        values = reading.yaw[: int(part * min(reading.yaw.size, _MOST))]
+        if values.size >= _LEAST and (words := _two_modes(name, values, interval)):
+            return words
+    return ""
+
+
+def _two_modes(name: str, values: Array, interval: float) -> str:
+    vectors = left_vectors(values)
+    one, two = (fit_modes(values, interval, count, vectors) for count in (1, 2))
+    if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
+        return ""
+    order = np.argsort(np.abs(two.frequency - one.frequency[0]))
+    resolution = float(two.rate.sum()) / np.pi
+    turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
+    if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
+        return ""  # not resolved, or a harmonic of the motion
+    main, second = (
+        f"{two.amplitude[i]:.2g} rad at {two.frequency[i]:.3g} Hz, which decays at {two.rate[i]:.2g} 1/s"
+        for i in order
+    )
+    return (
+        f"{name} contains a second mode: {second}, beside {main}. With it, what one free decay leaves falls by "
+        f"{100.0 * (1.0 - two.left / one.left):.0f} %. A rig with one degree of freedom has one mode: look for "
+        f"another motion, such as heave or the mount's."
+    )
+
+
+_NOTE = "no damping ratio and no derivative is stated, since no run is a free decay"
+
+
+def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnosis:
+    """Replace the answer by what the examination recognised.
+
+    Args:
+        nominal: the answer without effects, for the gap to a free decay and the noise.
+
+    Returns:
+        The answer ``unknown``, without coefficients, place or rest.
+    """
+    excess = nominal.gap.excess_before
+    return replace(
+        nominal,
+        causes=UNKNOWN,
+        verdict=f"No run is a free decay, so no cause is named. {_recognised(remarks)}.",
+        where=Where(None, None, tuple(run.id for run in nominal.gap.runs)),
+        candidates=(Candidate("unknown", 1.0, excess, 0.0),),
+        coefficients=Coefficients({}, {}, _NOTE),
+        inclusion={},
+        blind_spots=(),
+        rest=None,
+    )
+
+
+def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
+    """The refusal where not even the nominal model can be fitted to runs in a limit cycle.
+
+    Returns:
+        The error, which says what was recognised.
+    """
+    return TunnelError(
+        f"no run is a free decay: {_recognised(remarks)}", remedy="add decays at a lower wind speed"
+    )
+
+
+def _recognised(remarks: Sequence[Remark]) -> str:
+    return ". ".join(f"{r.runs[0]}: {r.what}" for r in remarks if in_limit_cycle(r.figures))

@@ -1,0 +1,242 @@
+"""The answer in the units of the measured campaign, and what unstated sizes leave open."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.result import Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
+from tunnel_sim.effects import effect_class
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
+from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
+
+#: Units of what acts on the yaw axis, and of the same per unit inertia.
+_PER_INERTIA = {
+    "N m": "rad/s2",
+    "N m/rad": "1/s2",
+    "N m s/rad": "1/s",
+    "N m s2/rad2": "1/rad",
+    "rad/(N m)": "s2",
+}
+
+
+def parameter_unit(name: str, campaign: Campaign) -> str:
+    """The unit of an effect's parameter as identified.
+
+    Args:
+        name: ``effect.parameter``.
+
+    Returns:
+        The parameter's own unit; over that of Izz where any run states no spring, and times those of the frontal
+        area, the reference length and the air density where these are not stated.
+    """
+    effect, _, parameter = name.partition(".")
+    info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
+    normalised = any(run.spring_stiffness is None for run in campaign.runs)
+    rig = campaign.rig
+    if info.per_pressure:
+        dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
+        factors = {
+            "kg/m3": not dense,
+            "m2": rig.frontal_area is None,
+            "m": rig.reference_length is None,
+            "1/(kg m2)": normalised,
+        }
+        within = [dimension(unit) for unit, missing in factors.items() if missing]
+        return in_si(functools.reduce(product, within, NUMBER))
+    if info.unit == "l/V" and rig.reference_length is None:
+        return "m"  # a·l, which over V is the time
+    return _per_inertia(info.unit) if normalised else info.unit
+
+
+def _per_inertia(unit: str) -> str:
+    """The unit of a quantity whose mass is divided by Izz."""
+    if unit in _PER_INERTIA:
+        return _PER_INERTIA[unit]
+    of = dimension(unit)
+    return in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
+
+
+def sized_coefficients(
+    found: Mapping[str, ParameterEstimate], rig: RigProperties
+) -> dict[str, ParameterEstimate]:
+    """Coefficients under the names of what was identified.
+
+    Args:
+        found: ``cn_beta`` and ``cn_r``, with 1 in place of every size that is not stated; or other coefficients.
+        rig: which sizes are stated.
+
+    Returns:
+        The same where both sizes are stated; else Cnβ and Cnr times the missing ones, which their names say:
+        ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
+    """
+    names = _sized_names(rig)
+    return {
+        names[name][0] if name in names else name: replace(value, unit=names[name][1])
+        if name in names
+        else value
+        for name, value in found.items()
+    }
+
+
+def _sized_names(rig: RigProperties) -> dict[str, tuple[str, str]]:
+    """Name and unit of the product identified in place of each coefficient."""
+    if rig.frontal_area is not None and rig.reference_length is not None:
+        return {}
+    if rig.reference_length is not None:
+        return {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")}
+    if rig.frontal_area is not None:
+        return {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")}
+    return {"cn_beta": ("cn_beta_area_length", "m3/rad"), "cn_r": ("cn_r_area_length2", "m4/rad")}
+
+
+def size_note(rig: RigProperties, *, windy: bool) -> str:
+    """What is identified in place of the coefficients where sizes are not stated.
+
+    Args:
+        rig: which sizes are stated.
+        windy: whether there are aerodynamic coefficients at all.
+
+    Returns:
+        A sentence; empty where they are Cnβ and Cnr.
+    """
+    stated = {"frontal_area": rig.frontal_area, "reference_length": rig.reference_length}
+    missing = [name for name, value in stated.items() if value is None]
+    if not missing or not windy:
+        return ""
+    beta = "Cnβ" + "·A" * (rig.frontal_area is None) + "·l" * (rig.reference_length is None)
+    rate = "Cnr" + "·A" * (rig.frontal_area is None) + "·l²" * (rig.reference_length is None)
+    return (
+        f"[rig] states no {' and no '.join(missing)}, so {beta} and {rate} are identified, not Cnβ and Cnr. State "
+        f"{'both' if len(missing) > 1 else 'it'} to get Cnβ and Cnr."
+    )
+
+
+_NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
+_STEPS = {
+    "spring_stiffness": 0.01,
+    "wind_speed": 0.1,
+    "release_angle": 0.01,
+    "duration": 1.0,
+}  # N m/rad, m/s, rad, s
+
+
+def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
+    """The answer with the parameters of the measured rig; what remains (`Rest`) has its units already.
+
+    Args:
+        answer: for the similar campaign; its candidates, maps and places are in the measured campaign's units
+            already.
+        similarity: how that was made.
+
+    Returns:
+        The same answer in the measured campaign's units.
+    """
+
+    def own(values: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
+        return {name: own_estimate(value, similarity) for name, value in values.items()}
+
+    return replace(
+        answer,
+        coefficients=replace(
+            answer.coefficients,
+            before=own(answer.coefficients.before),
+            after=own(answer.coefficients.after),
+        ),
+        noise=_noise(answer.noise, similarity),
+        confirmation=_confirmation(answer.confirmation, similarity),
+        next_run=None if answer.next_run is None else own_next_run(answer.next_run, similarity),
+    )
+
+
+def own_parameters(
+    given: Mapping[str, ParameterEstimate], campaign: Campaign, similarity: Similarity
+) -> dict[str, ParameterEstimate]:
+    """Parameters of effects in the measured campaign's units.
+
+    Args:
+        given: by ``effect.parameter``, in the effects' own units, for the similar campaign.
+        campaign: says which sizes and springs are stated.
+        similarity: how the similar campaign was made.
+
+    Returns:
+        The same quantities, in the units of `parameter_unit`. The coefficient of another power of the rate than the
+        textbook's changes with that power of time.
+    """
+    found = {}
+    for name, value in given.items():
+        effect, _, parameter = name.partition(".")
+        infos = {info.name: info for info in effect_class(effect).parameters()}
+        exponent = infos[parameter].rate_exponent
+        free = given.get(f"{effect}.{exponent}")
+        beyond = 0.0 if free is None else free.value - infos[exponent].default
+        own = own_estimate(value, similarity)
+        factor = similarity.time**-beyond
+        std = None if own.std is None else own.std * factor
+        # A size, density or inertia that is not stated is 1 in own units: only the name of the unit changes.
+        unit = parameter_unit(name, campaign)
+        found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
+    return found
+
+
+def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
+    """An estimate in the measured campaign's units.
+
+    Args:
+        estimate: for the similar campaign.
+        similarity: how that was made.
+
+    Returns:
+        The same quantity, its value and standard deviation changed alike.
+    """
+
+    def own(value: float) -> float:
+        return similarity.own(value, estimate.unit)
+
+    std, ends = estimate.std, estimate.interval
+    return replace(
+        estimate,
+        value=own(estimate.value),
+        std=None if std is None else own(std),
+        interval=None if ends is None else (own(ends[0]), own(ends[1])),
+    )
+
+
+def _noise(noise: NoiseSummary, similarity: Similarity) -> NoiseSummary:
+    stated = noise.stated_std
+    return replace(
+        noise,
+        std=similarity.own(noise.std, similarity.reading),
+        stated_std=None if stated is None else similarity.own(stated, similarity.reading),
+    )
+
+
+def _confirmation(found: Confirmation, similarity: Similarity) -> Confirmation:
+    factor = similarity.own(1.0, similarity.reading)
+    return replace(
+        found,
+        largest_difference=found.largest_difference * factor,
+        rms_difference=found.rms_difference * factor,
+        tolerance=found.tolerance * factor,
+    )
+
+
+def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
+    """A run to make (`separating_run`) in the measured campaign's units, rounded to what an operator can set.
+
+    Args:
+        run: for the similar campaign.
+        similarity: how that was made.
+    """
+    own = {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
+    return {name: _settable(value, _STEPS[name]) if name in _STEPS else value for name, value in own.items()}
+
+
+def _settable(value: float, step: float) -> float:
+    """A value that an operator can set: a whole number of steps, or two digits where it is only a few steps."""
+    if abs(value) < 10.0 * step:
+        return float(f"{value:.2g}")
+    return round(round(value / step) * step, 6)

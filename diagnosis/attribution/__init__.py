@@ -1,1 +1,0 @@
-"""Which effects cause the gap: ranked, fitted, weighed."""

@@ -1,0 +1,365 @@
+"""A blind set: campaigns without their truth, a sealed key, answers without the key, and the hashes of all.
+
+A set is a folder: a folder for each campaign, ``seal.json`` (published: hashes of the key and of the campaigns) and
+``key.json`` (the truth; may be elsewhere). Answers are in a folder of their own, which has a ``seal.json`` too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from diagnosis._diagnose import diagnose, vocabulary
+from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
+from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
+from tunnel_reference.separable import ATTEMPTS
+from tunnel_reference.severity import Simulated
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.expression_effect import read_effects
+from tunnel_sim.effects.registry import answering_with
+from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
+from tunnel_sim.files.json_text import json_text
+from tunnel_sim.files.reading import read_json, read_regular
+from tunnel_sim.files.writing import clear_leftovers, output_folder, whole_folder, write_whole
+from tunnel_sim.processes import in_processes
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, shown
+
+SCHEMA_VERSION = 1
+SEAL = "seal.json"
+KEY = "key.json"
+_CAMPAIGN = "campaign.toml"
+
+
+def write_document(path: Path, document: Mapping[str, Any]) -> str:
+    """Write JSON whole or not at all.
+
+    Args:
+        path: the file; replaced when it exists.
+        document: as for `tunnel_sim.files.json_text.json_text`.
+
+    Returns:
+        SHA-256 of what was written, in hexadecimal.
+
+    Raises:
+        TunnelError: when the file cannot be written.
+        ValueError: when the document holds NaN or infinity.
+    """
+    content = json_text(document).encode()
+    write_whole(path, content)
+    return hashlib.sha256(content).hexdigest()
+
+
+def read_document(path: Path, remedy: str) -> dict[str, Any]:
+    """Read a JSON document.
+
+    Args:
+        remedy: what to do when it is missing or broken.
+
+    Raises:
+        TunnelError: when it is missing, cannot be read or is no JSON object.
+    """
+    return read_json(path, remedy=remedy)
+
+
+def read_hashes(path: Path, key: str, remedy: str) -> dict[str, str]:
+    """Read hashes by name from a seal.
+
+    Args:
+        path: of the ``seal.json``.
+        key: under which they are listed.
+        remedy: what to do when the file is missing or broken.
+
+    Raises:
+        TunnelError: when the file is missing or malformed.
+    """
+    found = read_document(path, remedy).get(key)
+    if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
+        raise TunnelError(f"has no hashes under '{key}'", where=shown(path), remedy=remedy)
+    return found
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    return hashlib.sha256(read_regular(path, limits.DATA_BYTES)).hexdigest()
+
+
+def folder_hash(folder: Path) -> str:
+    """SHA-256 over names and contents of a folder's files, in hexadecimal.
+
+    Args:
+        folder: with subfolders; hidden files are left out.
+
+    Returns:
+        A hash that changes when any file is changed, added, removed or renamed.
+    """
+    found = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.is_file() and not p.name.startswith(".")):
+        found.update(f"{path.relative_to(folder).as_posix()}\0{file_hash(path)}\n".encode())
+    return found.hexdigest()
+
+
+def campaign_folders(folder: Path) -> list[Path]:
+    """Campaigns of a set, by name.
+
+    Returns:
+        Its subfolders that hold a campaign.
+
+    Raises:
+        TunnelError: when there are none.
+    """
+    found = sorted(path.parent for path in folder.glob(f"*/{_CAMPAIGN}"))
+    if not found:
+        raise TunnelError(
+            "holds no campaign", where=str(folder), remedy="make a set first: tunnel blind make FOLDER"
+        )
+    return found
+
+
+CHUNK = 100
+"""Campaigns simulated together: their runs advance in one array, so that few at a time would cost as much."""
+
+MakeProgress = Callable[[int, int], None]
+
+
+def make_blind(
+    out: Path,
+    *,
+    count: int,
+    seed: int,
+    shares: Mapping[str, float] = DEFAULT_SHARES,
+    mixture: Mixture | None = None,
+    key: Path | None = None,
+    progress: MakeProgress | None = None,
+    show_steps: bool = False,
+) -> Path:
+    """Draw, simulate and write campaigns whose truth is only in the key.
+
+    The key begins with 32 random bytes (the salt), so that the truth cannot be found by trying guesses against the
+    published hash; the hash shows that the key was not changed later. The seed is in the key too, since the truth
+    follows from it.
+
+    Args:
+        out: folder to make.
+        count: number of campaigns.
+        seed: of everything drawn; the same arguments give the same campaigns.
+        shares: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
+        mixture: how often other forms, other circumstances and small effects are drawn.
+        key: file of the key; inside the folder, beside the campaigns, when None.
+        progress: called with the number of campaigns written and the number in all.
+        show_steps: report on standard error how the sizing of the effects proceeds.
+
+    Returns:
+        The file of the key.
+
+    Raises:
+        TunnelError: when the folder or the key exists already, or the count is not above zero.
+    """
+    if count < 1:
+        raise TunnelError(f"{count} is not a number of campaigns", where="--count", remedy="give 1 or more")
+    clear_leftovers(out.resolve().parent)  # what a killed command set aside is there again
+    target = out / KEY if key is None else key
+    for path in (out, target):
+        if path.is_file() or (path.is_dir() and any(path.iterdir())):
+            raise TunnelError("exists already", where=str(path), remedy="name another")
+    mixture = mixture or Mixture()
+    with whole_folder(out, replace=False) as partial:
+        truths = _write_campaigns(partial, count, seed, shares, mixture, progress, show_steps)
+        document = {
+            "schema_version": SCHEMA_VERSION,
+            "salt": secrets.token_hex(32),
+            "made_with": {
+                "count": count,
+                "seed": seed,
+                "kinds": dict(shares),
+                "textbook": mixture.textbook,
+                "rare": mixture.rare,
+                "variety": mixture.variety,
+                "small": mixture.small,
+            },
+            "truths": truths,
+        }
+        sealed = write_document(partial / KEY if key is None else key, document)
+        hashes = {name: folder_hash(partial / name) for name in truths}
+        write_document(
+            partial / SEAL,
+            {"schema_version": SCHEMA_VERSION, "key_sha256": sealed, "campaigns_sha256": hashes},
+        )
+    return target
+
+
+def _write_campaigns(
+    folder: Path,
+    count: int,
+    seed: int,
+    shares: Mapping[str, float],
+    mixture: Mixture,
+    progress: MakeProgress | None,
+    show_steps: bool,
+) -> dict[str, Any]:
+    """Write the campaigns; their truths by name."""
+    draws = draw_set(count, seed, dict(shares), mixture)
+    width = max(4, len(str(count)))
+    truths: dict[str, Any] = {}
+    for start in range(0, count, CHUNK):
+        for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
+            name = f"c{len(truths) + 1:0{width}d}"
+            truths[name] = truth_of(written(simulated, folder / name, show_steps))
+            if progress is not None:
+                progress(len(truths), count)
+    return truths
+
+
+def written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
+    """Write a simulated campaign; one that the reader refuses, as for too few cycles, is drawn again.
+
+    Args:
+        simulated: the campaign.
+        folder: to write, named as the campaign is to be.
+        show_steps: whether the steps of a second simulation are shown.
+
+    Returns:
+        The campaign that was written.
+
+    Raises:
+        TunnelError: when the reader refuses several draws in turn.
+    """
+    for attempt in range(ATTEMPTS):
+        try:
+            write_campaign(as_campaign(simulated, folder.name), folder)
+            break
+        except TunnelError:
+            if attempt == ATTEMPTS - 1:
+                raise
+            (simulated,) = simulate_set([redraw(simulated.draw)], progress=show_steps)
+    return simulated
+
+
+AnswerProgress = Callable[[int, int, str], None]
+
+
+def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Path:
+    """Where the answers to a set go.
+
+    Args:
+        excluded: effects withheld from the vocabulary.
+        effects_file: of effects added to it; None: none.
+
+    Returns:
+        ``answers`` inside the set, or ``answers-without-…-with-…``, which ends with a hash of the effects file.
+    """
+    without = ["without", *sorted(set(excluded))] if excluded else []
+    names = sorted(kind.name for kind in _own_effects(effects_file))
+    own = ["with", *names, file_hash(effects_file)[:8]] if effects_file else []
+    return folder / "-".join(["answers", *without, *own])
+
+
+def _own_effects(effects_file: Path | None) -> tuple[type[Effect], ...]:
+    return () if effects_file is None else read_effects(effects_file)
+
+
+def answer_set(
+    folder: Path,
+    *,
+    excluded: Sequence[str] = (),
+    jobs: int = 1,
+    progress: AnswerProgress | None = None,
+    effects_file: Path | None = None,
+) -> str:
+    """Diagnose every campaign of a set that has no answer yet.
+
+    An interrupted run leaves only complete answers, and the next run continues from there. A campaign that cannot
+    be diagnosed gets an answer that says why; it counts as wrong.
+
+    Args:
+        excluded: effects withheld from the vocabulary.
+        progress: called with the number of campaigns answered, the number in all, and the name of the last.
+        effects_file: of effects added to the vocabulary; None: none.
+
+    Returns:
+        SHA-256 over all answers, in hexadecimal: publish it before the key is opened.
+
+    Raises:
+        TunnelError: when the set holds no campaign, an effect is unknown, or an answer was changed afterwards.
+    """
+    campaigns = campaign_folders(folder)
+    vocabulary(exclude=excluded)
+    target = answers_folder(folder, excluded, effects_file)
+    output_folder(target)
+    hashes = _answered(target)
+    names = {path.name for path in campaigns}
+    left = [path for path in campaigns if path.name not in hashes]
+    if progress is not None:
+        progress(len(names & hashes.keys()), len(campaigns), "")
+    for name, answer in _answers(left, sorted(set(excluded)), jobs, effects_file):
+        hashes[name] = write_document(target / f"{name}.json", answer)
+        _write_seal(target, hashes, excluded)
+        if progress is not None:
+            progress(len(names & hashes.keys()), len(campaigns), name)
+    return file_hash(target / SEAL)
+
+
+def _answered(target: Path) -> dict[str, str]:
+    """Hashes of the answers that exist, after a check of their files."""
+    if not (target / SEAL).exists():
+        return {}
+    hashes = read_hashes(target / SEAL, "answers_sha256", "remove the folder and answer again")
+    for name, known in hashes.items():
+        path = target / f"{name}.json"
+        if not path.is_file() or file_hash(path) != known:
+            raise TunnelError(
+                "is not the answer that was given",
+                where=str(path),
+                remedy=f"remove {target} and answer all campaigns again",
+            )
+    return hashes
+
+
+def _write_seal(target: Path, hashes: dict[str, str], excluded: Sequence[str]) -> None:
+    document = {
+        "schema_version": SCHEMA_VERSION,
+        "excluded": sorted(set(excluded)),
+        "answers_sha256": dict(sorted(hashes.items())),
+    }
+    write_document(target / SEAL, document)
+
+
+def _answers(
+    campaigns: Sequence[Path], excluded: Sequence[str], jobs: int, effects_file: Path | None
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name and answer of each campaign, as they come."""
+    work = partial(answer_campaign, excluded=tuple(excluded), effects_file=effects_file)
+    processes = jobs if jobs > 1 and len(campaigns) > 1 else 0
+    return (answer for _, answer in in_processes(work, campaigns, processes))
+
+
+def answer_campaign(
+    folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None
+) -> tuple[str, dict[str, Any]]:
+    """Diagnose one campaign of a set.
+
+    Args:
+        excluded: effects withheld from the vocabulary.
+        effects_file: of effects added to it; None: none.
+
+    Returns:
+        Its name and its answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``, or, where
+        there is none, ``causes`` null and the ``error``.
+    """
+    begun = time.perf_counter()
+    try:
+        with answering_with(_own_effects(effects_file)):
+            found = diagnose(read_campaign(folder), kinds=vocabulary(exclude=excluded))
+        answer = found.to_json_dict()
+        answer.pop("maps", None)  # pictures' data: larger than the records, and nothing is scored by them
+    except Exception as error:  # one bad campaign must not end a night's work; the score counts it as wrong
+        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
+        answer = {"schema_version": SCHEMA_VERSION, "campaign": folder.name, "causes": None, "error": said}
+    answer["data_sha256"] = folder_hash(folder)
+    answer["wall_s"] = time.perf_counter() - begun
+    return folder.name, answer

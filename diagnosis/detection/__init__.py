@@ -1,1 +1,0 @@
-"""Is there a gap? Noise, hum, comparable runs, and the tests against chance."""

@@ -1,0 +1,359 @@
+"""Which runs of a campaign can be diagnosed together, and with which effects; the rest is refused."""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import median
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.nondimensional import free_frequency, frequency
+from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES
+from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
+from identification.estimate import Status
+from identification.examination.clock import with_clocks
+from identification.examination.examine import examine
+from identification.examination.self_excited import in_limit_cycle
+from identification.signal.driven import driven_start
+from identification.signal.run_fit import NO_WINDOWS, identify_run
+from identification.status import Outcome, Remark
+from tunnel_sim.effects import Effect, the_effect
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.joint_law import JointLaw
+
+SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
+
+
+def reach(campaign: Campaign) -> float:
+    """The greatest displacement in the records.
+
+    Returns:
+        rad; from the frequency where the sensor measures a rate or an acceleration.
+    """
+    found = []
+    for run in campaign.runs:
+        readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
+        turn = 2.0 * np.pi * frequency(run.record) if campaign.sensor.derivative else 1.0
+        found.append(float(np.max(np.abs(readings - np.mean(readings)))) / turn**campaign.sensor.derivative)
+    return max(found)
+
+
+def with_law(campaign: Campaign, law: JointLaw) -> Campaign:
+    """The campaign with a joint's law in place of a spring.
+
+    Args:
+        law: of the joint.
+
+    Returns:
+        The campaign; its runs state the stiffness at rest.
+
+    Raises:
+        TunnelError: when the runs state more than one spring, or the wind blows and a reference size is missing.
+    """
+    springs = {run.spring_stiffness for run in campaign.runs} - {None}
+    if len(springs) > 1:
+        raise TunnelError(
+            f"the runs state {len(springs)} springs, and a model has one",
+            where="--model",
+            remedy="diagnose the runs of each spring separately",
+        )
+    rig = campaign.rig
+    if any(run.wind_on for run in campaign.runs) and None in (rig.frontal_area, rig.reference_length):
+        raise TunnelError(
+            "runs with a wind speed need the rig's sizes beside the model",
+            where="--model",
+            remedy="state frontal_area and reference_length under [rig] in campaign.toml",
+        )
+    runs = tuple(replace(run, spring_stiffness=law.stiffness) for run in campaign.runs)
+    return replace(campaign, runs=runs, law=law)
+
+
+_LEFT_OUT = "left out of the diagnosis, which compares free decays"
+
+
+@dataclass(frozen=True)
+class Diagnosable:
+    """The runs to diagnose.
+
+    Args:
+        limit_cycles: whether they are all in limit cycles, so that no decay remains.
+    """
+
+    campaign: Campaign
+    remarks: tuple[Remark, ...]
+    limit_cycles: bool = False
+
+
+def diagnosable(campaign: Campaign) -> Diagnosable:
+    """Examine a campaign, and separate its free decays from runs in a limit cycle.
+
+    Returns:
+        The free decays; the whole records of all runs where every one is in a limit cycle.
+
+    Raises:
+        TunnelError: when the examination refuses the records.
+    """
+    examined = examine(campaign).accepted()
+    cycling = {name for r in examined.remarks if in_limit_cycle(r.figures) for name in r.runs}
+    decays = tuple(run for run in examined.campaign.runs if run.id not in cycling)
+    remarks = tuple(
+        replace(r, outcome=Outcome.LEFT_OUT, remedy=_LEFT_OUT) if in_limit_cycle(r.figures) else r
+        for r in examined.remarks
+    )
+    if not cycling:
+        return Diagnosable(examined.campaign, examined.remarks)
+    if decays:
+        return Diagnosable(replace(examined.campaign, runs=decays), remarks)
+    whole, _ = with_clocks(replace(campaign, runs=tuple(r for r in campaign.runs if r.id in cycling)))
+    return Diagnosable(whole, examined.remarks, limit_cycles=True)
+
+
+def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+    """Leave out the runs that cannot be fitted together with the others.
+
+    Returns:
+        The campaign of the remaining runs, and sentences that say which were left out and why; none where all
+        runs remain. Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those
+        that state it, if equal). Of runs that do not state it, those with the same frequency at the same wind
+        speed remain: only they can have one spring. A wind-on run that swings in another mode than the wind-off
+        runs of its spring is left out.
+    """
+    stated = [run for run in campaign.runs if run.spring_stiffness is not None]
+    bare = [run for run in campaign.runs if run.spring_stiffness is None]
+    said = []
+    kept = stated if len(stated) >= len(bare) else bare
+    if stated and bare:
+        other, what = (bare, "state no") if kept is stated else (stated, "state their")
+        said.append(
+            f"Left out, since they {what} spring_stiffness and the others "
+            f"{'do' if kept is stated else 'do not'}: {_ids(other)}. State it for all runs, or diagnose these "
+            f"separately."
+        )
+    if kept is bare:
+        same = _of_one_spring(bare)
+        if len(same) < len(bare):
+            other = [run for run in bare if run not in same]
+            said.append(
+                f"Left out, since different frequencies at one wind speed show more than one spring, and these "
+                f"runs may not have the spring of the rest: {_ids(other)}. State spring_stiffness, or diagnose "
+                f"these separately."
+            )
+        kept = same
+    elsewhere = _in_another_mode(kept)
+    if elsewhere:
+        said.append(
+            f"Left out, since they swing in another mode, {ANOTHER_MODE:g} times as fast as the same spring with "
+            f"the wind off or faster: {_ids(elsewhere)}. Diagnose these separately."
+        )
+        kept = [run for run in kept if run not in elsewhere]
+    order = {run.id for run in kept}
+    return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(said)
+
+
+def _ids(runs: Sequence[Run]) -> str:
+    return ", ".join(run.id for run in runs)
+
+
+def _in_another_mode(runs: Sequence[Run]) -> list[Run]:
+    """Wind-on runs far above the frequency of the wind-off runs of the same spring."""
+    still: dict[float | None, list[float]] = defaultdict(list)
+    for run in runs:
+        if not run.wind_on:
+            still[run.spring_stiffness].append(free_frequency(run))
+    windy = [run for run in runs if run.wind_on and run.spring_stiffness in still]
+    return [run for run in windy if free_frequency(run) > ANOTHER_MODE * median(still[run.spring_stiffness])]
+
+
+def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
+    """The largest group of runs that may have one spring.
+
+    The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
+    same at each speed.
+    """
+    by_speed: dict[float, list[Run]] = defaultdict(list)
+    for run in runs:
+        by_speed[run.wind_speed].append(run)
+    groups = {speed: _by_frequency(alike) for speed, alike in by_speed.items()}
+    counts = {len(found) for found in groups.values()}
+    if counts == {1}:
+        return list(runs)
+    if len(counts) == 1:
+        ranks = [[run for found in groups.values() for run in found[rank]] for rank in range(counts.pop())]
+        return max(ranks, key=len)
+    return max((group for found in groups.values() for group in found), key=len)
+
+
+def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
+    """Groups of runs with about the same frequency, lowest first."""
+    found = sorted(((free_frequency(run), run) for run in runs), key=lambda pair: pair[0])
+    groups = [[found[0][1]]]
+    for (last, _), (now, run) in itertools.pairwise(found):
+        if now > SAME_SPRING * last:
+            groups.append([])
+        groups[-1].append(run)
+    return groups
+
+
+_ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
+_NOT_TRIED = "On driven runs these effects are not tried yet: {}."
+_NOT_BY_MUJOCO = (
+    "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
+    "take their input."
+)
+
+#: Said of a campaign with driven runs.
+NOT_SOUGHT = (
+    "What could be closed of what remains, and by which formula, is not sought where a run is driven."
+)
+
+
+def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
+    """Refuse driven runs that the diagnosis does not treat yet.
+
+    Args:
+        own_model: whether the nominal model is a joint of the user's own.
+
+    Raises:
+        TunnelError: for the first such run.
+    """
+    driven = [run for run in campaign.runs if run.drive is not None]
+    for run in driven:
+        assert run.drive is not None
+        why = ""
+        if not run.drive.on_body:
+            why = "is driven by the motion of the spring's root"
+        elif run.spring_stiffness == 0.0:
+            why = "is driven and has no spring"
+        elif own_model:
+            why = "is driven, and a model of your own is given"
+        elif campaign.sensor.derivative:
+            why = f"is driven, and its sensor reads {campaign.sensor.quantity}s"
+        elif not run.record.uniform:
+            why = "is driven, and its samples are not evenly spaced"
+        elif run.record.yaw_rad.size < LEAST_SAMPLES:
+            raise TunnelError(
+                f"the run is driven and has {run.record.yaw_rad.size} samples: too few to tell its noise from its "
+                "response",
+                where=f"{campaign.name}, run '{run.id}'",
+                remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
+            )
+        if why:
+            raise TunnelError(
+                f"the run {why}, which is not diagnosed yet",
+                where=f"{campaign.name}, run '{run.id}'",
+                remedy="leave the run out",
+            )
+    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
+    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
+        raise TunnelError(
+            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
+            where=campaign.name,
+            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+        )
+
+
+def refuse_without_resonance(campaign: Campaign) -> None:
+    """Refuse a driven run whose motion does not follow from its input as an oscillation.
+
+    Raises:
+        TunnelError: for the first such run.
+    """
+    for run in campaign.runs:
+        if run.drive is not None:
+            found = driven_start(run.record.time_s, run.record.yaw_rad, run.drive.values)
+            if found is None or not found[1] > 0.0:
+                raise TunnelError(
+                    "no resonance between input and motion",
+                    where=f"run {run.id}",
+                    remedy="drive it over a band that includes the natural frequency; or leave the run out",
+                )
+
+
+def kinds_for(
+    campaign: Campaign, kinds: Sequence[type[Effect]]
+) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
+    """The effects that can be fitted to a campaign.
+
+    Args:
+        kinds: the effects to answer with.
+
+    Returns:
+        All of them, and no sentence, where no run is driven; else those that can be fitted to driven runs, and
+        sentences that name the others.
+    """
+    if not campaign.driven:
+        return tuple(kinds), ()
+    kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
+    gone = [kind.name for kind in kinds if kind not in kept]
+    return kept, (*((_NOT_TRIED.format(", ".join(gone)),) if gone else ()), _NOT_BY_MUJOCO)
+
+
+def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
+    """The gain of the input in a fit.
+
+    Args:
+        campaign: as measured.
+        fit: of the similar campaign.
+
+    Returns:
+        A sentence, in the measured campaign's units; none where the gain is known.
+    """
+    if "drive_gain" not in fit.problem.names:
+        return ()
+    data = fit.problem.data
+    known = any(
+        r.drive is not None and (r.drive.column == "moment_nm" or r.drive.gain) for r in campaign.runs
+    )
+    unit = "kg m2" if known else "N m"
+    value, std = fit.value("drive_gain"), fit.std("drive_gain")
+    value, std = (data.similarity.own(1.0, unit) ** (-1 if known else 1) * one for one in (value, std))
+    if known:
+        return (f"Per N m of the input the angular acceleration is {value:.5g} ± {std:.2g} rad/s².",)
+    per = "rad/s²" if data.normalised else "N m"
+    return (f"The gain of the input is {value:.5g} ± {std:.2g} {per} per unit.",)
+
+
+_HOPELESS = (Status.NO_OSCILLATION, Status.NOT_DETERMINED)
+
+
+def refuse_hopeless(campaign: Campaign) -> None:
+    """Refuse a campaign with a run that shows no decaying motion; the estimators leave out the same runs.
+
+    Raises:
+        TunnelError: for the first such run.
+    """
+    for run in campaign.runs:
+        if run.drive is not None:
+            continue
+        status = identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
+        if status in _HOPELESS:
+            what, _, remedy = status.value.partition(": ")
+            raise TunnelError(what, where=f"run {run.id}", remedy=f"{remedy}; or leave the run out")
+
+
+def refuse_indefinite(fit: Fit) -> None:
+    """Refuse a nominal fit that the runs do not determine.
+
+    Args:
+        fit: of the nominal model.
+
+    Raises:
+        TunnelError: when a parameter or its standard deviation is not finite, or the inertia is not positive.
+    """
+    values = dict(zip(fit.problem.names, fit.point.common.tolist(), strict=True))
+    numbers = np.concatenate(
+        (fit.point.common, fit.point.release.ravel(), fit.covariance.ravel(), [fit.total])
+    )
+    if not np.isfinite(numbers).all():
+        raise TunnelError(
+            "the runs do not determine the nominal model",
+            remedy="check that they are free decays of springs and wind speeds that differ",
+        )
+    if values.get("yaw_inertia", 1.0) <= 0.0:
+        what, _, remedy = Status.INERTIA_NOT_POSITIVE.value.partition(": ")
+        raise TunnelError(what, remedy=remedy)

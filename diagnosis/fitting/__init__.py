@@ -1,1 +1,0 @@
-"""The model of a campaign as a function of parameters, and its least-squares fit."""

@@ -1,0 +1,500 @@
+"""Weighted least squares of a campaign: Gauss–Newton with the releases eliminated run by run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.likelihood.nondimensional import REFERENCE_STIFFNESS
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.run_data import Data
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Products:
+    """Products of the sensitivities, which every step from one point shares.
+
+    Args:
+        own: of every run's own with themselves, shape (runs, own, own).
+        mixed: of the own with the common, shape (runs, own, common).
+        common: of the common with themselves, by run, shape (runs, common, common).
+    """
+
+    own: Array
+    mixed: Array
+    common: Array
+
+    @classmethod
+    def of(cls, jacobian: list[tuple[Array, Array]]) -> Products:
+        """The products of sensitivities, as `sensitivities` gives them."""
+        return cls(
+            np.stack([release.T @ release for _, release in jacobian]),
+            np.stack([release.T @ common for common, release in jacobian]),
+            np.stack([common.T @ common for common, _ in jacobian]),
+        )
+
+
+def normal_equations(
+    jacobian: list[tuple[Array, Array]],
+    residuals: list[Array],
+    damping: float = 0.0,
+    products: Products | None = None,
+) -> tuple[Array, Array, Array]:
+    """Normal matrix and gradient of the common parameters with every run's release eliminated.
+
+    Args:
+        jacobian: from `sensitivities`.
+        residuals: scaled.
+        damping: of the release's own step, as a share of its diagonal.
+        products: of the jacobian, where they are known.
+
+    Returns:
+        Matrix (common, common), gradient (common,), and the (runs, own, common + 1) solutions that give the
+        releases' steps: release = solution[:, -1] − solution[:, :-1] @ common step.
+    """
+    matrices, gradients, solutions = by_run(jacobian, residuals, damping, products)
+    return matrices.sum(axis=0), gradients.sum(axis=0), solutions
+
+
+def by_run(
+    jacobian: list[tuple[Array, Array]],
+    residuals: list[Array],
+    damping: float = 0.0,
+    products: Products | None = None,
+) -> tuple[Array, Array, Array]:
+    """As `normal_equations`, before the sum over the runs.
+
+    Args:
+        jacobian: from `sensitivities`.
+        residuals: scaled.
+        damping: of the release's own step, as a share of its diagonal.
+        products: of the jacobian, where they are known.
+
+    Returns:
+        Matrices, shape (runs, common, common), gradients, shape (runs, common), and the solutions of
+        `normal_equations`.
+    """
+    known = Products.of(jacobian) if products is None else products
+    columns = list(zip(jacobian, residuals, strict=True))
+    seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
+    cross = np.concatenate([known.mixed, seen], axis=2)
+    size = np.sqrt(np.maximum(np.diagonal(known.own, axis1=1, axis2=2), 1e-300))
+    ridge = known.own / (size[:, :, None] * size[:, None, :]) + (1e-12 + damping) * np.eye(size.shape[1])
+    solutions = np.linalg.solve(ridge, cross / size[:, :, None]) / size[:, :, None]
+    absorbed = np.swapaxes(cross[:, :, :-1], 1, 2) @ solutions
+    seen_common = np.stack([common.T @ r for (common, _), r in columns])
+    return known.common - absorbed[:, :, :-1], seen_common - absorbed[:, :, -1], solutions
+
+
+def damped_step(
+    problem: Problem,
+    point: Point,
+    residuals: list[Array],
+    jacobian: list[tuple[Array, Array]],
+    damping: float,
+    products: Products | None = None,
+) -> Point:
+    """Where a Gauss–Newton step leads.
+
+    Args:
+        problem: gives the bounds.
+        point: where to start.
+        residuals: scaled, by run.
+        jacobian: from `sensitivities`, of the same rows as the residuals.
+        damping: added to the scaled normal matrix's diagonal, dimensionless.
+        products: of the jacobian, where they are known.
+
+    Returns:
+        The point, its common parameters inside their bounds.
+    """
+    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping, products)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix / np.outer(scale, scale) + damping * np.eye(len(scale))
+    lower, upper = problem.bounds
+    step = bounded_step(
+        scaled, gradient / scale, (lower - point.common) * scale, (upper - point.common) * scale
+    )
+    release = solutions[:, :, -1] - solutions[:, :, :-1] @ (step / scale)
+    return Point(np.clip(point.common + step / scale, lower, upper), point.release + release)
+
+
+def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> Array:
+    """The solution of the normal equations, those parameters held at a bound that would leave their range.
+
+    Args:
+        matrix: symmetric, shape (n, n).
+        gradient: shape (n,).
+        lower: least steps, at most 0, shape (n,).
+        upper: greatest steps, at least 0, shape (n,).
+
+    Returns:
+        Steps within their bounds, shape (n,).
+    """
+    step, free = np.zeros(gradient.size), np.ones(gradient.size, dtype=bool)
+    while free.any():
+        held = gradient[free] - matrix[np.ix_(free, ~free)] @ step[~free]
+        step[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], held, rcond=1e-13)[0]
+        outside = free & ((step < lower) | (step > upper))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step, lower, upper)[outside]
+        free &= ~outside
+    return step
+
+
+def project_release(change: Array, slopes: Array) -> Array:
+    """The part of a change of one run's prediction that its release cannot absorb.
+
+    Args:
+        change: shape (n,).
+        slopes: derivatives to the release, shape (n, own).
+
+    Returns:
+        The remainder, shape (n,).
+    """
+    left: Array = change - slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]
+    return left
+
+
+_MAX_ITERATIONS = 25
+_HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
+_AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
+_AIR_STIFFNESS = (
+    4.0  # N m/rad in the strongest wind: a coefficient is judged by what it does, whatever the air
+)
+_AIR_DAMPING = 0.02  # N m s/rad in the same way
+_TRIES = 9  # dampings tried in a step, each ten times the last
+
+
+class FitError(ArithmeticError):
+    """A fit left the range in which the model can be integrated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted problem.
+
+    Args:
+        problem: what was fitted.
+        point: the parameter values found.
+        residuals: reading minus prediction in noise standard deviations, by run.
+        chi2: sum of their squares, by run, shape (runs,).
+        covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
+        jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
+            (n, common), and to the run's release, shape (n, 2).
+        converged: whether the last step no longer paid.
+    """
+
+    problem: Problem
+    point: Point
+    residuals: list[Array]
+    chi2: Array
+    covariance: Array
+    jacobian: list[tuple[Array, Array]] = field(repr=False)
+    converged: bool
+
+    @cached_property
+    def products(self) -> Products:
+        """Products of the sensitivities."""
+        return Products.of(self.jacobian)
+
+    @property
+    def total(self) -> float:
+        """χ² of the campaign."""
+        return float(self.chi2.sum())
+
+    @property
+    def count(self) -> int:
+        """Number of residuals."""
+        return sum(run.filled for run in self.problem.data.runs)
+
+    @property
+    def excess(self) -> float:
+        """Mean squared scaled residual minus one."""
+        return self.total / self.count - 1.0
+
+    @property
+    def gap(self) -> float:
+        """What shares are of: the excess, at least 0.001."""
+        return max(self.excess, 1e-3)
+
+    @property
+    def chance(self) -> float:
+        """Standard deviation, by chance, of a share of the gap."""
+        return float(np.sqrt(2.0 / self.count)) / self.gap
+
+    def value(self, name: str) -> float:
+        """A common parameter by name."""
+        return float(self.point.common[self.problem.names.index(name)])
+
+    def zero(self, index: int) -> float:
+        """The sensor's zero in the run of an index."""
+        return self.problem.zero(self.point.common, self.point.release[index])
+
+    def std(self, name: str) -> float:
+        """Its standard deviation, if the model is right."""
+        i = self.problem.names.index(name)
+        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+
+    def bound(self, name: str) -> str | None:
+        """``lower`` or ``upper`` where a common parameter lies at that end of its range; None inside it."""
+        i = self.problem.names.index(name)
+        value = self.point.common[i]
+        for end, limits in zip(("lower", "upper"), self.problem.bounds, strict=True):
+            if np.isfinite(limits[i]) and abs(value - limits[i]) <= _AT_BOUND * max(
+                abs(limits[i]), abs(value)
+            ):
+                return end
+        return None
+
+
+def fit(
+    problem: Problem,
+    start: Point,
+    *,
+    base: Fit | None = None,
+    tolerance: float = 1e-4,
+    max_iterations: int = _MAX_ITERATIONS,
+) -> Fit:
+    """Minimise χ² from a starting point.
+
+    Args:
+        start: parameter values to start from.
+        base: a fit of the same runs with fewer effects. While progress is good, its sensitivities are used for
+            the parameters that both have, which saves most of the simulations.
+        tolerance: the fit goes on while a step lowers χ² by this share, or by 0.1.
+        max_iterations: Gauss–Newton steps at most.
+
+    Returns:
+        The fit at the best point found.
+
+    Raises:
+        FitError: when the model cannot be integrated at the start.
+    """
+    state = _State(problem, clip(problem, start))
+    borrowed = base is not None
+    iterations = 0
+    converged = False
+    while iterations < max_iterations and not converged:
+        iterations += 1
+        state.linearise(base if borrowed else None)
+        gain = state.improve()
+        poor = gain < max(0.1, 0.1 * state.cost) if borrowed else gain < max(0.1, tolerance * state.cost)
+        if poor and borrowed:
+            borrowed = False  # once more with its own sensitivities
+        elif poor:
+            converged = True
+        if base is not None and iterations >= _HOPELESS and state.cost > base.total:
+            break  # more parameters, and still worse than without them
+    return state.result(converged)
+
+
+def fit_at(problem: Problem, point: Point) -> Fit:
+    """The fit that stands at a point found by other means.
+
+    Args:
+        problem: runs and effects.
+        point: parameter values.
+
+    Returns:
+        Residuals and sensitivities there.
+
+    Raises:
+        FitError: when the model cannot be integrated there.
+    """
+    state = _State(problem, clip(problem, point))
+    state.linearise(None)
+    return state.result(converged=True)
+
+
+class _State:
+    """Where a minimisation stands."""
+
+    def __init__(self, problem: Problem, point: Point) -> None:
+        self.problem, self.point = problem, point
+        self.prediction = problem.predict([point])[0]
+        self.residuals = _scaled(problem, self.prediction)
+        self.cost = _cost(self.residuals)
+        self.damping = 1e-6
+        self.jacobian: list[tuple[Array, Array]] = []
+        self.products: Products | None = None
+
+    def linearise(self, base: Fit | None) -> None:
+        """Compute sensitivities, those of a smaller fit borrowed where given."""
+        self.jacobian = sensitivities(self.problem, self.point, base, self.prediction)
+        if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
+            raise FitError("the model's sensitivities are not finite")
+        self.products = Products.of(self.jacobian)
+
+    def improve(self) -> float:
+        """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
+        here = self.problem, self.point, self.residuals, self.jacobian
+        for _ in range(_TRIES):
+            trial = clip(self.problem, damped_step(*here, self.damping, self.products))
+            prediction = self.problem.predict([trial])[0]
+            residuals = _scaled(self.problem, prediction)
+            cost = _cost(residuals)
+            if cost < self.cost:
+                gain = self.cost - cost
+                self.point, self.prediction, self.residuals, self.cost = trial, prediction, residuals, cost
+                self.damping = max(self.damping * 0.2, 1e-9)
+                return gain
+            self.damping = max(self.damping * 10.0, 1e-4)
+        return 0.0
+
+    def result(self, converged: bool) -> Fit:
+        """The fit as it stands."""
+        return Fit(
+            self.problem,
+            self.point,
+            self.residuals,
+            np.array([float(r @ r) for r in self.residuals]),
+            _covariance(self.jacobian, self.products),
+            self.jacobian,
+            converged,
+        )
+
+
+def clip(problem: Problem, point: Point) -> Point:
+    """Bring the common parameters inside their bounds.
+
+    Args:
+        problem: gives the bounds.
+        point: parameter values.
+
+    Returns:
+        The point, its common parameters clipped.
+    """
+    lower, upper = problem.bounds
+    return Point(np.clip(point.common, lower, upper), point.release)
+
+
+def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
+    """Reading minus prediction.
+
+    Args:
+        point: parameter values.
+
+    Returns:
+        Residuals in noise standard deviations, by run, each of the shape of the run's reading.
+    """
+    return _scaled(problem, problem.predict([point])[0])
+
+
+def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
+    with np.errstate(invalid="ignore"):  # a run that grew without bound; its cost is infinite
+        return [
+            run.scaled(run.reading - values)
+            for run, values in zip(problem.data.runs, prediction, strict=True)
+        ]
+
+
+def _cost(residuals: list[Array]) -> float:
+    total = sum(float(r @ r) for r in residuals)
+    return total if np.isfinite(total) else np.inf
+
+
+def difference_steps(problem: Problem, common: Array) -> Array:
+    """Steps for one-sided finite differences of the common parameters, away from bounds.
+
+    Args:
+        problem: gives the parameters and their bounds.
+        common: their values, shape (common,).
+
+    Returns:
+        Steps, shape (common,), each in its parameter's unit.
+    """
+    data = problem.data
+    windy = [run for run in data.runs if run.wind_on]
+    stiffness_load = max((data.air_moment(run) for run in windy), default=1.0)
+    damping_load = max(
+        (data.air_moment(run) * data.reference_length / run.wind_speed for run in windy), default=1.0
+    )
+    scales = {
+        "yaw_inertia": 0.1,
+        "stiffness": 10.0,
+        "added_stiffness": 1.0,
+        "mechanical_damping": 0.02,
+        "cn_beta": _AIR_STIFFNESS / stiffness_load,
+        "cn_r": _AIR_DAMPING / damping_load,
+        "zero": 1.0,
+        "drive_gain": _gain_scale(data),
+    }
+    for kind in problem.effects:
+        for info in kind.parameters():
+            scales[f"{kind.name}.{info.name}"] = info.scale
+    sizes = np.array(
+        [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
+    )
+    steps = 1e-5 * sizes
+    _, upper = problem.bounds
+    steps[common + steps > upper] *= -1.0
+    return steps
+
+
+def _gain_scale(data: Data) -> float:
+    """A small gain of the input, by what it does on the reference spring, N m per unit."""
+    largest = max(
+        (float(np.max(np.abs(r.drive.values))) for r in data.runs if r.drive is not None), default=1.0
+    )
+    return 1e-2 * REFERENCE_STIFFNESS * data.swing / largest
+
+
+def sensitivities(
+    problem: Problem, point: Point, base: Fit | None = None, prediction: list[Array] | None = None
+) -> list[tuple[Array, Array]]:
+    """Derivatives of the scaled prediction by finite differences.
+
+    Args:
+        base: a fit of the same runs; its derivatives are reused for the parameters it has.
+        prediction: at the point, by run, where it is known.
+
+    Returns:
+        By run: with respect to the common parameters, shape (n, common), and the run's own, shape (n, own).
+    """
+    known = 0 if base is None else len(base.problem.names)
+    known_own = 0 if base is None else base.point.release.shape[1]
+    steps = difference_steps(problem, point.common)
+    points = []
+    for i in range(known, steps.size):
+        moved = point.common.copy()
+        moved[i] += steps[i]
+        points.append(Point(moved, point.release))
+    amplitude = np.maximum(np.abs(point.release[:, 0]), 1e-3)
+    own = point.release.shape[1]
+    release_steps = [1e-5 * amplitude, 1e-4 * amplitude, *[np.full_like(amplitude, 1e-5)] * (own - 2)]
+    for j in range(known_own, own):
+        release = point.release.copy()
+        release[:, j] += release_steps[j]
+        points.append(Point(point.common, release))
+    if prediction is None:
+        prediction, *predictions = problem.predict([point, *points])
+    else:
+        predictions = problem.predict(points)
+    result = []
+    for r, run in enumerate(problem.data.runs):
+        with np.errstate(invalid="ignore"):  # a run that grew without bound; the caller looks for it
+            changes = [run.scaled(moved[r] - prediction[r]) for moved in predictions]
+        common = [c / steps[known + i] for i, c in enumerate(changes[: steps.size - known])]
+        ends = [c / release_steps[known_own + j][r] for j, c in enumerate(changes[steps.size - known :])]
+        if base is None:
+            result.append((np.stack(common, axis=1), np.stack(ends, axis=1)))
+        else:
+            result.append(
+                (
+                    np.column_stack([base.jacobian[r][0], *common]),
+                    np.column_stack([base.jacobian[r][1], *ends]),
+                )
+            )
+    return result
+
+
+def _covariance(jacobian: list[tuple[Array, Array]], products: Products | None) -> Array:
+    none = [np.zeros(c.shape[0]) for c, _ in jacobian]
+    matrix, _, _ = normal_equations(jacobian, none, products=products)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    inverse: Array = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)

@@ -1,0 +1,289 @@
+"""Prepare a campaign for the fits: in blocks, without what no free decay explains, whole or cut into stretches.
+
+Where the model is far from the motion, its phase is lost within a few cycles, and a fit of the whole run has many
+minima. In a stretch of two cycles the phase cannot be lost: what is wrong with the model shows as a frequency and a
+damping that differ from stretch to stretch (multiple shooting; Bock, Springer Ser. Chem. Phys. 18 (1981) 102).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Container
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
+from diagnosis.likelihood.problem import Point
+from diagnosis.likelihood.run_data import Data, RunData, Samples
+from diagnosis.policy import GROWN_ON
+from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+
+#: Interval of the block means, s: the motion stays below 10 Hz and the mains at 50 Hz.
+BLOCK_INTERVAL = 4e-3
+_END = 50  # a run ends where its last fiftieth stands
+_STILL = 0.02  # of the largest swing, within which a body counts as at rest
+_QUIET = 5.0  # noise standard deviations of a block mean, within which it does too
+_LONG_REST = 0.1  # of a run: a rest that is cut off
+
+
+def prepare(
+    campaign: Campaign,
+    noise_variance: dict[str, float],
+    similarity: Similarity = AS_MEASURED,
+    interval: float = BLOCK_INTERVAL,
+) -> Data:
+    """Average a campaign's records in blocks.
+
+    Args:
+        noise_variance: of one sample, rad², by run id.
+        similarity: how the campaign was made from the measured one.
+        interval: between the blocks, s; the nearest number of samples, at least one.
+
+    Returns:
+        The prepared data. Where any run states no stiffness, all are taken in normalised form; where a wind-on run
+        states no air density, all have the density 1 kg/m³.
+    """
+    rig = campaign.rig
+    held = {} if campaign.law is None else campaign.law.held
+    dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
+    runs = (
+        _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval, dense=dense)
+        for run in campaign.runs
+    )
+    normalised = any(run.spring_stiffness is None for run in campaign.runs)
+    return Data(
+        runs=tuple(
+            data if run.drive is None else _driven(data, run, normalised=normalised)
+            for data, run in zip(runs, campaign.runs, strict=True)
+        ),
+        frontal_area=rig.frontal_area or similarity.area,
+        reference_length=rig.reference_length or similarity.time,
+        width=rig.width or 0.0,
+        normalised=normalised,
+        yaw_inertia=rig.yaw_inertia,
+        own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held,
+        similarity=similarity,
+        law=campaign.law,
+    )
+
+
+def _prepare_run(
+    run: Run, noise_variance: float, derivative: int, interval: float, *, dense: bool
+) -> RunData:
+    record = run.record
+    block = max(1, round(interval * record.sample_rate))
+    count = record.yaw_rad.size // block
+    samples = None if record.uniform else Samples.of(record, block)
+    if samples is None:
+        reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
+    else:
+        since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
+        reading = samples.means(np.interp(samples.time, since, record.yaw_rad))
+    return RunData(
+        id=run.id,
+        reading=reading,
+        block=block,
+        interval=block * record.sample_interval,
+        noise_variance=noise_variance / block,
+        spring_stiffness=run.spring_stiffness,
+        wind_speed=run.wind_speed,
+        air_density=(run.air_density or 0.0) if dense else 1.0,
+        duration=record.duration + record.sample_interval,
+        derivative=derivative,
+        samples=samples,
+    )
+
+
+def _driven(data: RunData, run: Run, *, normalised: bool) -> RunData:
+    """A driven run with its input.
+
+    Per unit inertia, a known moment has an unknown gain too: one over the inertia.
+    """
+    assert run.drive is not None
+    known = run.drive.column == "moment_nm" or run.drive.gain is not None
+    moment = DriveMoment(
+        run.record.time_s - run.record.time_s[0],
+        run.drive.values,
+        scale=1.0 if run.drive.gain is None else run.drive.gain,
+        held=run.drive.hold == "zero",
+    )
+    return dataclasses.replace(data, drive=moment, gain_free=normalised or not known)
+
+
+def without_start(data: Data) -> Data:
+    """The runs from their second passage through the middle on.
+
+    Where a hand lets go late, the start of the record is driven, which no free decay explains.
+
+    Returns:
+        The data with every run cut at the first passage through its mean after its first turning point; a run
+        that would lose more than a quarter stays as it is.
+    """
+    return dataclasses.replace(data, runs=tuple(_without_start(run) for run in data.runs))
+
+
+def _without_start(run: RunData) -> RunData:
+    values = run.reading - np.mean(run.reading)
+    passages = np.flatnonzero(np.diff(np.signbit(values)))
+    turn = int(np.argmax(np.abs(values[: passages[0] + 1]))) if passages.size else 0
+    later = passages[passages > turn]
+    if later.size == 0 or later[0] > values.size // 4:
+        return run
+    return run.part(int(later[0]) + 1)
+
+
+def without_rest(data: Data) -> Data:
+    """The runs up to where their motion ends.
+
+    Where dry friction stops a body depends on its last swing discontinuously, so that χ² has many minima.
+
+    Returns:
+        The data with every run cut after its last reading that differs from its end by more than a fiftieth of its
+        largest swing.
+    """
+    return dataclasses.replace(data, runs=tuple(run.part(last=_moves_until(run)) for run in data.runs))
+
+
+def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
+    """The runs up to where their motion ends, where a long rest follows.
+
+    Returns:
+        The data with such runs cut after their last reading that differs from their end by more than the noise, and
+        the ids of these runs.
+    """
+    ends = [_moves_until(run, _QUIET * float(np.sqrt(run.noise_variance))) for run in data.runs]
+    rests = [end < (1.0 - _LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    each = list(zip(data.runs, ends, rests, strict=True))
+    runs = tuple(run.part(last=end) if rest else run for run, end, rest in each)
+    return data.with_runs(runs), tuple(run.id for run, _, rest in each if rest)
+
+
+def _moves_until(run: RunData, still: float | None = None) -> int:
+    """Number of blocks up to the last that is away from the end by more than ``still``, rad; all where none is.
+
+    Without it, by more than a fiftieth of the largest swing.
+    """
+    at_end = np.median(run.reading[-max(1, run.reading.size // _END) :])
+    away = np.abs(run.reading - at_end)
+    moving = np.flatnonzero(away > (_STILL * away.max() if still is None else still))
+    return int(moving[-1]) + 1 if moving.size else run.reading.size
+
+
+_SHORT, _LONG = 2, 18  # cycles
+_LONGER = 3  # times, from one fit to the next: the phase at the end of a stretch is known to that much
+_TOLERANCE = 1e-3  # of the fits on the way
+_ITERATIONS = 15
+
+
+def long_stretch(short: Stretches) -> int:
+    """Length, in blocks, of the stretches on which sets of causes are compared.
+
+    Over eighteen cycles a model of the motion shows in the phase as well; over a hundred the phase shows the clock,
+    the temperature and the hand that let go.
+
+    Args:
+        short: stretches of two cycles.
+    """
+    return short.length * _LONG // _SHORT
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """The runs of a campaign in stretches.
+
+    Args:
+        data: the stretches, as runs.
+        places: of each stretch its run's number and the block it begins with.
+        length: in blocks; the last of a run may be half as short or half as long again.
+    """
+
+    data: Data
+    places: tuple[tuple[int, int], ...]
+    length: int
+
+    def only(self, places: Container[tuple[int, int]]) -> Stretches:
+        """Those of the places given."""
+        if all(place in places for place in self.places):
+            return self
+        kept = [k for k, place in enumerate(self.places) if place in places]
+        runs = tuple(self.data.runs[k] for k in kept)
+        return Stretches(self.data.with_runs(runs), tuple(self.places[k] for k in kept), self.length)
+
+
+def in_stretches(data: Data, length: int | None = None) -> Stretches:
+    """Cut runs into stretches.
+
+    Args:
+        length: of a stretch, in blocks; two cycles where not given. Multiples of it have ends in common.
+
+    Returns:
+        The stretches. They may be fitted with effects that are autonomous.
+    """
+    if length is None:
+        length = round(_SHORT / (REFERENCE_FREQUENCY * data.runs[0].interval))
+    parts, places = [], []
+    for number, run in enumerate(data.runs):
+        count = max(1, round(run.reading.size / length))
+        begins = [k * length for k in range(count)]
+        for begin, end in zip(begins, [*begins[1:], run.reading.size], strict=True):
+            parts.append(dataclasses.replace(run.part(begin, end), id=f"{run.id} from block {begin}"))
+            places.append((number, begin))
+    return Stretches(data.with_runs(tuple(parts)), tuple(places), length)
+
+
+def spread_out(short: Stretches, data: Data) -> Stretches:
+    """Stretches of two cycles to grow sets of causes on, spread over the runs where all would be too many.
+
+    Args:
+        short: all of them.
+
+    Returns:
+        Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least
+        with which the runs divided by it have no more than `GROWN_ON` blocks.
+    """
+    each = ceil(sum(run.reading.size for run in data.runs) / GROWN_ON)
+    long = in_stretches(data, long_stretch(short))
+    kept: set[tuple[int, int]] = set()
+    for run in range(len(data.runs)):
+        begins = [begin for number, begin in long.places if number == run]
+        ends = [*begins[1:], data.runs[run].reading.size]
+        for begin, end in list(zip(begins, ends, strict=True))[::each]:
+            kept.update(place for place in short.places if place[0] == run and begin <= place[1] < end)
+    return short.only(kept)
+
+
+def fit_longer(
+    found: Fit, stretches: Stretches, data: Data, length: int | None = None
+) -> tuple[Fit, Stretches]:
+    """Fit ever longer stretches, each from the fit of shorter ones.
+
+    Args:
+        found: a fit of the stretches, the first of each run among them.
+        length: to reach, in blocks; None: whole runs.
+
+    Returns:
+        The fit of the longest stretches, and these. Whole runs are one stretch each and keep their own names.
+
+    Raises:
+        FitError: when the model cannot be integrated.
+    """
+    longest = max(run.reading.size for run in data.runs)
+    goal = longest if length is None else min(length, longest)
+    while stretches.length < goal:
+        known = dict(zip(stretches.places, found.point.release, strict=True))
+        longer = in_stretches(data, min(stretches.length * _LONGER, goal)).only(known)
+        if longer.length >= longest:
+            longer = Stretches(data, tuple((i, 0) for i in range(len(data.runs))), longest)
+        release = np.array([known[place] for place in longer.places])
+        problem = dataclasses.replace(found.problem, data=longer.data)
+        start = Point(found.point.common, release)
+        if longer.length >= goal:
+            found = fit(problem, start)
+        else:
+            found = fit(problem, start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
+        stretches = longer
+    return found, stretches

@@ -1,0 +1,483 @@
+"""Runs as the fits see them: samples in blocks, the means of the reading and the stated physics they belong to."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
+from diagnosis.likelihood.whitening import WHITE, colour, colouring, response, whiten
+from tunnel_sim.physics.expression import Expression, parse
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.vocabulary.joint_law import JointLaw
+from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
+from tunnel_sim.vocabulary.record import Array, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples that are not evenly spaced, on the uniform raster of the blocks.
+
+    A block without any has a place for one in its middle, so that every block has a mean; it does not count.
+
+    Args:
+        time: since the start of the first block, increasing, shape (m,), s.
+        block: the block that each sample lies in, shape (m,).
+        count: samples in each block, shape (n,).
+    """
+
+    time: Array
+    block: NDArray[np.int64]
+    count: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, record: Record, block: int) -> Samples:
+        """The samples of a record, in blocks that hold ``block`` of them on average.
+
+        The raster starts half a mean interval before the first sample, so that jitter moves few samples into the
+        next block.
+        """
+        blocks, interval = record.time_s.size // block, block * record.sample_interval
+        time = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
+        place = np.floor(time / interval).astype(np.int64)
+        count = np.bincount(place, minlength=blocks)[:blocks]
+        empty = np.flatnonzero(count == 0)
+        order = np.argsort(np.concatenate([time[place < blocks], (empty + 0.5) * interval]))
+        time = np.concatenate([time[place < blocks], (empty + 0.5) * interval])[order]
+        return cls(time, np.concatenate([place[place < blocks], empty])[order], count)
+
+    def means(self, values: Array) -> Array:
+        """Mean over each block of one value per sample, shape (m,) or (k, m)."""
+        rows = np.atleast_2d(values)
+        sums = np.stack([np.bincount(self.block, row, self.count.size) for row in rows])
+        return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
+
+    def part(self, first: int, last: int, interval: float) -> Samples:
+        """The samples of some of the blocks.
+
+        Args:
+            first: number of the first block.
+            last: number of the block after the last one.
+            interval: of a block, s.
+        """
+        inside = slice(*np.searchsorted(self.block, (first, last)))
+        return Samples(
+            self.time[inside] - first * interval, self.block[inside] - first, self.count[first:last]
+        )
+
+
+def hermite_means(block: int, derivative: int = 0, interval: float = 1.0) -> Array:
+    """Weights that turn a step's ends into the mean over its evenly spaced samples.
+
+    Args:
+        block: samples in the step, the first at its start.
+        derivative: as in `hermite_basis`.
+        interval: of the step, s.
+
+    Returns:
+        As `hermite_basis`, shape (4,).
+    """
+    means: Array = hermite_basis(np.arange(block) / block, derivative, interval).mean(axis=1)
+    return means
+
+
+def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array:
+    """The cubic through both ends of a step, or a derivative of it.
+
+    Args:
+        u: places in the step, from 0 to 1, shape (n,).
+        derivative: 0, 1 or 2.
+        interval: of the step, s.
+
+    Returns:
+        Weights of (start angle, end angle, interval × start rate, interval × end rate), shape (4, n), in units of
+        s to the power of −``derivative``: exact to the integrator's order for the angle, and to one and two orders
+        less for its derivatives.
+    """
+    basis = (
+        [2 * u**3 - 3 * u**2 + 1, -2 * u**3 + 3 * u**2, u**3 - 2 * u**2 + u, u**3 - u**2],
+        [6 * u**2 - 6 * u, -6 * u**2 + 6 * u, 3 * u**2 - 4 * u + 1, 3 * u**2 - 2 * u],
+        [12 * u - 6, -12 * u + 6, 6 * u - 4, 6 * u - 2],
+    )[derivative]
+    return np.array(basis) / interval**derivative
+
+
+def _filtered(fraction: tuple[Array, Array], values: Array) -> Array:
+    """Values, in columns or in one, after a filter of this numerator and denominator."""
+    from scipy.signal import lfilter  # only here: slow to load
+
+    return np.asarray(lfilter(*fraction, values, axis=0), np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class RunData:
+    """One run as the fits see it.
+
+    Args:
+        id: of the run.
+        reading: block means, rad, shape (n,); interpolated where a block has no sample.
+        block: samples per block, on average where they are not evenly spaced.
+        interval: between blocks, s.
+        noise_variance: of one block mean of ``block`` samples, rad²; of its innovations where it is coloured.
+        spring_stiffness: stated, N m/rad; None in normalised form.
+        wind_speed: stated, m/s.
+        air_density: stated, kg/m³; 0 where the wind is off.
+        duration: of the record, s.
+        start: time left out at the start of the record, s.
+        derivative: which derivative of the angle the reading is: 0, 1 or 2. The units of the reading and its noise
+            follow from it.
+        samples: where they are, if they are not evenly spaced.
+        whitening: filter that makes the noise of the block means white, its first tap 1, shape (order + 1,).
+        innovations: numerator and denominator of the filter that then makes the response to a random moment white,
+            which begins at rest with the run; None where there is no such moment.
+        drive: the moment of a driven run, its times since the start of the record; None of a free decay.
+        gain_free: whether the common gain multiplies that moment.
+    """
+
+    id: str
+    reading: Array
+    block: int
+    interval: float
+    noise_variance: float
+    spring_stiffness: float | None
+    wind_speed: float
+    air_density: float
+    duration: float
+    start: float = 0.0
+    derivative: int = 0
+    samples: Samples | None = None
+    whitening: Array = field(default_factory=lambda: WHITE)
+    innovations: tuple[Array, Array] | None = None
+    drive: DriveMoment | None = None
+    gain_free: bool = False
+
+    @property
+    def conditions(self) -> tuple[object, ...]:
+        """What the moment law and its integration depend on: spring, wind, sampling and input."""
+        free = self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
+        return free if self.drive is None else (*free, id(self.drive), self.start)
+
+    def moment(self, gain: float) -> DriveMoment | None:
+        """The moment of the input from the first block on; None of a free decay.
+
+        Args:
+            gain: of an input whose gain is not known, N m per unit of the input; of others it does not matter.
+        """
+        if self.drive is None:
+            return None
+        scale = self.drive.scale * (gain if self.gain_free else 1.0)
+        first = max(round(self.start / self.interval) * self.block - 1, 0)
+        seen = slice(first, first + (self.reading.size + 1) * self.block + 2)
+        return dataclasses.replace(
+            self.drive,
+            time_s=self.drive.time_s[seen],
+            values=self.drive.values[seen],
+            scale=scale,
+            delay=self.drive.delay - self.start,
+        )
+
+    @property
+    def input_means(self) -> Array:
+        """Block means of the input of a driven run, shape (n,), in its own unit."""
+        assert self.drive is not None
+        first = round(self.start / self.interval) * self.block
+        values = self.drive.values[first : first + self.reading.size * self.block]
+        return np.asarray(values.reshape(-1, self.block).mean(axis=1), np.float64)
+
+    @property
+    def wind_on(self) -> bool:
+        """Whether the wind blows."""
+        return self.wind_speed > 0.0
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights that turn a block's ends into its mean, as `hermite_means` gives them.
+
+        Shape (4,), or (4, n) where the samples are not evenly spaced.
+        """
+        if self.samples is None:
+            return hermite_means(self.block, self.derivative, self.interval)
+        u = self.samples.time / self.interval - self.samples.block
+        return self.samples.means(hermite_basis(u, self.derivative, self.interval))
+
+    @cached_property
+    def times(self) -> Array:
+        """Mean time of the samples of every block since the first block's start, shape (n,), s."""
+        if self.samples is None:
+            return np.asarray(
+                (np.arange(self.reading.size) + 0.5 * (self.block - 1) / self.block) * self.interval
+            )
+        return self.samples.means(self.samples.time)
+
+    @property
+    def sample_times(self) -> Array:
+        """Time of every sample in the blocks since the first block's start, shape (m,), s."""
+        if self.samples is not None:
+            return self.samples.time
+        return np.asarray(
+            np.arange(self.reading.size * self.block) * (self.interval / self.block), np.float64
+        )
+
+    def scaled(self, difference: Array) -> Array:
+        """A difference of readings as white residuals.
+
+        Args:
+            difference: of block means, in the unit of the reading, shape (n,).
+
+        Returns:
+            In noise standard deviations, shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
+        """
+        if self.samples is None:
+            return np.asarray(self.white(difference) / np.sqrt(self.noise_variance), np.float64)
+        seen = np.where(self.samples.count > 0, difference, 0.0)
+        return self.white(seen) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
+
+    def white(self, values: Array) -> Array:
+        """Block means with white noise.
+
+        Args:
+            values: of the run, or several in columns, shape (n,) or (n, k), any unit.
+
+        Returns:
+            Of the values' shape and unit.
+        """
+        found = whiten(values, self.whitening)
+        if self.innovations is None:
+            return found
+        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
+            return _filtered(self.innovations, found)
+
+    @cached_property
+    def taps(self) -> Array:
+        """Response of `white` to one value well inside the run, dimensionless, shape (m,)."""
+        if self.innovations is None:
+            return self.whitening
+        impulse = np.zeros(self.reading.size)
+        impulse[: self.whitening.size] = self.whitening[: impulse.size]
+        return _filtered(self.innovations, impulse)
+
+    def unwhitened(self, difference: Array) -> Array:
+        """A difference of readings over the noise of its innovations, not whitened.
+
+        Args:
+            difference: of block means, in the unit of the reading, shape (n,).
+
+        Returns:
+            Dimensionless, shape (n,): `scaled` of it where the noise is white.
+        """
+        filled = 1.0 if self.samples is None else np.sqrt(self.samples.count / self.block)
+        return np.asarray(difference * filled / np.sqrt(self.noise_variance), np.float64)
+
+    def unscaled(self, residual: Array) -> Array:
+        """The inverse of `scaled`.
+
+        Args:
+            residual: white, in noise standard deviations, shape (n,).
+
+        Returns:
+            Difference of block means, in the unit of the reading, shape (n,); 0 in empty blocks.
+        """
+        if self.samples is not None:
+            residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
+        innovations = residual * np.sqrt(self.noise_variance)
+        if self.innovations is not None:
+            innovations = _filtered(self.innovations[::-1], innovations)
+        return np.asarray(colour(innovations, self.whitening), np.float64)
+
+    @property
+    def filled(self) -> int:
+        """Number of blocks with samples."""
+        return self.reading.size if self.samples is None else int(np.count_nonzero(self.samples.count))
+
+    def means(self, values: Array) -> Array:
+        """Block means of one value per sample.
+
+        Args:
+            values: shape (m,) or (k, m).
+
+        Returns:
+            Shape (n,) or (k, n).
+        """
+        if self.samples is not None:
+            return self.samples.means(values)
+        blocks = values.reshape(*values.shape[:-1], self.reading.size, self.block)
+        return np.asarray(blocks.mean(axis=-1), np.float64)
+
+    def part(self, first: int = 0, last: int | None = None) -> RunData:
+        """The run from one block up to another.
+
+        Args:
+            first: its first block.
+            last: the block after its last one; None: to the end.
+
+        Returns:
+            The shorter run. Its duration is that of the record less what is left out at the start.
+        """
+        last = self.reading.size if last is None else last
+        return dataclasses.replace(
+            self,
+            reading=self.reading[first:last],
+            duration=self.duration - first * self.interval,
+            start=self.start + first * self.interval,
+            samples=None if self.samples is None else self.samples.part(first, last, self.interval),
+        )
+
+    @property
+    def noise_std(self) -> float:
+        """Standard deviation of the noise of one block mean, rad."""
+        return float(np.sqrt(self.noise_variance)) * colouring(self.whitening)
+
+    def noise_at(self, frequency: float | Array) -> Array:
+        """The noise at a frequency.
+
+        Args:
+            frequency: Hz, any shape.
+
+        Returns:
+            Standard deviation of white noise of the same density, rad, of the frequency's shape.
+        """
+        return np.asarray(np.sqrt(self.noise_variance) / np.abs(self.response(frequency)))
+
+    def response(self, frequency: float | Array) -> np.ndarray:
+        """What the whitening filters make of a sinusoid.
+
+        Args:
+            frequency: Hz, any shape.
+
+        Returns:
+            Complex factor, dimensionless, of the frequency's shape; 1 where the noise is white.
+        """
+        cycles = np.asarray(frequency) * self.interval
+        found = response(self.whitening, cycles)
+        if self.innovations is None:
+            return found
+        numerator, denominator = self.innovations
+        return np.asarray(found * response(numerator, cycles) / response(denominator, cycles))
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """A campaign as the fits see it.
+
+    Args:
+        runs: prepared runs.
+        frontal_area: A, m²; 1 in the measured campaign's units where it does not state it.
+        reference_length: l, m; likewise.
+        width: m; likewise.
+        normalised: whether the runs are fitted per unit inertia with a common stiffness.
+        yaw_inertia: nominal Izz, kg m²; None where the campaign does not state it.
+        own_zeros: whether every run has a zero of its own.
+        windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
+            then keeps its aerodynamic parameters.
+        similarity: how the campaign was made from the measured one.
+        law: of the joint in a model of one's own; None: spring and damper.
+        keeps_gain: whether the runs are part of a campaign with an input of unknown gain, though none of these
+            may have one: the model then keeps the gain.
+    """
+
+    runs: tuple[RunData, ...]
+    frontal_area: float
+    reference_length: float
+    width: float
+    normalised: bool
+    yaw_inertia: float | None
+    own_zeros: bool = False
+    windy: bool = False
+    similarity: Similarity = AS_MEASURED
+    law: JointLaw | None = None
+    keeps_gain: bool = False
+
+    @property
+    def driven(self) -> bool:
+        """Whether any of the runs has an input."""
+        return any(run.drive is not None for run in self.runs)
+
+    @property
+    def gain_free(self) -> bool:
+        """Whether any run of the campaign has an input of unknown gain."""
+        return self.keeps_gain or any(run.gain_free for run in self.runs)
+
+    @cached_property
+    def program(self) -> tuple[float, ...]:
+        """The moment that the law has beside its linear spring and damper, as the moment law evaluates it."""
+        if self.law is None or not self.law.terms:
+            return ()
+        return departure(self.law).program({}, {"b": "angle", "r": "rate"})
+
+    @cached_property
+    def swing(self) -> float:
+        """The largest angle of the motion from its middle, rad, also where the readings are rates."""
+        turn = 2.0 * np.pi * REFERENCE_FREQUENCY
+        return max(0.5 * float(np.ptp(run.reading)) / turn**run.derivative for run in self.runs)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the greatest reading of all runs, rad."""
+        readings = [run.reading for run in self.runs]
+        return min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
+
+    @property
+    def springs(self) -> tuple[float, ...]:
+        """Stated stiffnesses, ascending, N m/rad."""
+        return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness is not None}))
+
+    @property
+    def wind_on(self) -> bool:
+        """Whether any run of the campaign has the wind on."""
+        return self.windy or any(run.wind_on for run in self.runs)
+
+    def air_moment(self, run: RunData | RunSettings) -> float:
+        """The air's yaw moment on the model for a moment coefficient of 1.
+
+        Args:
+            run: gives the air's density and speed.
+
+        Returns:
+            ½ρV²·A·l, N m.
+        """
+        return aerodynamic_stiffness(
+            1.0,
+            air_density=run.air_density,
+            wind_speed=run.wind_speed,
+            frontal_area=self.frontal_area,
+            reference_length=self.reference_length,
+        )
+
+    def with_runs(self, runs: tuple[RunData, ...]) -> Data:
+        """Other runs of the same campaign, whose model has the same parameters.
+
+        Args:
+            runs: some of the runs, or further ones.
+        """
+        return dataclasses.replace(self, runs=runs, windy=self.wind_on, keeps_gain=self.gain_free)
+
+    def undriven(self) -> Data:
+        """The same runs as free decays, whose model has the same parameters."""
+        if not self.driven:
+            return self
+        return self.with_runs(tuple(dataclasses.replace(r, drive=None, gain_free=False) for r in self.runs))
+
+    def subset(self, keep: tuple[str, ...]) -> Data:
+        """The runs of the given ids.
+
+        Args:
+            keep: ids.
+        """
+        return self.with_runs(tuple(run for run in self.runs if run.id in keep))
+
+
+def departure(law: JointLaw) -> Expression:
+    """The moment that a joint's law has beside its linear spring, damper and friction.
+
+    Args:
+        law: with one term or more.
+
+    Returns:
+        Of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s), in N m.
+    """
+    text = "".join(f"-({term.coefficient!r})*({term.expression})" for term in law.terms)
+    return parse(text, frozenset("br"))

@@ -1,0 +1,354 @@
+"""Where fits start: the nominal model from the records alone, and an effect's severity from its signature."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, normal_equations
+from diagnosis.likelihood.per_run_parameters import OwnNumbers, ringing, skip
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.residuals import CHANNELS, Line, mains_line, misfit, shedding_line
+from diagnosis.likelihood.run_data import Data, RunData, departure
+from diagnosis.policy import GROSS_MISFIT
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.driven import driven_start
+from identification.signal.free_decay import Decay
+from identification.signal.frequency import peak_of_swing, starting_decay
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
+from tunnel_sim.vocabulary.record import Array, Record
+
+_STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
+_PHASES = 64  # of a cycle, for its mean
+_NEARER = 0.02  # of the size that linear theory gives an effect
+_PADDING = 16  # zero padding of the spectrum that gives the first frequency
+
+
+def decays_start(data: Data) -> Point | None:
+    """A starting point for the nominal model from the runs' own decays, which `identify` gives.
+
+    A frequency that depends on the amplitude spreads the peak of a spectrum, and χ² has a minimum for every cycle
+    more or less that fits the record.
+
+    Returns:
+        As `nominal_start`; None where a run has no decay of its own.
+    """
+    if data.driven:
+        return None
+    decays = []
+    for run in data.runs:
+        record = Record(run.times, run.reading)
+        start = starting_decay(record)
+        found = None if start is None else fit_run(Reading.from_record(record), start)
+        if found is None or not found.runs or found.runs[0].decay.stiffness <= 0.0:
+            return None
+        decays.append(found.runs[0].decay)
+    return nominal_start(data, decays)
+
+
+def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
+    """A starting point for the nominal model.
+
+    Args:
+        decays: of the runs, where they are known; else their frequencies are those of their spectra, or of a
+            driven run that of the resonance between input and motion.
+
+    Returns:
+        Inertia and aerodynamic stiffness by linear regression of the runs' frequencies, a small damping, and
+        the releases from the first samples.
+    """
+    driven = [None if run.drive is None else _driven_start(run) for run in data.runs]
+    omega2 = np.array(
+        [
+            (2.0 * np.pi * _frequency(run)) ** 2 if response is None else response[1]
+            for run, response in zip(data.runs, driven, strict=True)
+        ]
+        if decays is None
+        else [decay.stiffness for decay in decays]
+    )
+    swing = np.array([float(np.std(run.reading)) for run in data.runs])
+    moving = (swing > _STILL * swing.max()).astype(np.float64)  # a body at rest has no frequency
+    typical = float(np.median(omega2[moving > 0.0]))
+    own = [float(np.mean(run.reading)) for run in data.runs]
+    common = float(np.median(own))
+    zeros = own if data.own_zeros else [common] * len(own)
+    release = np.array([[np.mean(r.reading[:3]) - z, 0.0, z] for r, z in zip(data.runs, zeros, strict=True)])
+    release, zero = (release, ()) if data.own_zeros else (release[:, :2], (common,))
+    found = [one for one in driven if one is not None]
+    losses = [2.0 * one[0] for one in found if one[0] > 0.0]
+    loss = float(np.median(losses)) if losses else 0.01 * float(np.sqrt(typical))
+    gain: tuple[float, ...] = (_gain_start(data, driven),) if data.gain_free else ()
+    if data.normalised:
+        return Point(np.array([typical, loss, *_still(data), *gain, *zero]), release)
+    spring = _seen_stiffness(data, swing)
+    pressure = np.array([data.air_moment(run) for run in data.runs])
+    # Kr = Izz ω² + pressure Cnβ, with equal relative errors
+    design = np.column_stack([omega2, pressure]) / spring[:, None] * moving[:, None]
+    if not data.wind_on:
+        design = design[:, :1]
+    solution = np.linalg.lstsq(design, moving, rcond=None)[0]
+    inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median((spring / omega2)[moving > 0.0]))
+    air = (float(solution[1]), 0.0) if data.wind_on else ()
+    damping = inertia * loss if losses else 0.01 * inertia * float(np.sqrt(typical))
+    gain = tuple(inertia * one for one in gain)
+    names = Problem(dataclasses.replace(data, law=None)).nominal_names
+    start = dict(zip(names, [inertia, damping, *air, *gain, *zero], strict=True)) | {"added_stiffness": 0.0}
+    return Point(np.array([start[name] for name in Problem(data).nominal_names]), release)
+
+
+def _driven_start(run: RunData) -> tuple[float, float, float] | None:
+    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit); None where the run shows no resonance."""
+    found = driven_start(run.times, run.reading, run.input_means)
+    return None if found is None or found[1] <= 0.0 else found
+
+
+def _gain_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> float:
+    """The gain of the input per unit inertia, by its median over the runs."""
+    gains = [
+        found[2] / run.drive.scale
+        for run, found in zip(data.runs, driven, strict=True)
+        if found is not None and run.gain_free and run.drive is not None
+    ]
+    return float(np.median(gains)) if gains else 0.0
+
+
+def _seen_stiffness(data: Data, swing: Array) -> Array:
+    """Stiffness of every run at its amplitude, N m/rad, shape (runs,), by harmonic balance.
+
+    ``swing`` holds the runs' root mean square displacements, rad.
+    """
+    stated = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+    if data.law is None or not data.law.terms:
+        return stated
+    phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+    amplitude = np.sqrt(2.0) * swing[:, None]
+    further = departure(data.law).value({"b": amplitude * np.cos(phase), "r": 0.0})
+    seen = stated - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude[:, 0], 1e-12)
+    return np.where(seen > 0.0, seen, stated)
+
+
+def _still(data: Data) -> tuple[float, ...]:
+    return (0.0, 0.0) if data.wind_on else ()
+
+
+def _frequency(run: RunData) -> float:
+    """Frequency of the greatest peak of a run's spectrum, Hz."""
+    values = run.reading - run.reading.mean()
+    size = _PADDING * values.size
+    return float(peak_of_swing(values, size) / (size * run.interval))
+
+
+@dataclass(frozen=True, eq=False)
+class StartingPoint:
+    """Where the fit of an effect starts, and how much linear theory predicts that it closes.
+
+    Args:
+        problem: the fit with the effect added.
+        point: where to start.
+        predicted_drop: of χ² by linear theory, dimensionless.
+        predicted: χ² beyond noise that linear theory leaves by channel, shape (6,), dimensionless.
+        scaled: place of the common parameter that linear theory has scaled; None where it scaled none.
+    """
+
+    problem: Problem
+    point: Point
+    predicted_drop: float
+    predicted: Array
+    scaled: int | None
+
+    def nearer(self) -> StartingPoint | None:
+        """The point with much less of the effect; None where linear theory did not say how much.
+
+        A fit from there goes down from the fit without the effect.
+        """
+        if self.scaled is None:
+            return None
+        common = self.point.common.copy()
+        common[self.scaled] *= _NEARER
+        return dataclasses.replace(self, point=Point(common, self.point.release))
+
+
+def _of_line(line: Line | None) -> OwnNumbers | None:
+    return None if line is None else OwnNumbers((line.amplitude, line.parameter), line.phases, line.drop)
+
+
+#: How an effect with a number of its own in every run is found: a periodic one by what sets its frequency.
+_FINDERS: Mapping[str, Callable[[Fit], OwnNumbers | None]] = {
+    "mains": lambda base: _of_line(mains_line(base)),
+    "shedding": lambda base: _of_line(shedding_line(base)),
+    "ringing": ringing,
+    "skips": skip,
+}
+
+
+def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
+    """Starting points for adding one effect to a fitted problem, by the drop of χ² predicted, greatest first.
+
+    Args:
+        base: the fit without it.
+        kind: the effect to add.
+
+    Returns:
+        One per trial; none where the effect cannot be seen in these runs.
+    """
+    data = base.problem.data
+    if kind.condition == "wind_on" and not data.wind_on:
+        return []
+    if kind.line or kind.skips:
+        found_own = _FINDERS[kind.line or "skips"](base)
+        return [] if found_own is None else [_own_start(base, kind, found_own)]
+    found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
+    return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
+
+
+def is_gross(fit: Fit) -> bool:
+    """Whether a fit misses the motion itself, so that its sensitivities are of little use.
+
+    Returns:
+        True where the residual holds more than a hundredth of the reading's power.
+    """
+    readings = sum(
+        float(np.sum(r.scaled(r.reading - np.mean(r.reading)) ** 2)) for r in fit.problem.data.runs
+    )
+    return fit.total > GROSS_MISFIT * readings
+
+
+def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoint:
+    problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
+    infos = _own_parameters(problem, kind)
+    values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
+    release = np.column_stack([base.point.release, found.numbers])
+    point = Point(np.concatenate([base.point.common, values]), release)
+    predicted = misfit(base).excess
+    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= found.drop
+    return StartingPoint(problem, point, found.drop, predicted, base.point.common.size)
+
+
+def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
+    """Those parameters of an effect that are free in a problem."""
+    return [info for info in kind.parameters() if f"{kind.name}.{info.name}" in problem.names]
+
+
+def _circumstances(data: Data) -> Circumstances:
+    greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
+    slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
+    return Circumstances(data.springs, greatest, data.normalised, slowest)
+
+
+def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
+    spring = kind.chosen_spring()
+    held = {} if spring is None else {spring: trial.values[spring]}
+    fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
+    freed = any(info.form and info.name in trial.values for info in kind.parameters())
+    with_free_form = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
+    effects = (*base.problem.effects, kind)
+    problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=with_free_form)
+    infos = _own_parameters(problem, kind)
+    scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
+    values = np.array([trial.values.get(info.name, info.default) for info in infos])
+    names = base.problem.names
+    replaced = names.index(trial.replaces) if trial.replaces in names else None
+    change = _moderate_change(base, problem, values, scaled, replaced)
+    if change is None:
+        return None
+    left = project_out(base, change)
+    power = sum(float(c @ c) for c in left)
+    if power <= 0.0:
+        return None
+    slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
+    start, drop = values.copy(), slope * slope * power
+    if scaled is not None:
+        moderate = np.clip(slope * values[scaled], -trial.at_most, trial.at_most)
+        start[scaled] = np.clip(moderate, infos[scaled].lower, infos[scaled].upper)
+        if start[scaled] == 0.0:
+            start[scaled], drop = 0.01 * values[scaled], 0.0
+        if replaced is not None:
+            start[scaled] = min(start[scaled], base.point.common[replaced])
+    point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
+    place = None if scaled is None else base.point.common.size + scaled
+    after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
+    return StartingPoint(problem, point, drop, misfit(base, after).excess, place)
+
+
+def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:
+    """Common parameters with those of an effect; ``replaced`` is the place of the one that it replaces."""
+    common = base.point.common.copy()
+    if scaled is not None and replaced is not None:
+        common[replaced] -= values[scaled]
+    return np.concatenate([common, values])
+
+
+def _moderate_change(
+    base: Fit, problem: Problem, values: Array, scaled: int | None, replaced: int | None = None
+) -> list[Array] | None:
+    """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
+
+    ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
+    place of the one that is lowered, None where none may be, and ``replaced`` that of the one that it replaces.
+    """
+    data = base.problem.data
+    limit = 3.0 * np.sqrt(base.total)
+    for _ in range(12):
+        moved = problem.predict([Point(_with_effect(base, values, scaled, replaced), base.point.release)])[0]
+        change = [
+            run.scaled(m - run.reading) + r
+            for m, run, r in zip(moved, data.runs, base.residuals, strict=True)
+        ]
+        size = float(np.sqrt(sum(float(c @ c) for c in change)))
+        if np.isfinite(size) and (size <= limit or scaled is None):
+            return change
+        if scaled is None:
+            return None
+        values[scaled] *= 0.1 if not np.isfinite(size) else max(0.01, 0.5 * limit / size)
+    return None
+
+
+def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
+    """What an effect of typical size changes that the fitted parameters cannot absorb.
+
+    Args:
+        base: a fit without it.
+        kind: an effect without numbers of its own in every run.
+
+    Returns:
+        The scaled change of all runs, shape (n,), and its norm as a share of the whole change; None where the
+        runs cannot show the effect.
+    """
+    data = base.problem.data
+    trial = next(iter(kind.trials(_circumstances(data))), None)
+    if trial is None or (kind.condition == "wind_on" and not data.wind_on):
+        return None
+    effects = (*base.problem.effects, kind)
+    problem = dataclasses.replace(base.problem, effects=effects, free_forms=(kind.name,))
+    infos = _own_parameters(problem, kind)
+    values = np.array([trial.values.get(info.name, info.default) for info in infos])
+    scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
+    change = _moderate_change(base, problem, values, scaled)
+    if change is None:
+        return None
+    left, whole = np.concatenate(project_out(base, change)), np.concatenate(change)
+    size = float(np.linalg.norm(whole))
+    return None if size == 0.0 else (left, float(np.linalg.norm(left)) / size)
+
+
+def project_out(base: Fit, columns: list[Array]) -> list[Array]:
+    """The part of a change of the prediction that the fitted parameters cannot absorb.
+
+    Args:
+        base: a fit, whose common parameters and releases absorb.
+        columns: scaled change by run, each of shape (n,).
+
+    Returns:
+        The remainder, by run.
+    """
+    matrix, gradient, solutions = normal_equations(base.jacobian, columns, products=base.products)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    step = np.linalg.lstsq(matrix / np.outer(scale, scale), gradient / scale, rcond=1e-12)[0] / scale
+    return [
+        column - common @ step - release @ (solution[:, -1] - solution[:, :-1] @ step)
+        for column, (common, release), solution in zip(columns, base.jacobian, solutions, strict=True)
+    ]

@@ -1,0 +1,1 @@
+"""The noise of the records, and whether there is a gap beyond it."""

@@ -1,0 +1,345 @@
+"""The colour of the sensor's noise: its spectrum where the motion is not; and a zero that wanders.
+
+Coloured noise differs from a gap in three properties. It is as strong with the wind off as on, it is as strong at
+the start of a record as at its end, and it is smooth across the motion's frequency and its harmonics. Its spectrum
+is therefore taken between the harmonics, in parts of all records, where these parts agree. A gap changes with the
+wind or the amplitude, and lies at the harmonics, across which the spectrum is interpolated.
+
+Both make a spectrum that rises towards low frequencies. That of noise is level below some corner; that of a random
+walk is not, because its zero goes ever further away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import chdtri
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.policy import (
+    CHANCE_STDS,
+    COLOUR_AMPLITUDES,
+    COLOUR_FALSE_ALARM_RATE,
+    COLOUR_STEADY_RATE,
+    COLOUR_THROUGHOUT,
+    FLOOR_TOLERANCE,
+)
+from tunnel_sim.vocabulary.record import Array
+
+_PARTS = 8  # parts of records to compare, where they are long enough
+_FEWEST_PARTS = 4  # fewer agree by chance
+_CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays within the share left out
+_BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
+_LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
+_OCTAVE_PARTS = 2  # bands in an octave
+_SLOPE_BANDS = 4  # lowest bands that give the slope below them
+#: Neighbouring ordinates under a Hann window: as many carry the information of one independent ordinate.
+HANN = 1.94
+_LONGEST = 512  # taps of the whitening filter
+
+
+@dataclass(frozen=True, eq=False)
+class Colour:
+    """A spectrum of the noise of block means.
+
+    Args:
+        frequency: centres of bands, Hz, ascending, shape (n,).
+        level: natural logarithm of the power over that of the white noise assumed before, shape (n,).
+        std: of the levels, shape (n,).
+        slope: of the level against the logarithm of frequency in the lowest bands, between 0 and that of a random
+            walk, −2; dimensionless.
+        slope_std: its standard deviation, dimensionless.
+        steep: slope assumed below the first band: the same, made steeper by what chance may hide; dimensionless.
+    """
+
+    frequency: Array
+    level: Array
+    std: Array
+    slope: float
+    slope_std: float
+    steep: float
+
+    def at(self, frequency: Array) -> Array:
+        """The level at some frequencies, as high below the first band as chance allows.
+
+        Args:
+            frequency: Hz, above zero, any shape.
+
+        Returns:
+            Natural logarithm of the power ratio, of the frequency's shape.
+        """
+        return self._extended(frequency, self.steep)
+
+    def _extended(self, frequency: Array, slope: float) -> Array:
+        place, places = np.log(frequency), np.log(self.frequency)
+        below = np.minimum(place - places[0], 0.0)
+        return np.asarray(np.interp(place, places, self.level) + slope * below)
+
+    def mean(self, count: int, interval: float) -> float:
+        """The mean power over the frequencies of a record.
+
+        Args:
+            count: values in the record.
+            interval: between them, s.
+        """
+        frequency = np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)
+        return float(np.mean(np.exp(self._extended(frequency, self.slope))))
+
+    def spread(self, frequency: Array) -> float:
+        """How well the mean power over some frequencies is known.
+
+        Args:
+            frequency: Hz, above zero, shape (n,).
+
+        Returns:
+            Standard deviation of the mean power, a share of it.
+        """
+        place, places = np.log(frequency), np.log(self.frequency)
+        nearest = np.argmin(np.abs(place[:, None] - places), axis=1)
+        share = np.bincount(nearest, minlength=places.size) / place.size
+        below = float(np.mean(np.minimum(place - places[0], 0.0)))
+        return float(np.sqrt(np.sum((share * self.std) ** 2) + (below * self.slope_std) ** 2))
+
+
+def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False) -> Colour | None:
+    """The colour of the noise in the residuals of a fit.
+
+    Args:
+        nominal: any fit whose residuals were scaled as white.
+        beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
+        throughout: whether the lowest band and `COLOUR_THROUGHOUT` of all must be steady; otherwise any two do.
+
+    Returns:
+        The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
+        parts of the records, of which there must be four.
+    """
+    parts = [part for i in range(len(nominal.residuals)) for part in _parts(nominal, i)]
+    sizes = [part.motion for part in parts]
+    if len(sizes) < _FEWEST_PARTS or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
+        return None
+    lowest = max(
+        _LOWEST * max(part.frequency[1] for part in parts),
+        beyond * max(resonance(nominal, i) for i in range(len(nominal.residuals))),
+    )
+    highest = 0.5 / max(run.interval for run in nominal.problem.data.runs)
+    if highest < 2.0 * lowest:
+        return None
+    edges = _band_edges(lowest, highest)
+    cells = [part.by_band(edges) for part in parts]
+    power, count = (np.array(column) for column in zip(*cells, strict=True))
+    steady = _steady(power, count)
+    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= COLOUR_THROUGHOUT)):
+        return None
+    total = count.sum(axis=0)
+    level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
+    std = np.sqrt(1.0 / total[steady])
+    if _flat(level, std):
+        return None
+    centres = np.sqrt(edges[1:] * edges[:-1])[steady]
+    slope, slope_std = _slope(np.log(centres), level, std)
+    # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
+    steep = slope - CHANCE_STDS * slope_std if steady[0] else slope
+    return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
+
+
+def between_harmonics(fit: Fit, index: int) -> tuple[Array, Array]:
+    """The periodogram of a run's residuals between the harmonics of its motion.
+
+    Args:
+        fit: its residuals are scaled as white.
+        index: of the run.
+
+    Returns:
+        Frequency (Hz) and power (in units of white noise), shape (n,) each.
+    """
+    run = fit.problem.data.runs[index]
+    values = run.unscaled(fit.residuals[index])
+    whole = _part(values, run.reading - values, run, resonance(fit, index))
+    return whole.frequency[whole.between], whole.power[whole.between]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of a record: its periodogram, in units of white noise, and the size of the motion (rad)."""
+
+    frequency: Array
+    power: Array
+    between: Array  # which ordinates lie between the harmonics of the motion
+    motion: float
+
+    def by_band(self, edges: Array) -> tuple[Array, Array]:
+        """Mean power and number of independent ordinates by band, shape (bands,) each."""
+        band = np.searchsorted(edges, self.frequency[self.between], side="right") - 1
+        inside = (band >= 0) & (band < edges.size - 1)
+        count = np.bincount(band[inside], minlength=edges.size - 1)
+        power = np.bincount(band[inside], self.power[self.between][inside], edges.size - 1)
+        return power / np.maximum(count, 1), count / HANN
+
+
+def _parts(fit: Fit, index: int) -> list[_Part]:
+    """The parts of one run; none where it is shorter than one part."""
+    run, own = fit.problem.data.runs[index], resonance(fit, index)
+    cycles = run.reading.size * run.interval * own
+    wanted = max(2, -(-_PARTS // len(fit.residuals)))
+    count = min(wanted, int(cycles / _CYCLES))
+    values = run.unscaled(fit.residuals[index])
+    return [_part(values[p], run.reading[p] - values[p], run, own) for p in _pieces(values.size, count)]
+
+
+def _pieces(size: int, count: int) -> list[slice]:
+    length = size // max(count, 1)
+    return [slice(i * length, (i + 1) * length) for i in range(count)]
+
+
+def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
+    window = np.hanning(values.size)
+    scale = run.noise_variance * float(window @ window)
+    power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 / scale
+    frequency = np.fft.rfftfreq(values.size, run.interval)
+    order = frequency / own
+    multiple = np.round(order)
+    beside = np.where(multiple > 0, np.abs(order - multiple) >= _BESIDE, True)
+    beside &= frequency * values.size * run.interval > _LOWEST
+    beside[-1] = False  # the ordinate at half the sampling rate has one degree of freedom
+    return _Part(np.asarray(frequency), np.asarray(power), beside, float(np.std(motion)))
+
+
+def _band_edges(low: float, high: float) -> Array:
+    """Edges of equal ratio, Hz, an octave or more apart."""
+    return np.geomspace(low, high, round(_OCTAVE_PARTS * np.log2(high / low)) + 1)
+
+
+def _steady(power: Array, count: Array) -> np.ndarray:
+    """Which bands have one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
+
+    Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc. R. Soc. A 160 (1937) 268,
+    doi 10.1098/rspa.1937.0109).
+    """
+    total = count.sum(axis=0)
+    mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
+    ratio = np.maximum(power / np.where(mean > 0.0, mean, 1.0), 1e-300)  # any number where the count is 0
+    corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
+    statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
+    freedom = np.sum(count > 0, axis=0) - 1
+    limit = chdtri(np.maximum(freedom, 1), COLOUR_STEADY_RATE)
+    return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
+
+
+def _flat(level: Array, std: Array) -> bool:
+    """Whether the levels are one constant within the tolerance and chance."""
+    weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
+    mean = float(weight @ level / weight.sum())
+    return float(weight @ (level - mean) ** 2) < float(chdtri(level.size - 1, COLOUR_FALSE_ALARM_RATE))
+
+
+def _slope(place: Array, level: Array, std: Array) -> tuple[float, float]:
+    """Slope of the lowest bands, and its standard deviation."""
+    use = slice(0, _SLOPE_BANDS)
+    weight = 1.0 / std[use] ** 2
+    centred = place[use] - float(weight @ place[use] / weight.sum())
+    power = float(weight @ centred**2)
+    return float((weight * centred) @ level[use]) / power, float(np.sqrt(1.0 / power))
+
+
+def _red(slope: float) -> float:
+    """A slope between that of white noise and that of a random walk."""
+    return float(np.clip(slope, -2.0, 0.0))
+
+
+def whitened(data: Data, colour: Colour) -> Data:
+    """The data with a filter that makes noise of a colour white.
+
+    Args:
+        data: prepared for white noise.
+        colour: of its noise.
+
+    Returns:
+        The runs with the filter and the variance of the innovations.
+    """
+    longest = max(run.reading.size for run in data.runs)
+    total = sum(run.reading.size for run in data.runs)
+    filters = {run.interval: _filter(colour, run.interval, longest, total) for run in data.runs}
+    return data.with_runs(
+        tuple(
+            replace(
+                run,
+                whitening=filters[run.interval][0],
+                noise_variance=run.noise_variance * filters[run.interval][1],
+            )
+            for run in data.runs
+        )
+    )
+
+
+def _filter(colour: Colour, interval: float, longest: int, total: int) -> tuple[Array, float]:
+    """Whitening filter at an interval (s), and the variance of the innovations over that of the white noise.
+
+    The Levinson recursion (S. M. Kay, Modern Spectral Estimation, 1988, sect. 6.3) stops at the order beyond which
+    all records together hold less than one nat of evidence for another; the gain of all further orders is known
+    from the spectrum (Kolmogorov).
+    """
+    size = 2 ** int(np.ceil(np.log2(8 * longest)))
+    frequency = np.maximum(np.arange(size // 2 + 1) / size, 0.25 / longest) / interval
+    spectrum = colour.at(frequency)
+    covariance = np.fft.irfft(np.exp(spectrum), size)
+    least = np.exp(np.mean(np.concatenate([spectrum, spectrum[-2:0:-1]])))
+    whitening, variance = np.ones(1), float(covariance[0])
+    while whitening.size <= _LONGEST and 0.5 * total * np.log(variance / least) > 1.0:
+        order = whitening.size
+        reflection = -float(whitening @ covariance[order:0:-1]) / variance
+        grown = np.append(whitening, 0.0)
+        whitening = grown + reflection * grown[::-1]
+        variance *= 1.0 - reflection**2
+    return whitening, variance
+
+
+_LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: as good as none
+_CORNERS = (1.0, 4.0, 16.0)  # of the colour's lowest frequency, to start from
+_WHITE = 30.0  # the level's natural logarithm stays within this of that of white noise
+
+
+def zero_wanders(nominal: Fit, colour: Colour) -> bool:
+    """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
+
+    Args:
+        nominal: the fit whose residuals have the colour, scaled as white.
+        colour: of its noise; its lowest band is the lowest corner of stationary noise that counts as seen.
+
+    Returns:
+        The verdict of a likelihood ratio at `COLOUR_FALSE_ALARM_RATE`. The spectrum is that of white noise and a
+        first-order process, which is a random walk where its corner is zero. It is fitted to the ordinates between
+        the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
+    """
+    spectra = [between_harmonics(nominal, index) for index in range(len(nominal.residuals))]
+    frequency, power = (np.concatenate(column) for column in zip(*spectra, strict=True))
+    relative = frequency / colour.frequency[0]
+    seen = _least_loss(relative, power, 1.0)
+    free = min(seen, _least_loss(relative, power, _LOWEST_CORNER))
+    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * COLOUR_FALSE_ALARM_RATE))
+
+
+def _least_loss(frequency: Array, power: Array, lowest: float) -> float:
+    """Least negative log-likelihood, nats, with the corner at or above a frequency.
+
+    Args:
+        frequency: over the colour's lowest, shape (n,).
+        power: in units of white noise, shape (n,).
+        lowest: corner, in the same unit.
+    """
+
+    def loss(place: Array) -> tuple[float, Array]:
+        white, slow, corner = np.exp(place)
+        response = 1.0 / (frequency**2 + corner**2)
+        level = white + slow * response
+        by_level = (1.0 - power / level) / level
+        slopes = white, slow * response, -2.0 * slow * (corner * response) ** 2
+        total = float(np.sum(np.log(level) + power / level))
+        return total, np.array([float(np.sum(by_level * slope)) for slope in slopes])
+
+    bounds = [(-_WHITE, _WHITE), (-_WHITE, _WHITE), (np.log(lowest), _WHITE)]
+    starts = [np.array([0.0, np.log(power.max() * c**2 + 1.0), np.log(c)]) for c in (lowest, *_CORNERS)]
+    return min(float(minimize(loss, start, jac=True, bounds=bounds).fun) for start in starts)

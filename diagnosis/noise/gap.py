@@ -1,0 +1,341 @@
+"""Is there a gap? Tests of the nominal model's residuals by frequency band, and of the noise itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import bdtrc, chdtrc, stdtr
+
+from diagnosis.likelihood.least_squares import Fit, FitError
+from diagnosis.likelihood.least_squares import fit as refit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.starting_points import is_gross, nominal_start
+from diagnosis.noise.colour import noise_colour, whitened, zero_wanders
+from diagnosis.noise.rounding import repeated, rounding_errors, samples, with_rounding
+from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
+from diagnosis.policy import (
+    BEYOND_THE_MOTION,
+    FLOOR_TOLERANCE,
+    GAP_FALSE_ALARM_RATE,
+    NOISE_FALSE_ALARM_SHARE,
+    NOISE_TAILS,
+    ROUNDED_NOISE,
+)
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.record import Array
+
+#: Repetitions of the campaign, fewer where it is long, never below the least.
+_REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6
+#: A step this many times the noise hides its level, since crossed edges look like noise; several are tried.
+_COARSE = 3.0
+_FACTORS = (0.0, 0.5, 1.0, 1.5)
+_NAMES = ("noise against amplitude", "noise against rate", "noise in bursts")
+_HANN = 1.57  # correlated bins of the windowed periodogram that carry the information of one independent bin
+
+
+def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
+    """Probability that white noise behaves like that of the campaign.
+
+    Args:
+        trend: of the campaign.
+
+    Returns:
+        P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise
+        and the readings' lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993);
+        where the lattice hides the noise, the largest over several possible levels. All 1 where the sampling is
+        too slow for the test.
+    """
+    if not trend.judged:
+        return dict.fromkeys(_NAMES, 1.0)
+    white = noise.white(trend.step)
+    factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
+    found = np.zeros(3)
+    for factor in factors:
+        level = {run: factor * std for run, std in white.items()}
+        found = np.maximum(found, _p_values(trend, _repetitions(fit, level, trend.step)))
+    return dict(zip(_NAMES, found.tolist(), strict=True))
+
+
+def _p_values(trend: NoiseTrend, chance: Array) -> Array:
+    count = len(chance)
+    mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
+    score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
+    two_sided = 2.0 * stdtr(count - 1, -np.abs(score[:2]))
+    return np.append(two_sided, stdtr(count - 1, -score[2]))
+
+
+def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
+    """Statistics of the campaign repeated, shape (repetitions, 3)."""
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
+    readings = ((reading, run.sample_times) for run, _, reading in repeated(fit, white, step, count))
+    found = trend_statistics(readings)
+    assert found is not None  # the campaign was judged
+    return found
+
+
+def level_p_value(fit: Fit, noise: Noise) -> float:
+    """Probability that noise as stated, allowing for its rounding, is estimated as high as it is.
+
+    Args:
+        fit: gives the records' lengths.
+        noise: of the campaign; its stated variance is not None.
+
+    Returns:
+        The p-value of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
+        median found, at the largest noise that the statement allows.
+    """
+    assert noise.stated_variance is not None
+    level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
+    ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
+    return float(bdtrc((ordinates - 1) // 2, ordinates, 2.0**-level))
+
+
+_ABOVE = 0.48  # share of the ordinates that the estimate uses, where sampling is slowest
+
+
+Spread = Callable[[Array], float]
+BANDS = ("below", "f0", "2f0", "3f0", "above")
+
+
+@dataclass(frozen=True)
+class GapTest:
+    """The tests of a gap.
+
+    Args:
+        detected: whether any of them rejects the absence of a gap.
+        p_value: the smallest p-value, times the number of tests (at most 1).
+        tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
+        noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
+            above the stated level.
+    """
+
+    detected: bool
+    p_value: float
+    tests: Mapping[str, float]
+    noisy: bool
+
+
+def test_gap(
+    fit: Fit,
+    noise: Noise,
+    trend: NoiseTrend,
+    *,
+    coarse_step: bool,
+    errors: Sequence[Array] | None,
+) -> GapTest:
+    """Test whether a fit's residuals and the noise are consistent with white noise.
+
+    Args:
+        fit: usually of the nominal model.
+        trend: of the noise with the motion.
+        coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
+            noise are then not tested.
+        errors: what noise and rounding leave in the block means, by run, repetitions of it, shape (repetitions,
+            blocks), rad; None where they are white.
+
+    Returns:
+        The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
+    """
+    level, scatter = (np.ones(6), np.zeros(6)) if errors is None else _under_rounding(fit, errors)
+    floor = (1.0 + FLOOR_TOLERANCE) * noise.margin * level
+    tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
+    tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
+    noisy: dict[str, float] = {}
+    if not coarse_step and noise.source != "floor":
+        noisy |= trend_p_values(trend, fit, noise)
+        if noise.stated_variance is not None:
+            noisy["noise level"] = level_p_value(fit, noise)
+    everything = tests | noisy
+    limit = GAP_FALSE_ALARM_RATE / len(everything)
+    smallest = min(everything.values())
+    return GapTest(
+        smallest < limit,
+        min(1.0, smallest * len(everything)),
+        everything,
+        any(p < _misbehaves(everything) for p in noisy.values()),
+    )
+
+
+def _misbehaves(tests: Mapping[str, float]) -> float:
+    """The p-value of one of these tests below which the noise itself misbehaves."""
+    return GAP_FALSE_ALARM_RATE * NOISE_FALSE_ALARM_SHARE / len(tests)
+
+
+def judge(
+    nominal: Fit, noise: Noise, trend: NoiseTrend, *, step: float, coarse_step: bool
+) -> tuple[Fit, Noise, GapTest]:
+    """Test for a gap, and decide between a gap and coloured noise.
+
+    Args:
+        nominal: fit of the nominal model to runs prepared for white noise.
+        trend: of the noise with the motion.
+        step: of the lattice of the readings, rad; 0 where there is none.
+        coarse_step: as `test_gap` takes it.
+
+    Returns:
+        The fit, the noise and the verdict. The noise of the fit allows for rounding, whose error is not white where
+        the motion is slow and the noise small, and fit and noise are whitened where the noise is coloured. Where
+        whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
+        above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
+        Nor is it believed where there would be more noise than is stated, or where it alone would close the gap of
+        a wandering zero. Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
+    """
+    errors = rounding_errors(nominal, noise.white(step), step)
+    allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
+    if allowed is not None:
+        nominal = refit(Problem(allowed), nominal.point)
+    plain = test_gap(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
+    for source in () if is_gross(nominal) else _colour_sources(nominal):
+        found = noise_colour(source, throughout=source is not nominal)
+        if found is None:
+            continue
+        white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
+        coloured = noise.coloured(found, nominal.problem.data)
+        test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
+        still = any(not run.wind_on for run in nominal.problem.data.runs)
+        excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
+        believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None
+        if believed if test.detected else not zero_wanders(nominal, found):
+            return white, coloured, test
+    return nominal, noise, plain
+
+
+def _colour_sources(nominal: Fit) -> Iterator[Fit]:
+    """The fits that may show the noise's colour: the nominal one, and that of the runs with the wind off alone."""
+    yield nominal
+    data = nominal.problem.data
+    still = tuple(run for run in data.runs if not run.wind_on)
+    if 0 < len(still) < len(data.runs):
+        only = data.with_runs(still)
+        with suppress(FitError, np.linalg.LinAlgError):
+            yield refit(Problem(only), nominal_start(only))
+
+
+def chance(total: float, freedom: float, relative: float) -> float:
+    """Probability that white noise reaches a sum of squares.
+
+    Args:
+        total: sum of squares, in units of the noise variance.
+        freedom: degrees of freedom, a number of coefficients.
+        relative: standard deviation of the noise variance, as a share of it.
+
+    Returns:
+        The upper tail of a χ² variable, widened for the uncertainty of the noise level.
+    """
+    if freedom <= 0.0:
+        return 1.0
+    stretch = 1.0 + 0.5 * freedom * relative**2
+    return float(chdtrc(freedom / stretch, total / stretch))
+
+
+def _known(_frequency: Array) -> float:
+    return 0.0
+
+
+def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatter: float = 0.0) -> float:
+    """Probability that white noise alone moves the runs' means as far from the common zero.
+
+    Args:
+        fit: its residuals, in noise standard deviations.
+        floor: power assumed for white noise, a factor on the noise variance.
+        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
+        scatter: standard deviation of the floor, a share of it.
+
+    Returns:
+        The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own.
+    """
+    if fit.problem.data.own_zeros:
+        return 1.0
+    lowest = np.array([1.0 / max(run.duration for run in fit.problem.data.runs)])
+    relative = float(np.hypot(spread(lowest), scatter))
+    return chance(_offsets(fit.residuals) / floor, len(fit.residuals) - 1.0, relative)
+
+
+def _offsets(residuals: Sequence[Array]) -> float:
+    """Sum of the squared means of the runs' residuals, in their variances under white noise."""
+    return sum(float(np.sum(residual)) ** 2 / residual.size for residual in residuals)
+
+
+def band_p_values(
+    fit: Fit, floor: float | Array = 1.0, spread: Spread = _known, scatter: float | Array = 0.0
+) -> tuple[float, ...]:
+    """Probability that white noise alone gives as much power in each band, summed over the runs.
+
+    Args:
+        fit: its residuals, in noise standard deviations.
+        floor: power assumed for white noise, a factor on the noise variance; one for all bands, or shape (bands,).
+        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
+        scatter: standard deviation of the floor, a share of it, of its shape.
+
+    Returns:
+        One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.
+    """
+    values = []
+    each = np.broadcast_to(floor, len(BANDS)), np.broadcast_to(scatter, len(BANDS))
+    for (power, place), level, share in zip(_by_band(fit, fit.residuals), *each, strict=True):
+        relative = float(np.hypot(spread(place), share)) if place.size else 0.0
+        # each ordinate is half a χ² of two degrees of freedom
+        values.append(chance(2.0 * float(power.sum()) / level, 2.0 * place.size, relative))
+    return tuple(values)
+
+
+def _by_band(fit: Fit, residuals: Sequence[Array]) -> list[tuple[Array, Array]]:
+    """Power and frequency (Hz) of the periodograms' ordinates, all runs together, by band."""
+    bands, powers, frequencies = [], [], []
+    for index, (run, residual) in enumerate(zip(fit.problem.data.runs, residuals, strict=True)):
+        spectrum = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
+        frequency = np.fft.rfftfreq(residual.size, run.interval)
+        multiple = frequency[1:-1] / max(resonance(fit, index), 1e-9)
+        band = np.clip(np.floor(multiple + 0.5), 0, len(BANDS) - 1).astype(int)
+        bands.append(band)
+        powers.append(spectrum[1:-1])
+        frequencies.append(frequency[1:-1])
+    where, power, place = (np.concatenate(column) for column in (bands, powers, frequencies))
+    # each ordinate is half a χ² of two degrees of freedom
+    return [(power[where == index], place[where == index]) for index in range(len(BANDS))]
+
+
+def _under_rounding(fit: Fit, errors: Sequence[Array]) -> tuple[Array, Array]:
+    """Level of the tests' statistics under noise and rounding, and its scatter beyond that of white noise.
+
+    Both are shares of what white noise of the fit's variance gives, shape (tests,): the bands, then the offset.
+    """
+    found, count = [], np.ones(len(BANDS) + 1)
+    for number in range(len(errors[0])):
+        residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
+        bands = _by_band(fit, residuals)
+        count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
+        found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
+    level = np.mean(found, axis=0)
+    beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
+    return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
+
+
+def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:
+    """What the user should know of the noise.
+
+    Args:
+        trend: of the noise with the motion.
+
+    Returns:
+        Remarks where the noise is coloured, and where the sampling is too slow to compare it with the motion.
+    """
+    found = []
+    runs = tuple(noise.variance)
+    if noise.colour is not None:
+        span = noise.colour.frequency[-1] / noise.colour.frequency[0]
+        ratio = np.exp(np.ptp(noise.colour.level))
+        what = (
+            f"the sensor's noise is coloured: {noise.std:.3g} rad in all, and its power per hertz varies by a "
+            f"factor of {ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs"
+        )
+        found.append(Remark(Outcome.NOTED, runs, what, "the diagnosis allows for it, and it is not a cause"))
+    if not trend.judged:
+        what = "sampled too slowly to test whether the noise follows the motion or comes in bursts"
+        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to test it"))
+    return tuple(found)

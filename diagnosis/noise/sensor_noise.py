@@ -1,0 +1,413 @@
+"""The noise of a record, from the part of its spectrum far above the motion, compared with what is stated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from diagnosis.likelihood.nondimensional import frequency
+from diagnosis.likelihood.prepare import BLOCK_INTERVAL
+from diagnosis.likelihood.run_data import Data
+from diagnosis.noise.colour import Colour
+from diagnosis.noise.scattered_and_driven import driven_variance, scattered_variance
+from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array, Record
+
+_FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
+_LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
+#: Error, as a share of the swing, that block means and steps leave in a fit of the closed form of the nominal
+#: model, while its bands still pass as white.
+_ACCURACY = 4e-5
+_LEAST_WHITE = 1e-3  # of the variance: some of it is white, however coarse the step
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A campaign's noise.
+
+    Args:
+        variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
+        stated_variance: of one sample as the campaign states it, rad²; None where it does not.
+        source: of the variance used: ``stated``, ``estimated`` or ``floor``. The floor is the accuracy of the
+            fits, where the records contain less noise than that.
+        reason: why, in words.
+        estimate: the records' own variance, mean over the runs, rad²; None: the one used.
+        relative: standard deviation of that estimate, a share of it.
+        colour: of the noise of block means, relative to white noise of the variance used; None where it is white.
+        measured: variance of one sample as the spectrum above the motion shows it, rad², by run id.
+    """
+
+    variance: dict[str, float]
+    stated_variance: float | None
+    source: str
+    reason: str
+    estimate: float | None = None
+    relative: float = 0.0
+    colour: Colour | None = None
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+    def white(self, step: float) -> dict[str, float]:
+        """The white noise before rounding.
+
+        Args:
+            step: of the lattice of the readings, rad; 0 where there is none.
+
+        Returns:
+            Standard deviation of one sample, rad, by run id. Where the motion crosses a step in many samples, the
+            spectrum above it does not show the rounding error's q²/12 but how often noise takes a reading across
+            the next edge: qσ/√π for noise of a third of a step or less. The edges that the motion itself crosses
+            add to that, so noise of less than a tenth of a step is overestimated.
+        """
+        found = {}
+        for run, variance in self.variance.items():
+            seen, rounded = self.measured.get(run, variance), step**2 / 12.0
+            before = max(variance - rounded, _LEAST_WHITE * variance)
+            found[run] = float(np.sqrt(np.pi) * seen / step if seen < rounded else np.sqrt(before))
+        return found
+
+    @property
+    def used(self) -> float:
+        """The variance used, mean over the runs, rad²."""
+        return float(np.mean(list(self.variance.values())))
+
+    @property
+    def estimated(self) -> float:
+        """The records' own variance, mean over the runs, rad²."""
+        return self.used if self.estimate is None else self.estimate
+
+    @property
+    def margin(self) -> float:
+        """Factor by which the noise may exceed the one used: stated noise may be a little low and still agree."""
+        return 1.0 if self.colour else max(self.estimated / self.used, 1.0)
+
+    def coloured(self, colour: Colour, data: Data) -> Noise:
+        """The same noise, found to be coloured.
+
+        Args:
+            colour: its spectrum, from block means.
+
+        Returns:
+            The noise with the colour, and with an estimate of all its power that the records' lengths resolve.
+        """
+        extra = [
+            self.variance[run.id] / run.block * (colour.mean(run.reading.size, run.interval) - 1.0)
+            for run in data.runs
+        ]
+        whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
+        reason = f"it is coloured, {np.sqrt(whole):.3g} rad in all"
+        return replace(self, source="estimated", reason=reason, estimate=whole, colour=colour)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one sample, rad."""
+        return float(np.sqrt(self.used if self.colour is None else self.estimated))
+
+    def spread(self, frequency: Array) -> float:
+        """How well the noise is known.
+
+        Args:
+            frequency: Hz, shape (n,).
+
+        Returns:
+            Standard deviation of its mean power over these frequencies, a share of it.
+        """
+        return self.relative if self.colour is None else self.colour.spread(frequency)
+
+
+def estimate_variance(record: Record, fastest: float | None = None) -> tuple[float, float]:
+    """Variance of the white noise, from the median of the periodogram above the motion.
+
+    Where the samples are not evenly spaced, `scattered_variance` measures it.
+
+    Args:
+        fastest: frequency of the campaign's fastest motion, Hz, so that coloured noise is measured in the same band
+            in all runs; None: the record's own.
+
+    Returns:
+        Variance of one sample, rad², and its relative standard deviation. Lines such as the mains' harmonics
+        do not move a median.
+    """
+    if not record.uniform:
+        block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
+        return scattered_variance(record, fastest or frequency(record), block)
+    rate = record.sample_rate
+    low = min(_FLOOR_FROM, 0.25 * rate)
+    places, power = floor_periodogram(record.yaw_rad, rate)
+    floor = power[(places > low) & (places < 0.49 * rate)]
+    # a median of n exponentials scatters by 1/√n of its mean ln 2; the Hann window correlates neighbouring
+    # bins: 1.57 of them carry what one would without it
+    return float(np.median(floor) / _LN2 * rate / 2.0), float(np.sqrt(1.57 / floor.size) / _LN2)
+
+
+def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
+    """One-sided periodogram with a window whose leakage stays below the noise.
+
+    Args:
+        values: samples, shape (n,).
+        rate: Hz.
+
+    Returns:
+        Frequencies, Hz, and power, unit²/Hz.
+    """
+    window = np.hanning(values.size)
+    spectrum = np.fft.rfft((values - np.mean(values)) * window)
+    power = 2.0 * np.abs(spectrum) ** 2 / (rate * float(window @ window))
+    return np.asarray(np.fft.rfftfreq(values.size, 1.0 / rate), np.float64), power
+
+
+def campaign_noise(campaign: Campaign) -> Noise:
+    """The noise of every run: as stated where the records agree with it, else as estimated from them.
+
+    Returns:
+        The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
+        standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
+    """
+    fastest = max((frequency(run.record) for run in campaign.runs if not run.record.uniform), default=None)
+    measured = {run.id: _measured(run, fastest) for run in campaign.runs}
+    found = _stated_or_estimated(campaign, measured)
+    return replace(found, measured={run: value for run, (value, _) in measured.items()})
+
+
+def _measured(run: Run, fastest: float | None) -> tuple[float, float]:
+    """Variance of a run's noise, rad², and its relative standard deviation."""
+    if run.drive is None:
+        return estimate_variance(run.record, fastest)
+    return driven_variance(run.record.yaw_rad, run.drive.values, _FLOOR_FROM / run.record.sample_rate)
+
+
+def _stated_or_estimated(campaign: Campaign, measured: Mapping[str, tuple[float, float]]) -> Noise:
+    # however slow the motion, the error of a rounded reading is that large
+    rounded = lattice_step(campaign) ** 2 / 12.0
+    estimates = {run: (max(value, rounded), std) for run, (value, std) in measured.items()}
+    variances = np.array([value for value, _ in estimates.values()])
+    relative = np.array([std for _, std in estimates.values()])
+    pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
+    floors = {run.id: accuracy(run.record) ** 2 for run in campaign.runs}
+    if any(floors[run] > value for run, (value, _) in estimates.items()):
+        return _floor(campaign, {run: value for run, (value, _) in estimates.items()}, floors)
+    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < NOISE_OF_ITS_OWN * relative))
+    estimated = {run.id: pooled if uniform else estimates[run.id][0] for run in campaign.runs}
+    stated = _stated_variance(campaign.sensor, pooled)
+    found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
+    if stated is None:
+        return Noise(estimated, None, "estimated", "the campaign states no noise", pooled, uncertainty)
+    if not uniform:
+        said = f"their noise differs by run, {np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
+    elif abs(pooled / stated - 1.0) < NOISE_AGREES * uncertainty:
+        used = dict.fromkeys(estimated, stated)
+        return Noise(used, stated, "stated", f"the records agree: {found}", pooled, uncertainty)
+    else:
+        said = f"they contain {found}"
+    reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
+    return Noise(estimated, stated, "estimated", reason, pooled, uncertainty)
+
+
+def _stated_variance(sensor: SensorProperties, estimate: float) -> float | None:
+    """Variance of a sample as stated: with the resolution's share, or without where that is closer.
+
+    A data sheet may give the noise before or after rounding.
+    """
+    if not sensor.noise_std:  # no record has a noise of zero
+        return None
+    before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
+    after = sensor.noise_std**2
+    return min((before, after), key=lambda variance: abs(variance - estimate))
+
+
+def _floor(campaign: Campaign, estimates: dict[str, float], floors: dict[str, float]) -> Noise:
+    """The accuracy of the fits in place of a smaller noise."""
+    pooled = float(np.mean(list(estimates.values())))
+    used = {run: max(value, floors[run]) for run, value in estimates.items()}
+    reason = (
+        f"the records contain {np.sqrt(pooled):.1g} rad, in {sum(used[r] > v for r, v in estimates.items())} of "
+        f"{len(used)} runs less than the accuracy of the fits, which stands in for it"
+    )
+    return Noise(used, _stated_variance(campaign.sensor, pooled), "floor", reason, pooled)
+
+
+def accuracy(record: Record) -> float:
+    """How small a sample's noise may be before the errors of the fits show.
+
+    Returns:
+        Standard deviation of a sample, rad: a share of the swing, plus three times the error of the reading from
+        RK4's loss of phase, (ωh)⁴/120 of the phase for steps h of a block (Hairer, Nørsett and Wanner, Solving
+        ODEs I, sect. II.1). Three times, because the error lies in one narrow band and the noise in all.
+    """
+    swing = record.yaw_rad - np.mean(record.yaw_rad)
+    cycles = 1 + int(np.argmax(np.abs(np.fft.rfft(swing)[1:])))
+    omega = 2.0 * np.pi * cycles / record.duration
+    block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
+    lag = omega * (record.time_s - record.time_s[0]) * (omega * BLOCK_INTERVAL) ** 4 / 120.0
+    lost = float(np.sqrt(np.mean((lag * swing) ** 2)))
+    return float(np.sqrt(block) * (_ACCURACY * np.max(np.abs(swing)) + 3.0 * lost))
+
+
+def reading_step(campaign: Campaign) -> float:
+    """The step of the lattice on which the readings lie.
+
+    Returns:
+        The smallest difference between distinct readings, rad. This is the true resolution where the record
+        visits neighbouring steps, as every decay does; it is far below any step where readings are continuous.
+    """
+    return min((float(np.quantile(gaps, 0.02)) for gaps in _gaps(campaign)), default=0.0)
+
+
+def lattice_step(campaign: Campaign) -> float:
+    """The step of the lattice on which the readings lie, where they do.
+
+    Returns:
+        As `reading_step`, rad; 0 where the differences between distinct readings are not multiples of it.
+    """
+    step = reading_step(campaign)
+    multiples = np.concatenate([gaps / step for gaps in _gaps(campaign)]) if step > 0.0 else np.full(1, 0.5)
+    # differences of continuous readings are a quarter of a step off in the median, rounded ones hardly at all
+    return step if np.median(np.abs(multiples - np.round(multiples))) < _OFF_LATTICE else 0.0
+
+
+def reading_levels(campaign: Campaign) -> Array:
+    """The readings that occur, in increasing order, shape (levels,), rad; those a rounding error apart are one."""
+    found = np.unique(np.concatenate([run.record.yaw_rad for run in campaign.runs]))
+    apart = np.diff(found) > _OFF_LATTICE * reading_step(campaign)
+    return np.asarray(found[np.concatenate([[True], apart])], np.float64)
+
+
+def typical_step(levels: Array) -> float:
+    """The step of equal width whose rounding has the same power, rad.
+
+    Args:
+        levels: as `reading_levels` gives them, two or more, shape (levels,), rad.
+    """
+    widths = np.diff(levels)
+    return float(np.sqrt(np.sum(widths**3) / np.sum(widths)))
+
+
+def _gaps(campaign: Campaign) -> list[Array]:
+    """Differences between neighbouring distinct readings, by run, rad; runs of a single reading are left out."""
+    gaps = [np.diff(np.unique(run.record.yaw_rad)) for run in campaign.runs]
+    # the same step may be printed twice with different rounding
+    clear = [found[found > 1e-9] for found in gaps]
+    return [found for found in clear if found.size]
+
+
+_OFF_LATTICE = 0.1  # of a step: printed readings are rounded once more
+
+
+@dataclass(frozen=True)
+class NoiseTrend:
+    """How the noise's level depends on the motion and on time.
+
+    Args:
+        amplitude_z: slope of the local noise variance against the squared amplitude, in units of its standard
+            deviation under steady white noise.
+        rate_z: likewise against the squared rate.
+        spread: natural logarithm of the ratio of the local variances' standard deviation to that of a normal
+            distribution with their quartiles: positive for heavy tails. Skewness alone makes it about 0.1.
+        step: of the lattice of the readings, rad.
+        judged: whether any run is sampled fast enough for the test.
+    """
+
+    amplitude_z: float
+    rate_z: float
+    spread: float
+    step: float = 0.0
+    judged: bool = True
+
+
+_WINDOW = 0.02  # s: a small part of a swing, so that large angles and large rates fall in different windows
+_FEWEST = 10  # samples in a window
+_SHORTEST = 5.0 * _WINDOW  # s: of a record with several windows
+
+
+def noise_trend(campaign: Campaign) -> NoiseTrend:
+    """Measure whether the noise is as strong in motion as at rest, and the same at all times.
+
+    Returns:
+        Trends of the variance of fourth divided differences of the reading in windows of 20 ms, pooled over the
+        runs that are not shorter than five windows. Their null distribution is simulated
+        (`diagnosis.noise.gap`). Not judged where a run is driven: its motion may be as fast as the
+        noise.
+    """
+    if campaign.driven:
+        return NoiseTrend(0.0, 0.0, 0.0, judged=False)
+    long = [run.record for run in campaign.runs if run.record.duration > _SHORTEST]
+    values = trend_statistics([(record.yaw_rad[None], _sample_times(record)) for record in long])
+    if values is None:
+        return NoiseTrend(0.0, 0.0, 0.0, judged=False)
+    amplitude, rate, spread = values[0].tolist()
+    return NoiseTrend(amplitude, rate, spread, step=reading_step(campaign))
+
+
+def _sample_times(record: Record) -> Array:
+    """Time of the samples, shape (n,), s; on a uniform clock where the stamps are only rounded."""
+    if not record.uniform:
+        return record.time_s
+    return np.asarray(np.arange(record.time_s.size) * record.sample_interval, np.float64)
+
+
+def trend_statistics(readings: Iterable[tuple[Array, Array]]) -> Array | None:
+    """The statistics of `NoiseTrend`.
+
+    Args:
+        readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their times, shape
+            (n,), s; taken one after another, so that a generator holds those of one run at a time.
+
+    Returns:
+        Shape (repetitions, 3): ``amplitude_z``, ``rate_z`` and ``spread``; None where none is fast enough.
+    """
+    parts = [_local_levels(reading, time) for reading, time in readings if _in_window(time) >= _FEWEST]
+    if not parts:
+        return None
+    level, square, rate = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    scatter = np.maximum(np.std(level, axis=-1), _TINY)
+    root = np.sqrt(level.shape[-1])
+    upper, lower = np.quantile(level, [0.75, 0.25], axis=-1)
+    bulk = np.maximum((upper - lower) / 1.349, _TINY * scatter)
+    along = [np.einsum("ij,ij->i", level, over) / (scatter * root) for over in (square, rate)]
+    return np.stack([*along, np.log(scatter / bulk)], axis=-1)
+
+
+_TINY = 1e-9  # of a level's mean: the quartiles of a reading that rests on one step coincide
+
+
+def _standardised(values: Array) -> Array:
+    centred = values - values.mean(axis=-1, keepdims=True)
+    result: Array = centred / np.maximum(centred.std(axis=-1, keepdims=True), 1e-300)
+    return result
+
+
+def _in_window(time: Array) -> int:
+    """Samples in a window, on average."""
+    return round(_WINDOW * (time.size - 1) / float(time[-1] - time[0]))
+
+
+def _local_levels(reading: Array, time: Array) -> tuple[Array, Array, Array]:
+    """Mean squared fourth difference by window over its mean, less one; squared angle and rate, standardised."""
+    width = _in_window(time)
+    reading = reading - reading.mean(axis=-1, keepdims=True)
+    # leaves (ω dt)⁴ of the motion: far below any noise
+    fourth = _fourth_differences(reading, time)
+    count = fourth.shape[-1] // width
+
+    def windows(values: Array) -> Array:
+        return values[..., : count * width].reshape(*values.shape[:-1], count, width)
+
+    level = np.mean(windows(fourth) ** 2, axis=-1)
+    level = level / np.maximum(level.mean(axis=-1, keepdims=True), 1e-300) - 1.0
+    angle = windows(reading[..., 2:]).mean(axis=-1)
+    return level, _standardised(angle**2), _standardised(np.gradient(angle, axis=-1) ** 2)
+
+
+def _fourth_differences(reading: Array, time: Array) -> Array:
+    """Fourth divided differences, shape (..., n − 4), rad: white noise has the same variance in all of them."""
+    count = time.size - 4
+    total, gain = np.zeros((*reading.shape[:-1], count)), np.zeros(count)
+    for k in range(5):
+        weight = np.ones(count)
+        for j in {0, 1, 2, 3, 4} - {k}:
+            weight /= time[k : count + k] - time[j : count + j]
+        total += weight * reading[..., k : count + k]
+        gain += weight**2
+    return np.asarray(total / np.sqrt(gain))

@@ -1,0 +1,1 @@
+"""The causes written into a model of one's own."""

@@ -1,0 +1,442 @@
+"""The sparsest formula that explains what is left, chosen on held-out runs and fitted like any effect."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from itertools import product as combinations
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri
+
+from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.likelihood.problem import Point
+from diagnosis.policy import LAW_FALSE_RATE, LAW_REACHES, LAW_TERM_SHARE
+from diagnosis.remainder.bases import Ranges
+from diagnosis.remainder.ceiling import Rest
+from diagnosis.remainder.ridge import Normal, Ridge, held_out, total
+from tunnel_sim.effects import Effect, known_effects
+from tunnel_sim.effects.expression_effect import Quantity, expression_effect
+from tunnel_sim.physics.expression import Expression, parse
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import Dimension, dimension, dimension_text, product
+
+_NAMES = {"b": "rad", "r": "rad/s", "t": "s", "V": "m/s", "Kr": "N m/rad", "omega": "rad/s", "y": "rad"}
+_INNER = {"w": "rad", "c": "rad", "n": "1", "v": "rad/s", "q": "s", "d": "s", "f": "rad/s"}
+"""Own numbers of terms: widths, places, numbers per radian, rates, times and frequencies."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term with the values of its own numbers.
+
+    Args:
+        text: of ``b``, ``r``, ``t``, ``V``, ``Kr``, ``omega`` or ``y``, and its own numbers.
+        inner: value of each of its own numbers, in the unit of `_INNER`.
+    """
+
+    text: str
+    inner: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def formula(self) -> Expression:
+        """The text, parsed."""
+        return parse(self.text, frozenset({*_NAMES, *_INNER}))
+
+    @cached_property
+    def dimension(self) -> Dimension:
+        """Powers of kg, m and s."""
+        return self.formula.dimension({name: dimension(unit) for name, unit in (_NAMES | _INNER).items()})
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each of its own numbers."""
+        return {name: _INNER[name] for name in self.inner}
+
+    def value(self, places: Mapping[str, float | Array]) -> Array:
+        """The term along a motion, in its own unit.
+
+        Args:
+            places: by name, numbers or arrays of shape (n,).
+
+        Returns:
+            Shape (n,) or ().
+        """
+        return self.formula.value({**places, **self.inner})
+
+
+_ANGLE = ("b^2", "b^3", "b^5", "abs(b)", "abs(b)*b")
+_ANGLE_WIDE = ("tanh(b/w)", "b*exp(-(b/w)^2)", "b/(1+(b/w)^2)")
+_ANGLE_PLACE = ("max(abs(b)-c,0)*sign(b)", "max(b-c,0)", "max(-b-c,0)")
+_RATE = ("sign(r)", "abs(r)", "abs(r)*r", "r^3")
+_STATE = (
+    "b^2*r", "abs(b)*r", "b*r", "b*r^2", "b*sign(r)", "abs(b)*sign(r)", "b^2*sign(r)", "b^4*r", "max(b,0)*r",
+    "b*sqrt(b^2+(r/omega)^2)", "r/omega*sqrt(b^2+(r/omega)^2)", "b^2*r/omega*sqrt(b^2+(r/omega)^2)",
+)  # fmt: skip
+_STATE_WIDE = (
+    "exp(-(b/w)^2)*r", "b/(1+(b^2+(r/omega)^2)/w^2)", "r/omega/(1+(b^2+(r/omega)^2)/w^2)",
+    "b/sqrt(b^2+(r/omega)^2+w^2)", "r/omega/sqrt(b^2+(r/omega)^2+w^2)",
+)  # fmt: skip
+_TIME_SLOW = ("b*exp(-t/q)", "r*exp(-t/q)", "sign(r)*exp(-t/q)", "exp(-t/q)")
+_TIME = ("b*t", "r*t", "b*t^2")
+_TIME_WAVE = ("b*sin(f*t)", "b*cos(f*t)", "r*sin(f*t)")
+_READING = ("y^2", "y^3", "y^5", "abs(y)", "abs(y)*y", "t", "t^2")
+_READING_PLACE = ("max(abs(y)-c,0)*sign(y)", "max(y-c,0)", "max(-y-c,0)")
+
+
+def terms(kind: str, r: Ranges) -> list[Term]:
+    """The terms that may explain a kind.
+
+    Args:
+        kind: of `diagnosis.closure.KINDS`.
+        r: what the runs visit.
+
+    Returns:
+        Without a factor for spring or wind; none for kinds that no formula explains.
+    """
+    makers = {
+        "angle": (_of_angle,),
+        "rate": (_of_rate,),
+        "state": (_of_angle, _of_rate, _of_state),
+        "wind": (_of_angle, _of_rate, _of_state),
+        "time": (_of_time,),
+        "reading": (_of_reading,),
+    }
+    return [term for maker in makers.get(kind, ()) for term in maker(r)]
+
+
+def _grid(texts: tuple[str, ...], **inner: Array) -> Iterator[Term]:
+    for text in texts:
+        for values in combinations(*(grid.tolist() for grid in inner.values())):
+            yield Term(text, dict(zip(inner, values, strict=True)))
+
+
+def _widths(r: Ranges, count: int = 6) -> Array:
+    return np.geomspace(0.05, 0.8, count) * r.angle
+
+
+def _places(r: Ranges) -> Array:
+    return np.linspace(0.08, 0.92, 15) * r.angle
+
+
+def _numbers(r: Ranges) -> Array:
+    """Waves over the range: from one to ten, near enough to each other for a fit to find the one between."""
+    return np.arange(1.0, 10.1, 0.35) * np.pi / r.angle
+
+
+def _of_angle(r: Ranges) -> Iterator[Term]:
+    yield from map(Term, _ANGLE)
+    yield from _grid(_ANGLE_WIDE, w=_widths(r, 9))
+    yield from _grid(_ANGLE_PLACE, c=_places(r))
+    yield from _grid(("sin(n*b)",), n=_numbers(r))
+    yield from _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
+    yield from _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
+
+
+def _of_rate(r: Ranges) -> Iterator[Term]:
+    yield from map(Term, _RATE)
+    yield from _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
+
+
+def _of_state(r: Ranges) -> Iterator[Term]:
+    yield from map(Term, _STATE)
+    yield from _grid(_STATE_WIDE, w=_widths(r))
+    places = np.linspace(-0.85, 0.85, 18) * r.angle
+    yield from _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
+
+
+def _of_time(r: Ranges) -> Iterator[Term]:
+    yield from map(Term, _TIME)
+    yield from _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
+    yield from _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
+    instants = np.linspace(0.04, 0.96, 24) * r.time
+    yield from _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
+    often = np.arange(0.1, 0.98 * r.time / r.cycle, 0.2) * r.cycle
+    yield from _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
+
+
+def _of_reading(r: Ranges) -> Iterator[Term]:
+    yield from map(Term, _READING)
+    yield from _grid(_READING_PLACE, c=_places(r))
+    yield from _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
+    instants = np.linspace(0.04, 0.96, 47) * r.time
+    yield from _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
+    yield from _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
+
+
+_MOST_TERMS = 3
+_TRIED = 10  # terms of the greatest drop of χ² that are tried on held-out runs
+_FAR = 1e3  # bounds of a coefficient, in its first value
+_NEAR = 4.0  # bounds of a width or place, likewise
+_READING_KINDS = ("reading",)
+
+
+@dataclass(frozen=True, eq=False)
+class Formula:
+    """A sum of terms with coefficients.
+
+    Args:
+        terms: in the order in which they were found.
+        coefficients: of each, in N m, or rad for a reading, over the term's own unit.
+        of_reading: whether it is an error of the reading.
+        delta: steps of the fit's common parameters that go with it, in their units, shape (common,).
+        gained: drop of χ² on held-out runs, dimensionless.
+    """
+
+    terms: tuple[Term, ...]
+    coefficients: tuple[float, ...]
+    of_reading: bool
+    delta: Array
+    gained: float
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A formula as an effect, fitted.
+
+    Args:
+        kind: the effect's class.
+        table: the same as the table of an effects file, in the units of the fit.
+        fit: of the answer with the effect added.
+    """
+
+    kind: type[Effect]
+    table: dict[str, Any]
+    fit: Fit
+
+
+def choose(rest: Rest, kind: str, closable: float) -> Formula | None:
+    """Find the terms, one after another.
+
+    Args:
+        rest: what is left.
+        kind: of `diagnosis.closure.KINDS`.
+        closable: drop of χ² on held-out runs that the kind's own basis reaches.
+
+    Returns:
+        The formula; None where no term is supported: by chance alone one would be in `LAW_FALSE_RATE` of the
+        campaigns, and it must predict held-out runs.
+    """
+    found = _chosen(rest, kind, closable)
+    if kind in ("angle", "rate") and (found is None or found.gained < LAW_REACHES * closable):
+        wider = _chosen(rest, "state", closable)
+        found = found if wider is None or (found and found.gained >= wider.gained) else wider
+    return found
+
+
+def _chosen(rest: Rest, kind: str, closable: float) -> Formula | None:
+    candidates = _with_factors(rest, kind)
+    if not candidates:
+        return None
+    of_reading = kind in _READING_KINDS
+    if of_reading and rest.paths[0].run.derivative:
+        return None  # an effect's reading is an angle
+    columns = [_columns(rest, candidates, index, of_reading) for index in range(len(rest.paths))]
+    size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
+    parts = rest.normals([c / size for c in columns])
+    chosen, gained = _greedy(rest, parts, len(candidates), closable)
+    while sum(1 + len(candidates[i].inner) for i in chosen) > limits.OWN_PARAMETERS:
+        chosen.pop()
+    if not chosen:
+        return None
+    whole = _of(total(parts), chosen)
+    solution = Ridge(whole, 0.0).solution
+    common = rest.size.size
+    return Formula(
+        tuple(candidates[i] for i in chosen),
+        tuple(float(v) for v in solution[common:] / size[chosen]),
+        of_reading,
+        solution[:common] / rest.size,
+        gained,
+    )
+
+
+def _with_factors(rest: Rest, kind: str) -> list[Term]:
+    """The terms of a kind: with the wind, or as they are and, those of the angle, in proportion to the spring."""
+    found = terms(kind, rest.ranges)
+    if kind == "wind":
+        fast = [Term("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
+        return [Term("V^2*" + term.text, term.inner) for term in found] + fast
+    if kind in _READING_KINDS or len({path.stiffness for path in rest.paths}) == 1:
+        return found
+    return found + [Term("Kr*" + term.text, term.inner) for term in found if "b" in term.formula.names]
+
+
+def _columns(rest: Rest, candidates: Sequence[Term], index: int, of_reading: bool) -> Array:
+    """Responses to every term in one run, shape (rows, terms)."""
+    path = rest.paths[index]
+    places: dict[str, float | Array] = {
+        "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
+        "Kr": path.stiffness, "omega": path.still_omega,
+    }  # fmt: skip
+    shape = path.angle.shape
+    values = np.column_stack([np.broadcast_to(term.value(places), shape) for term in candidates])
+    return path.seen(values) if of_reading else path.response(values)
+
+
+def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
+    """The normal equations of the model's parameters and some of the terms, none with a prior."""
+    keep = [*range(whole.free), *(whole.free + i for i in chosen)]
+    return Normal(whole.matrix[np.ix_(keep, keep)], whole.gradient[keep], whole.power, len(keep))
+
+
+def _greedy(rest: Rest, parts: Sequence[Normal], count: int, closable: float) -> tuple[list[int], float]:
+    """Terms added as long as each pays on held-out runs."""
+    whole = total(parts)
+    threshold = float(chdtri(1, LAW_FALSE_RATE / count))
+    before = float(rest.before[rest.seen].sum())
+    chosen: list[int] = []
+    gained = 0.0
+    while len(chosen) < _MOST_TERMS and gained < LAW_REACHES * closable:
+        drops = _drops(whole, chosen)
+        order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
+        tried = []
+        for i in order:
+            some = [_of(part, [*chosen, i]) for part in parts]
+            after = held_out(some, rest.groups, None)
+            tried.append((before - float(after[rest.seen].sum()), i))
+        if not tried or max(tried)[0] - gained < max(LAW_TERM_SHARE * closable, threshold):
+            break
+        gained, best = max(tried)
+        chosen.append(best)
+    return chosen, gained
+
+
+def _drops(whole: Normal, chosen: Sequence[int]) -> Array:
+    """Drop of χ² by each further term, shape (terms,)."""
+    c = whole.free
+    known = [*range(c), *(c + i for i in chosen)]
+    inner = whole.matrix[np.ix_(known, known)]
+    size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+    cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / size[:, None]
+    inverse = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-11, hermitian=True)
+    solved = inverse @ cross
+    own = np.diag(whole.matrix)[c:]
+    left = own - np.sum(cross * solved, axis=0)
+    along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / size)
+    # what the others explain to within rounding gains nothing
+    return np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
+
+
+def propose(rest: Rest, formula: Formula, kind: str) -> Proposal | None:
+    """Fit a formula like any other effect.
+
+    Args:
+        rest: what is left, whose fit the effect is added to.
+        formula: from `choose`.
+        kind: of `diagnosis.closure.KINDS`; names the effect.
+
+    Returns:
+        The effect and its fit; None where the fit fails.
+    """
+    table = effect_table(formula, _free_name(f"proposed_{kind}"))
+    try:
+        effect = effect_of(table)
+    except TunnelError:
+        return None
+    base = rest.fit
+    start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}
+    problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, effect))
+    own = np.array([start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]])
+    common = base.point.common + formula.delta
+    found = []
+    for first in (common, base.point.common):
+        with suppress(FitError, np.linalg.LinAlgError):
+            found.append(fit(problem, Point(np.concatenate([first, own]), base.point.release)))
+            if found[-1].excess < (1.0 - LAW_REACHES) * base.excess:
+                break
+    best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
+    return None if best is None or best.total >= base.total else Proposal(effect, table, best)
+
+
+def _free_name(name: str) -> str:
+    """The name, or with a number where it is an effect's already."""
+    taken = {kind.name for kind in known_effects()}
+    numbered = (f"{name}_{number}" for number in range(2, len(taken) + 3))
+    return next(free for free in chain((name,), numbered) if free not in taken)
+
+
+def effect_table(formula: Formula, name: str) -> dict[str, Any]:
+    """A formula as the table of an effects file.
+
+    Args:
+        formula: of the fit's units.
+
+    Returns:
+        The table, its values those of the formula.
+    """
+    aim = dimension("rad" if formula.of_reading else "N m")
+    first, severity = formula.terms[0], formula.coefficients[0]
+    parameters: dict[str, dict[str, object]] = {
+        "k": _coefficient(severity, dimension_text(product(aim, first.dimension, -1.0)), severity=True)
+    }
+    texts = []
+    for number, (term, value) in enumerate(zip(formula.terms, formula.coefficients, strict=True), 1):
+        text = term.text
+        for own, inner in term.inner.items():
+            text = re.sub(rf"\b{own}\b", f"{own}{number}", text)
+            parameters[f"{own}{number}"] = _inner(inner, term.units[own])
+        if number > 1:
+            ratio = product(first.dimension, term.dimension, -1.0)
+            parameters[f"a{number}"] = _coefficient(value / severity, dimension_text(ratio))
+            text = f"a{number}*{text}"
+        texts.append(text)
+    whole = " + ".join(texts)
+    whole = f"k*({whole})" if len(texts) > 1 else f"k*{whole}"
+    windy = all(term.text.startswith("V") for term in formula.terms)
+    names = set().union(*(term.formula.names for term in formula.terms))
+    return {
+        "name": name,
+        "channel": "sensor" if formula.of_reading else _channel(names),
+        "condition": "wind_on" if windy else "always",
+        **({"reading": f"y + {whole}"} if formula.of_reading else {"moment": whole}),
+        "summary": "A formula that tunnel diagnose proposed for what no effect explains.",
+        "parameters": parameters,
+    }
+
+
+def _channel(names: set[str]) -> str:
+    if "r" in names:
+        return "damping"
+    return "stiffness" if "b" in names else "forcing"
+
+
+def _coefficient(value: float, unit: str, *, severity: bool = False) -> dict[str, object]:
+    bound = _FAR * abs(value)
+    return {
+        "unit": unit, "scale": value, "lower": -bound, "upper": bound, "default": 0.0 if severity else value,
+    }  # fmt: skip
+
+
+def _inner(value: float, unit: str) -> dict[str, object]:
+    ends = sorted((value / _NEAR, value * _NEAR)) if value else [-1.0, 1.0]
+    return {"unit": unit, "scale": value or ends[1], "lower": ends[0], "upper": ends[1], "default": value}
+
+
+def effect_of(table: dict[str, Any]) -> type[Effect]:
+    """The class of an effect that a table of an effects file states.
+
+    Args:
+        table: from `effect_table`.
+
+    Returns:
+        The class, not registered.
+
+    Raises:
+        TunnelError: when the effect cannot be stated.
+    """
+    given = dict(table)
+    name = str(given.pop("name"))
+    parameters = {
+        own: Quantity(**{**values, "meaning": f"parameter {own}"})
+        for own, values in given.pop("parameters").items()
+    }
+    return expression_effect(name, parameters=parameters, **given)

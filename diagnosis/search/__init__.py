@@ -1,0 +1,1 @@
+"""Which effects cause the gap: sets of them are grown, fitted and weighed."""

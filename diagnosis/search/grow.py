@@ -1,0 +1,398 @@
+"""Which effects: sets of causes, grown one effect at a time and pruned, on whole runs or on stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.likelihood.prepare import Stretches, fit_longer, in_stretches, long_stretch, spread_out
+from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.starting_points import StartingPoint, is_gross, starting_points
+from diagnosis.policy import (
+    ALWAYS_FITTED,
+    FREED_FROM,
+    FREED_HYPOTHESES,
+    GROWN_BY,
+    GROWN_FROM,
+    GROWTH_LOSS,
+    LENGTHENED,
+    MODEL_ERROR,
+    MOST_CAUSES,
+    NEEDLESS_CHI2,
+    PREDICTED_SHARE,
+    SAME_CHANGE,
+)
+from diagnosis.search.hypothesis import (
+    Hypothesis,
+    Scale,
+    is_plausible,
+    of_more_weight,
+    own_gain,
+    restricted,
+    turned_back,
+    with_forms,
+)
+from diagnosis.search.weigh import log_misfit, misfit_scale
+from tunnel_sim.effects import Effect
+
+_ITERATIONS = 12  # of a fit on the way; the answer's own is polished
+
+Progress = Callable[[str], None]
+
+
+def grow(
+    nominal: Fit,
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None = None,
+    first: Hypothesis | None = None,
+) -> list[Hypothesis]:
+    """Add effects one after another, to the best few sets of each size.
+
+    Args:
+        nominal: the fit without any effect.
+        kinds: effects to try.
+        progress: called with the names of each set.
+        first: the set that all others contain; None: none.
+
+    Returns:
+        Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
+        could not rise, and at `MOST_CAUSES`.
+    """
+    found: dict[tuple[str, ...], Hypothesis] = {} if first is None else {first.names: first}
+    level, gap = [Hypothesis((), nominal) if first is None else first], misfit(nominal)
+    while level:
+        children = sets_with_one_more(level, kinds, progress)
+        scale = Scale.of(children, gap)
+        if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
+            count = FREED_HYPOTHESES if not level[0].effects else 1
+            children = with_forms(children, gap, FREED_FROM * level[0].fit.excess, count)
+        found |= {child.names: child for child in children}
+        going = going_on(children, level, gap)
+        level = _distinct(going, nominal)[:GROWN_FROM]
+    return sorted(found.values(), key=lambda h: h.fit.total)
+
+
+def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
+    """The second mode, where the nominal model misses the motion because it has one mode only.
+
+    Args:
+        nominal: a fit that misses the motion.
+        kinds: effects that may be tried.
+
+    Returns:
+        The fit with the mode added; None where it misses the motion too, or may not be tried.
+    """
+    modes = [kind for kind in kinds if kind.line == "ringing"]
+    found = sets_with_one_more([Hypothesis((), nominal)], modes, None)
+    return found[0] if found and not is_gross(found[0].fit) else None
+
+
+def _distinct(ranked: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    """The hypotheses without those that change the readings as a better one does: they would grow alike."""
+    kept: list[Hypothesis] = []
+    for hypothesis in ranked:
+        if not any(_same_change(hypothesis.fit, other.fit, nominal) for other in kept):
+            kept.append(hypothesis)
+    return kept
+
+
+def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
+    """Whether two fits differ by less than `SAME_CHANGE` of the power by which they change the nominal one."""
+    apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
+    return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
+
+
+def going_on(
+    children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: ChannelMisfit
+) -> list[Hypothesis]:
+    """The sets to grow further.
+
+    Args:
+        children: fitted sets of one size.
+        parents: those that they grew from.
+        gap: what the nominal model leaves.
+
+    Returns:
+        Best first; none where the best of all could gain nothing.
+    """
+    scale = Scale.of((*children, *parents), gap)
+    ranked = sorted(children, key=lambda h: -scale.weight(h))
+    if not ranked or not _may_gain(ranked[0], scale):
+        return []
+    return [child for child in ranked if _goes_on(child, parents, scale)]
+
+
+def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
+    """Whether the weight could rise if one more effect left nothing."""
+    if not hypothesis.effects:
+        return True
+    return len(hypothesis.effects) < MOST_CAUSES and scale.greatest(hypothesis) > scale.weight(hypothesis)
+
+
+def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], scale: Scale) -> bool:
+    """Whether a set may still lead on from the best it grew from: one of two equal causes closes only half."""
+    parents = [h for h in level if set(h.effects) < set(child.effects)]
+    if not any(parent.effects for parent in parents):
+        return True
+    return scale.weight(child) > max(scale.weight(parent) for parent in parents) - GROWTH_LOSS
+
+
+def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The hypotheses with one effect less than a given one that were not fitted yet.
+
+    Args:
+        whole: with two effects or more.
+        found: fitted hypotheses.
+
+    Returns:
+        The missing ones, each started from the values of the whole.
+    """
+    known = {hypothesis.names for hypothesis in found}
+    smaller = []
+    for kind in whole.fit.problem.effects:
+        names = tuple(name for name in whole.effects if name != kind.name)
+        if names and tuple(sorted(names)) not in known:
+            with suppress(FitError, np.linalg.LinAlgError):
+                smaller.append(Hypothesis(names, without(whole.fit, kind)))
+    return smaller
+
+
+def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    """The sets in which one effect of a given set is replaced by another that changes the readings alike.
+
+    Args:
+        whole: with two effects or more.
+        found: fitted hypotheses, those with one effect less than ``whole`` among them.
+        nominal: the fit without any effect.
+
+    Returns:
+        Those that were not fitted yet. Two effects are alike where each was fitted alone and the fits are.
+    """
+    by_name = {hypothesis.names: hypothesis for hypothesis in found}
+    alone = {h.effects[0]: h for h in found if len(h.effects) == 1}
+    sets: list[Hypothesis] = []
+    for name in filter(alone.__contains__, whole.effects):
+        others = tuple(sorted(set(whole.effects) - {name}))
+        alike = [
+            h.fit.problem.effects[0]
+            for other, h in alone.items()
+            if other not in whole.effects
+            and tuple(sorted((*others, other))) not in by_name
+            and _same_change(h.fit, alone[name].fit, nominal)
+        ]
+        if others in by_name:
+            sets += [_to_the_end(child) for child in sets_with_one_more([by_name[others]], alike, None)]
+    return sets
+
+
+def _to_the_end(child: Hypothesis) -> Hypothesis:
+    """The hypothesis with its fit converged, as that of its rival is."""
+    if not child.fit.converged:
+        with suppress(FitError, np.linalg.LinAlgError):
+            return replace(child, fit=fit(child.fit.problem, child.fit.point))
+    return child
+
+
+def without(whole: Fit, kind: type[Effect]) -> Fit:
+    """Refit with one effect taken out.
+
+    Args:
+        whole: a fit.
+        kind: one of its effects.
+
+    Returns:
+        The fit of the others, started from their values.
+
+    Raises:
+        FitError: when the model cannot be integrated.
+    """
+    start = restricted(whole, {other.name for other in whole.problem.effects} - {kind.name})
+    return fit(start.problem, start.point)
+
+
+def sets_with_one_more(
+    level: Sequence[Hypothesis], kinds: Sequence[type[Effect]], progress: Progress | None
+) -> list[Hypothesis]:
+    """The sets with one effect more, each fitted from its best starting points.
+
+    Args:
+        level: fitted sets.
+        kinds: effects to add to each.
+        progress: called with the names of each set.
+
+    Returns:
+        One for every set of effects: that of more weight where two sets lead to it, so that a freed form of one
+        does not take the place of the other.
+    """
+    found: dict[tuple[str, ...], Hypothesis] = {}
+    for parent in (*level, *_in_textbook_form(level)):
+        others = [kind for kind in kinds if kind.name not in parent.effects]
+        for kind, starts in _worth_fitting(parent, others):
+            if progress is not None:
+                progress(" + ".join((*parent.effects, kind.name)))
+            best = _best_fit(starts[: kind.tries], parent.fit)
+            if best is None:
+                continue
+            child = Hypothesis((*parent.effects, kind.name), best)
+            found[child.names] = of_more_weight(found.get(child.names), child, misfit(parent.fit))
+    return list(found.values())
+
+
+def _in_textbook_form(level: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The single effects whose form was freed, without it: alone, a form also follows what other causes do."""
+    single = [h for h in level if len(h.effects) == 1]
+    return [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
+
+
+def _worth_fitting(
+    parent: Hypothesis, kinds: Sequence[type[Effect]]
+) -> list[tuple[type[Effect], list[StartingPoint]]]:
+    """The effects that linear theory predicts to close most; after the nominal model generously many.
+
+    Beside other effects, those that are predicted to do no more than a needless one are left out.
+    """
+    scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
+    scale = misfit_scale(misfit(parent.fit))
+    scored.sort(key=lambda item: min(log_misfit(start.predicted, scale) for start in item[1]))
+    if parent.effects:
+        return [(kind, starts) for kind, starts in scored[:GROWN_BY] if _is_needed(starts[0], parent.fit)]
+    limit = PREDICTED_SHARE * parent.fit.total
+    return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
+
+
+def _is_needed(start: StartingPoint, base: Fit) -> bool:
+    """Whether linear theory predicts that an effect lowers χ² by more than a needless one."""
+    own = own_gain(start.problem, start.point) - own_gain(base.problem, base.point)
+    return start.predicted_drop > NEEDLESS_CHI2 + own
+
+
+def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
+    found = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
+    if all(fitted.total > base.total for fitted in found):  # linear theory led too far
+        near = [point for start in starts if (point := start.nearer()) is not None]
+        found += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
+    best = min((f for f in found if is_plausible(f)), key=lambda f: f.total, default=None)
+    return None if best is None else turned_back(best)
+
+
+def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
+    with suppress(FitError, np.linalg.LinAlgError):
+        if is_gross(base):
+            found = fit(start.problem, start.point)
+        else:
+            found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
+        return found if np.isfinite(found.total) else None
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class InStretches:
+    """Sets of causes grown on stretches of the runs.
+
+    Args:
+        nominal: fit of the nominal model to long stretches.
+        stretches: these.
+        hypotheses: sets of causes fitted to them.
+    """
+
+    nominal: Fit
+    stretches: Stretches
+    hypotheses: tuple[Hypothesis, ...]
+
+    def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis | None:
+        """The hypothesis fitted to whole runs, from its fit to stretches.
+
+        Args:
+            hypothesis: fitted to the stretches.
+
+        Returns:
+            The same effects; None where the fit fails.
+        """
+        with suppress(FitError, np.linalg.LinAlgError):
+            return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """A set of causes fitted to long stretches of the runs, and to short ones where it was found there."""
+
+    long: Hypothesis
+    short: Hypothesis | None = None
+
+
+def grow_in_stretches(
+    data: Data,
+    fit_nominal: Callable[[Data], Fit],
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None = None,
+) -> InStretches:
+    """Grow sets of causes on stretches of the runs, where the nominal model misses the motion itself.
+
+    Args:
+        fit_nominal: fits the nominal model to any runs.
+        kinds: effects to try; those that are autonomous are.
+        progress: called with the names of each set.
+
+    Returns:
+        The best sets of each size, compared in long stretches. Effects are added in short ones, in which the phase
+        cannot be lost, and in long ones to the sets that keep it there: a slow loss hardly shows in two cycles.
+    """
+    short = spread_out(in_stretches(data), data)
+    first = fit_nominal(short.data)
+    try:
+        nominal, long = fit_longer(first, short, data, long_stretch(short))
+    except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
+        nominal, long = first, short
+    level, found = [_Grown(Hypothesis((), nominal), Hypothesis((), first))], []
+    able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
+    while level:
+        grown = _longer_sets(level, short, data, able, progress)
+        least = min(FREED_FROM * level[0].long.fit.excess, MODEL_ERROR**2 * gap.motion / nominal.count)
+        children = with_forms([child.long for child in grown.values()], gap, least)
+        found += children
+        parents = [g.long for g in level]
+        going = _of_each(parents, going_on(children, parents, gap))
+        level = [replace(grown[h.names], long=h) for h in going[:GROWN_FROM]]
+    return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
+
+
+def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The best child of each parent, then the others: what fits better at first may be a dead end."""
+    first: list[Hypothesis] = []
+    for parent in parents:
+        child = next((h for h in ranked if h not in first and set(parent.effects) < set(h.effects)), None)
+        if child is not None:
+            first.append(child)
+    return first + [h for h in ranked if h not in first]
+
+
+def _longer_sets(
+    level: Sequence[_Grown],
+    short: Stretches,
+    data: Data,
+    kinds: Sequence[type[Effect]],
+    progress: Progress | None,
+) -> dict[tuple[str, ...], _Grown]:
+    """The sets with one effect more, by their names, from the better of two starts where there are two."""
+    tried = sets_with_one_more([g.short for g in level if g.short is not None], kinds, progress)
+    best = sorted(tried, key=lambda h: h.fit.total)[:LENGTHENED]
+    grown = {h.names: g for h in best if (g := _lengthened(h, short, data)) is not None}
+    following = [g.long for g in level if g.long.effects and not is_gross(g.long.fit)]
+    for child in sets_with_one_more(following, kinds, progress):
+        other = grown.get(child.names)
+        if other is None or child.fit.total < other.long.fit.total:
+            grown[child.names] = _Grown(child, None if other is None else other.short)
+    return grown
+
+
+def _lengthened(hypothesis: Hypothesis, short: Stretches, data: Data) -> _Grown | None:
+    with suppress(FitError, np.linalg.LinAlgError):
+        found, _ = fit_longer(hypothesis.fit, short, data, long_stretch(short))
+        return _Grown(replace(hypothesis, fit=found), hypothesis)
+    return None

@@ -1,0 +1,318 @@
+"""The nominal model with effects added and fitted; their forms freed where that pays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
+from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING, OWN_EVIDENCE
+from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
+from tunnel_sim.effects.base import IN_RUNS
+from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.vocabulary.record import Array
+
+_POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
+_AS_WELL = 1.01  # of χ², up to which a fit explains the readings as well as another
+_SAME_READING = 0.2  # noise standard deviations of a block mean
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """The nominal model with effects added, fitted.
+
+    Args:
+        effects: names, in the order they were added.
+        fit: the fit.
+        textbook: the fit with the textbook form, where the forms were freed; None otherwise.
+    """
+
+    effects: tuple[str, ...]
+    fit: Fit
+    textbook: Fit | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects, sorted."""
+        return tuple(sorted(self.effects))
+
+    @property
+    def forms(self) -> int:
+        """How many form parameters were freed."""
+        problem = self.fit.problem
+        return sum(i.form for k in problem.effects if k.name in problem.free_forms for i in k.parameters())
+
+    @property
+    def further_numbers(self) -> int:
+        """Freed form parameters and instants in a run, less two where gravity leaves no need of a spring.
+
+        An instant follows any slow error of the phase as a form does. A spring would have to soften by chance, and
+        as much as gravity does.
+        """
+        problem, width = self.fit.problem, self.fit.point.release.shape[1]
+        places = problem.own_places(width)
+        instants = sum(
+            int(places[k.name].stop) - int(places[k.name].start) for k in problem.effects if k.skips
+        )
+        return self.forms + instants - 2 * _needs_no_spring(self.fit)
+
+    def share_left(self, nominal: Fit) -> float:
+        """Share of the nominal gap that the set leaves open; below 0 by chance.
+
+        What instants and phases of the runs gain by chance counts as left.
+        """
+        by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
+        return (self.fit.excess + by_chance) / nominal.gap
+
+    @cached_property
+    def excess(self) -> Array:
+        """χ² beyond noise that the set leaves by channel, shape (6,), dimensionless.
+
+        What instants of the runs gain by chance counts as left in the frequency, and what phases gain in the
+        harmonics.
+        """
+        problem, width = self.fit.problem, self.fit.point.release.shape[1]
+        found = misfit(self.fit).excess
+        for kind in problem.effects:
+            if kind.name in problem.phased:
+                place = problem.own_places(width)[kind.name]
+                channel = "frequency" if kind.skips else "harmonics"
+                count = (place.stop - place.start) * len(problem.data.runs)
+                found[CHANNELS.index(channel)] += OWN_EVIDENCE * count
+        return found
+
+    def fitted_set(self, nominal: Fit) -> FittedSet:
+        """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves."""
+        return FittedSet(self.effects, self.share_left(nominal), self.excess, self.further_numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """What sets are compared by: the misfit by channel that needs no cause, and the least that any of them leaves.
+
+    Args:
+        misfit: χ² by channel, shape (6,).
+        least: χ² by channel, shape (6,), 0 or less.
+    """
+
+    misfit: Array
+    least: Array
+
+    @classmethod
+    def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit) -> Scale:
+        """The scale of some sets, from what the nominal model leaves."""
+        return cls(misfit_scale(gap), least_excess([h.excess for h in sets]))
+
+    def weight(self, hypothesis: Hypothesis) -> float:
+        """Logarithm of the weight of a set."""
+        left = hypothesis.excess - self.least
+        return log_weight(left, self.misfit, len(hypothesis.effects), hypothesis.further_numbers)
+
+    def greatest(self, hypothesis: Hypothesis) -> float:
+        """The same of the set with one more effect that leaves nothing."""
+        return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
+
+
+def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
+    """That of more weight, the first if they are equal.
+
+    Args:
+        one: None for none.
+        gap: what the nominal model leaves.
+    """
+    return other if one is None else max(one, other, key=Scale.of((one, other), gap).weight)
+
+
+def own_gain(problem: Problem, point: Point) -> float:
+    """χ² by which the instants and phases of the runs' own may lower it by chance."""
+    return float(OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
+
+
+def _needs_no_spring(fitted: Fit) -> bool:
+    data = fitted.problem.data
+    if not data.normalised or data.law is not None:
+        return False
+    return fitted.value("stiffness") < NEEDLESS_SPRING * linear_coefficients(fitted, 0)[2]
+
+
+def is_plausible(fitted: Fit) -> bool:
+    """Whether every effect of a fit is still what its name means, in at least half of the runs."""
+    effects = fitted.problem.effects_at(fitted.point.common)
+    motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
+    return all(np.mean([effect.plausible(omega) for omega in motions]) >= IN_RUNS for effect in effects)
+
+
+def turned_back(fitted: Fit) -> Fit:
+    """The fit with the sensor's zero where the body swings.
+
+    Half a turn away, gravity of the other sign swings the body alike, and fits of large swings may end there.
+
+    Returns:
+        Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else the
+        fit that was given.
+    """
+    problem, (least, greatest) = fitted.problem, fitted.problem.data.extremes
+    signs = [f"{kind.name}.{kind.turns}" for kind in problem.effects if kind.turns]
+    if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
+        return fitted
+    turn = np.pi if fitted.value("zero") < least else -np.pi
+    common, release = fitted.point.common.copy(), fitted.point.release.copy()
+    common[problem.names.index("zero")] += turn
+    common[[problem.names.index(name) for name in signs]] *= -1.0
+    release[:, 0] -= turn
+    with suppress(FitError, np.linalg.LinAlgError):
+        turned = fit(problem, Point(common, release))
+        return turned if turned.total < _AS_WELL * fitted.total else fitted
+    return fitted
+
+
+def restricted(whole: Fit, names: Collection[str]) -> Fit:
+    """A fit with some effects taken out and everything else as it was; its residuals are still those of the whole.
+
+    Args:
+        whole: with more effects.
+        names: of the effects to keep.
+
+    Returns:
+        A start, with its sensitivities, for the fit of the smaller problem.
+    """
+    large = whole.problem
+    problem = Problem(
+        large.data,
+        tuple(kind for kind in large.effects if kind.name in names),
+        tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
+        tuple(name for name in large.free_forms if name in names),
+        large.rod_followed,
+    )
+    common = [large.names.index(name) for name in problem.names]
+    places = large.own_places(whole.point.release.shape[1])
+    own = [*range(large.first_phase), *(i for name in problem.phased for i in np.r_[places[name]].tolist())]
+    return dataclasses.replace(
+        whole,
+        problem=problem,
+        point=Point(whole.point.common[common], whole.point.release[:, own]),
+        covariance=whole.covariance[np.ix_(common, common)],
+        jacobian=[(c[:, common], r[:, own]) for c, r in whole.jacobian],
+    )
+
+
+def with_forms(
+    found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int = FREED_HYPOTHESES
+) -> list[Hypothesis]:
+    """Free the forms of the best hypotheses where the textbook form leaves a good part open.
+
+    Args:
+        found: fitted hypotheses.
+        gap: what the nominal model leaves.
+        least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
+        count: how many of the best are tried with free forms.
+
+    Returns:
+        All hypotheses, best first.
+    """
+    ranked = sorted(found, key=lambda h: h.fit.total)
+    freed = [_freed_if_it_pays(h, gap, least) for h in ranked[:count]]
+    return sorted([*freed, *ranked[count:]], key=lambda h: h.fit.total)
+
+
+def _freed_if_it_pays(hypothesis: Hypothesis, gap: ChannelMisfit, least: float) -> Hypothesis:
+    """The hypothesis with its forms free where it then has more weight; else as it is."""
+    fitted = hypothesis.fit
+    freed = _free_forms(fitted) if fitted.excess > least else None
+    if freed is None:
+        return hypothesis
+    needed = _forms_that_matter(freed, FORM_SHARE * fitted.excess * fitted.count)
+    if needed and needed != freed.problem.free_forms:
+        freed = _free_forms(fitted, only=needed) or freed
+    found = Hypothesis(hypothesis.effects, freed, fitted)
+    return of_more_weight(hypothesis, found, gap)
+
+
+def _forms_that_matter(freed: Fit, least: float) -> tuple[str, ...]:
+    """Effects whose forms differ from the textbook's so that χ² would rise by more than ``least`` without."""
+    needed = []
+    for kind in freed.problem.effects:
+        if kind.name in freed.problem.free_forms:
+            values = [(f"{kind.name}.{info.name}", info.default) for info in kind.parameters() if info.form]
+            # a form that the runs cannot tell has no standard deviation
+            pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
+            if max(np.square(pulls), default=0.0) > least:
+                needed.append(kind.name)
+    return tuple(needed)
+
+
+def polish(chosen: Hypothesis) -> Hypothesis:
+    """The hypothesis fitted to convergence with its forms free, so that its covariance includes the forms.
+
+    Args:
+        chosen: a fitted hypothesis.
+
+    Returns:
+        The same effects with a χ² no larger, but for what following the rod changes; as given where the fit cannot
+        go on.
+    """
+    first = _rod_followed(chosen.fit)
+    better = _free_forms(first, tolerance=_POLISH)
+    if better is None:
+        with suppress(FitError, np.linalg.LinAlgError):
+            better = fit(first.problem, first.point, tolerance=_POLISH)
+    if better is None or better.total > first.total:
+        better = first
+    textbook = _textbook(better, first) if better.problem.free_forms else None
+    return Hypothesis(chosen.effects, better, textbook)
+
+
+def _rod_followed(fitted: Fit) -> Fit:
+    """The fit with the rod's ringing integrated, where adding it to the slow motion is not exact enough."""
+    problem = dataclasses.replace(fitted.problem, rod_followed=True)
+    differences = [
+        one - other
+        for one, other in zip(scaled_residuals(problem, fitted.point), fitted.residuals, strict=True)
+    ]
+    if max(float(np.max(np.abs(d))) for d in differences) < _SAME_READING:
+        return fitted
+    with suppress(FitError, np.linalg.LinAlgError):
+        return fit(problem, fitted.point)
+    return fitted  # the confirmation by MuJoCo then says how far it is off
+
+
+def _textbook(freed: Fit, first: Fit) -> Fit | None:
+    """The same effects in textbook form: the first fit where it had that, else one from the freed values."""
+    if not first.problem.free_forms:
+        return first
+    problem = dataclasses.replace(freed.problem, free_forms=())
+    values = dict(zip(freed.problem.names, freed.point.common.tolist(), strict=True))
+    start = Point(np.array([values[name] for name in problem.names]), freed.point.release)
+    with suppress(FitError, np.linalg.LinAlgError):
+        return fit(problem, start)
+    return None
+
+
+def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | None = None) -> Fit | None:
+    """The same effects with all forms, or only those of some, free; None where none is, or nothing is gained."""
+    problem = fitted.problem
+    kinds = [kind for kind in problem.effects if any(info.form for info in kind.parameters())]
+    kinds = kinds if only is None else [kind for kind in kinds if kind.name in only]
+    if not kinds:
+        return None
+    freed = dataclasses.replace(problem, free_forms=tuple(kind.name for kind in kinds))
+    values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
+    defaults = {f"{k.name}.{i.name}": _within(i) for k in kinds for i in k.parameters() if i.form}
+    start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
+    try:
+        found = fit(freed, start, tolerance=tolerance)
+    except (FitError, np.linalg.LinAlgError):
+        return None
+    return found if found.total < fitted.total and is_plausible(found) else None
+
+
+def _within(info: ParameterInfo) -> float:
+    """Where a form starts: at the textbook value, or half a step inside a bound, where its slope may vanish."""
+    return info.default + 0.5 * info.scale if info.default == info.lower else info.default

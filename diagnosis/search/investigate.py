@@ -1,0 +1,411 @@
+"""Investigate a campaign: measure its noise, test for a gap, fit every effect and weigh the answers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from diagnosis.diagnosable import refuse_indefinite
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
+from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import CHANNELS, mains_interval, misfit
+from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.starting_points import decays_start, is_gross, nominal_start
+from diagnosis.noise.gap import GapTest, judge
+from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
+from diagnosis.noise.rounding import rounding_errors
+from diagnosis.noise.sensor_noise import (
+    Noise,
+    NoiseTrend,
+    campaign_noise,
+    noise_trend,
+    reading_levels,
+    reading_step,
+    typical_step,
+)
+from diagnosis.policy import COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, NOISE_LEAVES, RIVAL_PROBABILITY
+from diagnosis.search.grow import InStretches, exchange, grow, grow_in_stretches, prune, second_mode_alone
+from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
+from diagnosis.search.random_moments import RandomAnswer, weigh_random_moments, without_the_random_moment
+from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
+from diagnosis.where.place import Place, locate
+from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+#: The effects that are read off the records before any is fitted.
+HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Everything found in a campaign, as `diagnosis.search.investigate.investigate` returns it.
+
+    Args:
+        campaign: the similar campaign (`diagnosis.likelihood.nondimensional`), whose units all values below have.
+        similarity: how it was made from the measured one.
+        cleaned: the campaign without the hum, where one was found.
+        noise: of the cleaned records.
+        trend: of the noise with the motion.
+        step: of the lattice on which the readings lie, rad; 0 where they are continuous.
+        coarse: whether that step is coarser than the stated resolution.
+        hum: the hum that was removed, or None.
+        nominal: the fit of the nominal model to the cleaned records.
+        test: whether there is a gap, after the hum is removed.
+        cut: whether the start of every run and what follows its motion were left out, because the nominal model
+            misses the motion grossly.
+        rested: runs that end with a long rest, which the fits of effects leave out.
+        place: where the gap is, from the residuals alone; None where it is not located yet.
+        hypotheses: fitted sets of effects.
+        weighed: answers with probabilities, the answer first; empty where there is no gap.
+        random: answers with a random moment that passed its tests.
+        seconds: wall time by step, s.
+    """
+
+    campaign: Campaign
+    similarity: Similarity
+    cleaned: Campaign
+    noise: Noise
+    trend: NoiseTrend
+    step: float
+    coarse: bool
+    hum: Hum | None
+    nominal: Fit
+    test: GapTest
+    cut: bool = False
+    rested: tuple[str, ...] = ()
+    place: Place | None = None
+    hypotheses: tuple[Hypothesis, ...] = ()
+    weighed: tuple[Weighed, ...] = ()
+    random: tuple[RandomAnswer, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def read_off(self) -> tuple[str, ...]:
+        """Causes read off the records before fitting."""
+        found = {HUM.name: self.hum is not None, COARSE_STEP.name: self.coarse}
+        return tuple(name for name, present in found.items() if present)
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Causes found by fitting: none, one or several, or ``unknown`` alone."""
+        return self.weighed[0].effects if self.weighed else ()
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """All causes, sorted; ``unknown`` alone where nothing in the vocabulary explains the gap."""
+        if self.fitted == UNKNOWN:
+            return UNKNOWN
+        return tuple(sorted({*self.read_off, *self.fitted}))
+
+    @property
+    def named(self) -> bool:
+        """Whether there is a gap and a cause of it is named."""
+        return self.causes not in ((), UNKNOWN)
+
+    @property
+    def chosen(self) -> Fit:
+        """The fit of the answer; the nominal one where no fitted effect is part of it."""
+        names = tuple(name for name in self.fitted if name != "unknown")
+        random = self.random_answer(names)
+        if random is not None:
+            return self.nominal if random.beside is None else random.beside.fit
+        hypothesis = self.hypothesis(names) if names else None
+        return self.nominal if hypothesis is None else hypothesis.fit
+
+    def hypothesis(self, names: Sequence[str]) -> Hypothesis | None:
+        """The fitted hypothesis of these effects; None where they were not fitted together."""
+        key = tuple(sorted(names))
+        return next((h for h in self.hypotheses if h.names == key), None)
+
+    def random_answer(self, names: Sequence[str]) -> RandomAnswer | None:
+        """The random moment among these effects; None where none passed, or the effects close more without it."""
+        key = tuple(sorted(names))
+        found = next((answer for answer in self.random if answer.effects == key), None)
+        steady = self.hypothesis(key)
+        if found is None or steady is None:
+            return found
+        share = max(steady.fit.excess, 0.0) / max(self.nominal.excess, 1e-9)
+        return found if found.share < share else None
+
+
+def located(study: Study) -> Place:
+    """Where the gap of a study is, found now where it was not found before.
+
+    Args:
+        study: up to the test of the gap.
+    """
+    if study.place is not None:
+        return study.place
+    stated = study.noise.stated_variance if study.coarse else None
+    level = float(np.mean([run.noise_variance * run.block for run in study.nominal.problem.data.runs]))
+    return locate(
+        study.campaign,
+        study.nominal,
+        hum_removed=study.hum is not None,
+        noise_ratio=level / stated if stated else 1.0,
+    )
+
+
+Progress = Callable[[str], None]
+
+_IN_HARMONICS = np.eye(len(CHANNELS))[CHANNELS.index("harmonics")]
+
+
+def investigate(
+    campaign: Campaign, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
+) -> Study:
+    """Test a campaign for a gap, and weigh the effects that may cause it.
+
+    Args:
+        progress: called with the name of each step.
+
+    Returns:
+        What was found, in the units of the similar campaign.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    clock = _Clock(progress)
+    found = _test(*similar_campaign(campaign), kinds, clock)
+    if found.test.detected:
+        with clock.step("where"):
+            found = replace(found, place=located(found))
+        found = _weigh_effects(found, kinds, clock)
+    return replace(found, seconds=clock.seconds)
+
+
+def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
+    """Test a campaign for a gap, and fit no effect.
+
+    Args:
+        kinds: the effects that may be read off the records.
+
+    Returns:
+        The study up to the fit of the nominal model.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    return _test(*similar_campaign(campaign), kinds, _Clock(None))
+
+
+def fit_nominal(data: Data) -> Fit:
+    """Fit the nominal model; where it misses the motion, from the runs' own decays as well.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted.
+    """
+    try:
+        found = fit(Problem(data), nominal_start(data))
+        nearer = decays_start(data) if is_gross(found) else None
+        if nearer is not None:
+            found = min(found, fit(Problem(data), nearer), key=lambda one: one.total)
+    except (FitError, np.linalg.LinAlgError) as error:
+        raise TunnelError(
+            "the nominal model cannot be fitted",
+            remedy="check spring stiffness, wind speed and that the runs are free decays of three cycles or more",
+        ) from error
+    refuse_indefinite(found)
+    return found
+
+
+def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study up to the test of the gap: noise, hum and nominal fit."""
+    allowed = {kind.name for kind in kinds}
+    with clock.step("noise"):
+        noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
+        stated = campaign.sensor.resolution
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
+    with clock.step("nominal fit"):
+        nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
+        cleaned, hum = campaign, None
+        line = find_hum(_fine(nominal, campaign, noise.variance)) if HUM.name in allowed else None
+        if line is not None:
+            frequency = refine_frequency(campaign, line)
+            cleaned, noise, hum = _without_hum(campaign, frequency, noise)
+            nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
+        # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
+        missed = is_gross(nominal) and not campaign.driven
+        cut = missed and second_mode_alone(nominal, kinds) is None
+        if cut:
+            nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
+        nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
+    return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, cut)
+
+
+def _fine(nominal: Fit, campaign: Campaign, variance: dict[str, float]) -> Fit:
+    """The nominal fit with the residuals of blocks short enough to show the mains; those of a slow rig are not."""
+    similarity, least = nominal.problem.data.similarity, mains_interval(nominal.problem.data.similarity)
+    if all(run.interval < least for run in nominal.problem.data.runs):
+        return nominal
+    problem = Problem(prepare(campaign, variance, similarity, 0.5 * least))
+    return replace(nominal, problem=problem, residuals=scaled_residuals(problem, nominal.point))
+
+
+def _without_hum(campaign: Campaign, frequency: float, noise: Noise) -> tuple[Campaign, Noise, Hum]:
+    """The campaign without a hum, its noise, and the hum; twice, as a hum may count as noise at first."""
+    for _ in range(2):
+        cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
+        noise = campaign_noise(cleaned)
+    return cleaned, noise, hum
+
+
+def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study with sets of effects and random moments fitted and weighed."""
+    fitted = [kind for kind in kinds if kind.fitted]
+    first = second_mode_alone(found.nominal, fitted) if is_gross(found.nominal) else None
+    # an input holds the phase of the motion, so that no stretches are needed
+    if fitted and first is None and is_gross(found.nominal) and not found.campaign.driven:
+        return _weigh_in_stretches(found, fitted, clock)
+    moving, rested = without_long_rest(found.nominal.problem.data)
+    if rested:  # where dry friction stops a body, χ² has many minima
+        with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
+            found = replace(found, nominal=fit(Problem(moving), found.nominal.point), rested=rested)
+    with clock.step("effects"):
+        found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress, first)))
+    with clock.step("random moments"):
+        random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
+        sets = without_the_random_moment(random, found.hypotheses, misfit(found.nominal))
+    found = replace(found, random=tuple(random), hypotheses=tuple(sets))
+    found = _pruned(found, found.nominal, clock)
+    weighed = _weighed(found, found.nominal)
+    if weighed[0].effects != UNKNOWN:
+        with clock.step("polishing"):
+            found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
+    if _noise_explains(found, weighed):
+        answer = Weighed((), 1.0, 1.0) if found.read_off else Weighed(UNKNOWN, 1.0, 1.0)
+        others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
+        weighed = [answer, *others]
+    return replace(found, weighed=tuple(weighed))
+
+
+def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches."""
+    with clock.step("effects"):
+        grown = grow_in_stretches(found.nominal.problem.data, fit_nominal, kinds, clock.progress)
+    found = replace(found, hypotheses=grown.hypotheses)
+    found = _pruned(found, grown.nominal, clock)
+    with clock.step("polishing"):
+        return _with_whole_runs(found, grown)
+
+
+def _with_whole_runs(found: Study, grown: InStretches) -> Study:
+    """The study with the answer and its parts fitted to the whole runs; a set that cannot be is no answer."""
+    data = found.nominal.problem.data
+    while True:
+        weighed = _weighed(found, grown.nominal)
+        answer = set(weighed[0].effects)
+        polished = _polished(found.hypotheses, weighed[0], ())
+        whole = [grown.whole(h, data) if answer.issuperset(h.names) else h for h in polished]
+        kept = replace(found, hypotheses=tuple(h for h in whole if h is not None), weighed=tuple(weighed))
+        if weighed[0].effects == UNKNOWN or kept.hypothesis(weighed[0].effects) is not None:
+            return kept
+        left = tuple(h for h in found.hypotheses if h.names != weighed[0].effects)
+        found = replace(found, hypotheses=left)
+
+
+def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
+    """The study with every set that has one effect less than the answer, or another one that does the same."""
+    named = (found.hypothesis(w.effects) for w in _weighed(found, base))
+    best = next((hypothesis for hypothesis in named if hypothesis is not None), None)
+    if best is None or len(best.effects) == 1:
+        return found
+    with clock.step("pruning"):
+        known = (*found.hypotheses, *prune(best, found.hypotheses))
+        found = replace(found, hypotheses=(*known, *exchange(best, known, base)))
+    with clock.step("forms"):
+        return _with_forms(found, base)
+
+
+def _with_forms(found: Study, base: Fit) -> Study:
+    """The study with the forms of rival sets free where that pays: growth frees those of few sets."""
+    weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
+    near = [w.effects for w in weighed if w.probability > RIVAL_PROBABILITY]
+    if len(near) < 2:
+        return found
+    rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
+    others = [h for h in found.hypotheses if not any(h is rival for rival in rivals)]
+    return replace(found, hypotheses=(*others, *with_forms(rivals, misfit(base), 0.0, len(rivals))))
+
+
+def _weighed(found: Study, base: Fit) -> list[Weighed]:
+    """The answers with their probabilities, the answer first; shares of the gap that ``base`` leaves."""
+    nominal, own = misfit(base), _of_read_off(found, base)
+    sets = [h.fitted_set(base) for h in found.hypotheses]
+    sets += [answer.left for answer in found.random]
+    if found.read_off:  # it may be the only cause, and is part of the gap
+        sets.append(FittedSet((), 1.0, nominal.excess))
+    if found.hum is not None:
+        removed = found.hum.excess * base.count * _IN_HARMONICS
+        nominal = replace(nominal, chi2=nominal.chi2 + removed)
+    return weigh([replace(one, excess=one.excess - own) for one in sets], nominal)
+
+
+def _of_read_off(found: Study, base: Fit) -> Array:
+    """χ² by channel that causes read off the records leave under any set of effects, shape (6,).
+
+    The error of a coarse step is not white, and follows a slow motion. A hum that is not a pure line leaves a small
+    share of itself.
+    """
+    left = np.zeros(len(CHANNELS))
+    if found.hum is not None:
+        left += HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
+    errors = None
+    if found.coarse:
+        levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
+        white = found.noise.white(typical_step(levels))
+        # a coarse step hides the noise, so that what is stated of it is the better guess
+        white = dict.fromkeys(white, stated) if stated else white
+        errors = rounding_errors(base, white, found.step, levels)
+    if errors is not None:
+        tries = [
+            misfit(base, [run.scaled(e[k]) for run, e in zip(base.problem.data.runs, errors, strict=True)])
+            for k in range(len(errors[0]))
+        ]
+        left += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
+    return left
+
+
+def _polished(
+    hypotheses: Sequence[Hypothesis], answer: Weighed, random: Sequence[RandomAnswer]
+) -> tuple[Hypothesis, ...]:
+    """The hypotheses, the answer's own fitted to convergence unless a random moment is the answer."""
+    if any(moment.effects == answer.effects for moment in random):
+        return tuple(hypotheses)
+    return tuple(polish(h) if h.names == answer.effects else h for h in hypotheses)
+
+
+def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
+    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
+
+    Effects of a few numbers close little of any noise, however it misbehaves.
+    """
+    block = found.nominal.problem.data.runs[0].block
+    small = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
+    closed = any(w.effects != UNKNOWN and w.share < NOISE_LEAVES for w in weighed)
+    return found.nominal.chance > 1.0 or (small and not closed)
+
+
+class _Clock:
+    """Wall time by step, and the progress call."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self.seconds: dict[str, float] = {}
+        self.progress = progress
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        """Time a step."""
+        if self.progress is not None:
+            self.progress(name)
+        begun = time.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun

@@ -1,0 +1,392 @@
+"""A random moment on the rig: its likelihood from a steady Kalman filter, and whether it is steady noise.
+
+There are two kinds: turbulence, broad or about one frequency, and vortex shedding with a wandering phase, about a
+frequency that follows the wind. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA
+RP-1077 (1981), filter error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import chdtri
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import linear_coefficients, resonance
+from diagnosis.likelihood.run_data import Data
+from diagnosis.policy import BURST, BURST_FALSE_ALARM_RATE, ONE_RUN_FALSE_ALARM_RATE, WHITE_INNOVATIONS
+from identification.signal.filter import discretised, steady_filters
+from tunnel_sim.vocabulary.record import Array
+
+_INTERVAL = 0.012  # s between the residuals the filter sees: well above the rig's frequencies
+_SETTLE = 1.0  # s left out at the start: the transient of the filter
+LONGEST_BANDWIDTH = 20.0  # Hz: the rig cannot distinguish a broader spectrum from a white one
+_LEAST_STROUHAL = 0.05  # bluff bodies shed at 0.1 to 0.3
+_LINE_SPACING = 0.3  # Hz, in the search for a line
+_WIDEST_LINE = 0.5  # Hz: beyond it a wandering line is turbulence
+_HIGHEST_LINE = 30.0  # Hz
+_EVALUATIONS = 60  # of the likelihood beyond the starting grid
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A random moment's spectrum: first order about a centre.
+
+    Args:
+        intensity: standard deviation of the moment coefficient, dimensionless.
+        bandwidth: corner frequency beside the centre, Hz.
+        centre: Hz; 0 for turbulence without one.
+        strouhal_number: of a centre that follows the wind on the body's width; 0 where none does.
+    """
+
+    intensity: float
+    bandwidth: float
+    centre: float = 0.0
+    strouhal_number: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessNoise:
+    """A fitted random moment.
+
+    Args:
+        spectrum: as fitted.
+        drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
+        by_run: the drop of each wind-on run over the power that the spectrum predicts of its response, in units of
+            the noise's, shape (runs,), dimensionless; at least 0.
+        cost: −2 ln L without constants, wind-on runs, dimensionless.
+        excess: mean squared scaled innovation minus one, dimensionless.
+        innovations: scaled, by wind-on run.
+        interval: between innovations, s.
+    """
+
+    spectrum: Spectrum
+    drop: float
+    by_run: Array
+    cost: float
+    excess: float
+    innovations: list[Array]
+    interval: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """One wind-on run for the filter."""
+
+    residual: Array  # rad
+    variance: float  # rad2, of one residual
+    interval: float
+    oscillator: Array  # (2, 2): angle, rate
+    moment: float  # N m per unit coefficient, over the inertia
+    reduced: float  # V/width, Hz
+
+
+def random_moments(fit: Fit, spectra: Collection[str] = ("broad_band", "narrow_band")) -> list[ProcessNoise]:
+    """The random moments that may explain the residuals of a fit.
+
+    Args:
+        fit: with residuals in the sensor's noise alone.
+        spectra: of the effects that may act (`tunnel_sim.effects.Effect.random`).
+
+    Returns:
+        The best fit of each kind; empty without wind-on runs or where the model is not stable.
+    """
+    tried: list[ProcessNoise | None] = []
+    if "broad_band" in spectra:
+        tried += [fit_turbulence(fit), fit_turbulence(fit, centred=True)]
+    if "narrow_band" in spectra:
+        tried.append(fit_wandering_shedding(fit))
+    return [one for one in tried if one is not None]
+
+
+def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
+    """Explain the residuals of the wind-on runs by turbulence of common coefficient.
+
+    Args:
+        fit: the deterministic model's fit; its coefficients give the rig's response.
+        centred: whether its spectrum has a centre of its own.
+
+    Returns:
+        The fit; None without wind-on runs or where the model is not stable.
+    """
+    if not centred:
+        grid = [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)]
+        bounds = ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH))
+        return _fit(fit, lambda x: Spectrum(x[0], x[1]), grid, bounds)
+    about = [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)]
+    limits = ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0))
+    return _fit(fit, lambda x: Spectrum(x[0], x[1], x[2]), about, limits)
+
+
+def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
+    """Explain the residuals of the wind-on runs by vortex shedding with a wandering phase.
+
+    Args:
+        fit: the deterministic model's fit.
+
+    Returns:
+        The fit; None without wind-on runs or body width.
+    """
+    data = fit.problem.data
+    fastest = max(run.wind_speed for run in data.runs)
+    if data.width <= 0.0 or fastest <= 0.0:
+        return None
+    # lines spaced so that any frequency lies on one, up to the highest that the filter's samples show
+    reduced = fastest / data.width
+    numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
+    grid = [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers]
+    bounds = ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0))
+    return _fit(fit, lambda x: Spectrum(x[0], x[1], strouhal_number=x[2]), grid, bounds)
+
+
+def _fit(
+    fit: Fit,
+    spectrum: Callable[[Sequence[float]], Spectrum],
+    grid: Sequence[tuple[float, ...]],
+    bounds: Sequence[tuple[float, float]],
+) -> ProcessNoise | None:
+    channels = [c for i in range(len(fit.residuals)) if (c := _channel(fit, i)) is not None]
+    if not channels:
+        return None
+
+    def cost(x: Array) -> float:
+        return sum(c for c, _ in _filtered(channels, spectrum(np.exp(x).tolist())))
+
+    every = [spectrum(x) for x in grid for _ in channels]
+    by_run = np.array([c for c, _ in _filtered(channels * len(grid), every)]).reshape(len(grid), -1)
+    start = np.log(grid[int(np.argmin(by_run.sum(axis=1)))])
+    found = minimize(
+        cost,
+        start,
+        method="Nelder-Mead",
+        bounds=[(np.log(low), np.log(high)) for low, high in bounds],
+        options={
+            "maxfev": _EVALUATIONS * len(start) // 2,
+            "xatol": 0.02,
+            "fatol": 0.5,
+            "initial_simplex": _simplex(start, np.log(bounds)),
+        },
+    )
+    best = spectrum(np.exp(found.x).tolist())
+    costs, innovations = zip(*_filtered(channels, best), strict=True)
+    kept = [c.residual[_skip(c) :] / np.sqrt(c.variance) for c in channels]
+    count = sum(i.size for i in innovations)
+    white = [float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True)]
+    drops = np.array(white) - np.array(costs)
+    return ProcessNoise(
+        best,
+        float(drops.sum()),
+        np.maximum(drops, 0.0) / _predicted(channels, Spectrum(1.0, LONGEST_BANDWIDTH)),
+        float(found.fun),
+        sum(float(i @ i) for i in innovations) / count - 1.0,
+        list(innovations),
+        channels[0].interval,
+    )
+
+
+def _predicted(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
+    """Power of the response at the end of each run that began at rest, in units of the noise's, shape (runs,)."""
+    transition, disturbance = _discrete(channels, [spectrum] * len(channels))
+    power = []
+    for channel, a, q in zip(channels, transition, disturbance, strict=True):
+        for _ in range(int(np.log2(channel.residual.size))):
+            a, q = a @ a, q + a @ q @ a.T
+        power.append(q[0, 0] / channel.variance)
+    return np.array(power)
+
+
+def _simplex(start: Array, bounds: Array) -> Array:
+    """Steps of half a logarithm in size and bandwidth, and a tenth of that in a centre found by the grid."""
+    corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
+    if start.size == 3 and bounds[2, 1] < 0.5:  # a Strouhal number
+        corners[3, 2] = start[2] + 2e-3
+    return np.clip(corners, bounds[:, 0], bounds[:, 1])
+
+
+def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
+    """The runs of a fit, the noise of those in the wind being the sensor's and the response to a random moment.
+
+    Args:
+        fit: its coefficients give the rig's response.
+        spectrum: of the moment.
+
+    Returns:
+        The data, scaled as the innovations of the steady filter; None where no run is in the wind, or the filter
+        does not settle.
+    """
+    runs = list(fit.problem.data.runs)
+    channels = {i: c for i in range(len(runs)) if (c := _channel(fit, i, 0.0)) is not None}
+    filters = _filters(list(channels.values()), spectrum)
+    for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
+        if not (np.isfinite(spread) and spread > 0.0):
+            return None
+        variance = runs[i].noise_variance * spread / channel.variance
+        runs[i] = replace(runs[i], innovations=(numerator, denominator), noise_variance=variance)
+    return fit.problem.data.with_runs(tuple(runs)) if channels else None
+
+
+def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Channel | None:
+    run = fit.problem.data.runs[run_index]
+    if not run.wind_on or run.derivative:  # the filter's reading is an angle
+        return None
+    inertia, damping, stiffness = linear_coefficients(fit, run_index)
+    if stiffness <= 0.0 or damping <= 0.0:
+        return None
+    group = max(1, round(least_interval / run.interval))
+    count = run.reading.size // group
+    scale = np.sqrt(run.noise_variance)
+    residual = (fit.residuals[run_index][: count * group] * scale).reshape(count, group).mean(axis=1)
+    # residuals are white: the rig's response, a narrow band, has passed through the same filter
+    passed = scale / float(run.noise_at(resonance(fit, run_index)))
+    data = fit.problem.data
+    moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length / inertia
+    oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
+    reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
+    return _Channel(
+        residual,
+        run.noise_variance / group,
+        group * run.interval,
+        oscillator,
+        passed * moment,
+        reduced,
+    )
+
+
+def _skip(channel: _Channel) -> int:
+    return min(channel.residual.size // 4, round(_SETTLE / channel.interval))
+
+
+def _filtered(
+    channels: Sequence[_Channel], spectra: Spectrum | Sequence[Spectrum]
+) -> list[tuple[float, Array]]:
+    """−2 ln L (without constants) and scaled innovations of the steady filter, by run.
+
+    Args:
+        spectra: of all runs, or one for each.
+    """
+    from scipy.signal import lfilter  # only here: slow to load
+
+    results = []
+    for channel, (numerator, denominator, spread) in zip(channels, _filters(channels, spectra), strict=True):
+        if not (np.isfinite(spread) and spread > 0.0):
+            results.append((np.inf, np.zeros(0)))
+            continue
+        innovations = lfilter(numerator, denominator, channel.residual)[_skip(channel) :]
+        cost = float(innovations.size * np.log(spread) + innovations @ innovations / spread)
+        results.append((cost, innovations / np.sqrt(spread)))
+    return results
+
+
+def _filters(
+    channels: Sequence[_Channel], spectra: Spectrum | Sequence[Spectrum]
+) -> list[tuple[Array, Array, float]]:
+    """The filter from residuals to innovations, numerator and denominator, and their variance, rad², by run."""
+    each = [spectra] * len(channels) if isinstance(spectra, Spectrum) else spectra
+    transition, disturbance = _discrete(channels, each)
+    variance = np.array([c.variance for c in channels])
+    return steady_filters(transition, disturbance, variance)
+
+
+def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
+    """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra have a centre, or none.
+
+    States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too.
+    """
+    centred = spectra[0].centre > 0.0 or spectra[0].strouhal_number > 0.0
+    size = 4 if centred else 3
+    dynamics = np.zeros((len(channels), size, size))
+    drive = np.zeros_like(dynamics)
+    for own, noise, channel, spectrum in zip(dynamics, drive, channels, spectra, strict=True):
+        corner = 2.0 * np.pi * spectrum.bandwidth
+        own[:2, :2] = channel.oscillator
+        own[1, 2] = channel.moment
+        own[range(2, size), range(2, size)] = -corner
+        if centred:
+            turn = 2.0 * np.pi * (spectrum.centre + spectrum.strouhal_number * channel.reduced)
+            own[2, 3], own[3, 2] = -turn, turn
+        noise[range(2, size), range(2, size)] = 2.0 * corner * spectrum.intensity**2
+    interval = np.array([channel.interval for channel in channels])
+    transition, disturbance = discretised(dynamics, drive, interval)
+    return transition, disturbance + 1e-18 * np.eye(size)
+
+
+def is_steady_noise(result: ProcessNoise) -> bool:
+    """Whether a random moment passes all tests.
+
+    Args:
+        result: a fit of process noise.
+
+    Returns:
+        False where its innovations are not white and steady, come in bursts, or are those of one run.
+    """
+    return (
+        departure_from_white(result) <= WHITE_INNOVATIONS
+        and bursts(result, BURST_FALSE_ALARM_RATE) <= BURST
+        and of_all_runs(result) >= ONE_RUN_FALSE_ALARM_RATE
+    )
+
+
+def departure_from_white(result: ProcessNoise) -> float:
+    """How far innovations are from white and steady.
+
+    Args:
+        result: a fit of process noise.
+
+    Returns:
+        Largest departure from 1 of the mean power in a frequency band, or in a quarter of the record in time, in
+        its standard deviations.
+    """
+    departures = []
+    for innovations in result.innovations:
+        power = np.abs(np.fft.rfft(innovations - innovations.mean())) ** 2 / innovations.size
+        for part in np.array_split(power[1:], 8):
+            departures.append((float(part.mean()) - 1.0) * np.sqrt(part.size))
+        for part in np.array_split(innovations, 4):
+            departures.append((float(np.mean(part**2)) - 1.0) * np.sqrt(part.size / 2.0))
+    return float(np.max(np.abs(departures)))
+
+
+def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
+    """The greatest power of innovations within a short time, divided by the greatest that chance explains.
+
+    A blow is in few innovations, a gust in some more. Windows of 1, 2, 4, … innovations are moved over each run, up
+    to a quarter of it.
+
+    Args:
+        result: a fit of process noise.
+        false_alarm_rate: probability that a steady normal moment exceeds 1 in any window, at most, a fraction.
+
+    Returns:
+        A ratio.
+    """
+    lengths = [1 << k for k in range(20)]
+    windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
+    rate = false_alarm_rate / max(sum(i.size - n + 1 for i, n in windows), 1)
+    highest = [float(np.max(_moving_power(i, n))) / float(chdtri(n, rate)) for i, n in windows]
+    return max(highest, default=0.0)
+
+
+def _moving_power(innovations: Array, length: int) -> Array:
+    total = np.concatenate(([0.0], np.cumsum(innovations**2)))
+    return np.asarray(total[length:] - total[:-length])
+
+
+def of_all_runs(result: ProcessNoise) -> float:
+    """Probability that a random moment that acts in all runs shows in one of them as much as this one does.
+
+    A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
+    quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
+    n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
+
+    Args:
+        result: a fit of process noise.
+
+    Returns:
+        The first term of Fisher's series, which is at least the probability; a fraction.
+    """
+    total = float(result.by_run.sum())
+    share = float(result.by_run.max()) / total if total > 0.0 else 0.0
+    return min(1.0, result.by_run.size * (1.0 - share) ** (result.by_run.size - 1))

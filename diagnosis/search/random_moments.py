@@ -1,0 +1,306 @@
+"""Random moments: a layer of noise under every set of causes, and itself a cause.
+
+A strong random motion misleads least squares: the residuals of the wind-on runs are far from white, so that
+instants and weak effects are missed in them. Here sets are grown and fitted to rows in whose noise the rig's
+response to the random moment is part. The random moment is estimated from what the best of them leaves, until both
+agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import fdtrc
+
+from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at
+from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
+from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.policy import MOST_CAUSES, NEEDLESS_CHI2, PHASE_FALSE_ALARM_RATE
+from diagnosis.search.grow import grow, sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
+from diagnosis.search.process_noise import ProcessNoise, is_steady_noise, random_moments, with_response
+from diagnosis.search.weigh import FittedSet, log_weight
+from tunnel_sim.effects import Effect
+
+_ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
+_FURTHER = 2  # effects added so that the innovations are white
+
+
+@dataclass(frozen=True, eq=False)
+class RandomAnswer:
+    """A random moment, alone or beside other effects.
+
+    Args:
+        kind: of the random moment.
+        process: its fit.
+        beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
+        left: what remains. The share is that of the innovations' and the wind-off runs' excess in the nominal
+            one's, and the same in every channel.
+    """
+
+    kind: type[Effect]
+    process: ProcessNoise
+    beside: Hypothesis | None
+    left: FittedSet
+
+    @property
+    def share(self) -> float:
+        """Of the gap left open, a fraction."""
+        return self.left.share
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, sorted; once where an effect acts steadily and at random."""
+        return tuple(sorted({self.kind.name, *(() if self.beside is None else self.beside.effects)}))
+
+
+def weigh_random_moments(
+    nominal: Fit,
+    hypotheses: Sequence[Hypothesis],
+    kinds: Sequence[type[Effect]],
+) -> list[RandomAnswer]:
+    """Try turbulence, and vortices with a wandering phase, under all sets of effects.
+
+    Args:
+        nominal: fitted with the sensor's noise alone.
+        hypotheses: sets of effects fitted likewise.
+        kinds: the vocabulary to answer in.
+
+    Returns:
+        The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
+        than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes, or
+        where no random moment in the wind could leave little enough of the gap.
+    """
+    allowed = {kind.random: kind for kind in kinds if kind.random}
+    scale = Scale.of(hypotheses, misfit(nominal))
+    best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
+    if not allowed or not _may_act(best, scale, allowed):
+        return []
+    top = _settled(best, nominal, [kind for kind in kinds if kind.fitted], allowed)
+    for seen in _until_steady(top, nominal.problem.data, [kind for kind in kinds if kind.fitted]):
+        process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
+        if process is not None and not follows_the_motion(seen.fit):
+            kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
+            share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
+            names = tuple(dict.fromkeys((kind.name, *seen.effects)))
+            left = FittedSet(names, share, share * misfit(nominal).excess, seen.further_numbers)
+            return [RandomAnswer(kind, process, seen if seen.effects else None, left)]
+    return []
+
+
+def without_the_random_moment(
+    answers: Sequence[RandomAnswer], known: Sequence[Hypothesis], gap: ChannelMisfit
+) -> list[Hypothesis]:
+    """The sets beside random moments fitted with the sensor's noise alone: what they leave may be no random moment.
+
+    Args:
+        known: fitted sets.
+        gap: what the nominal model leaves.
+
+    Returns:
+        All sets; of two with the same effects that of more weight.
+    """
+    found = {hypothesis.names: hypothesis for hypothesis in known}
+    for answer in answers:
+        if answer.beside is not None:
+            with suppress(FitError, np.linalg.LinAlgError):
+                alone = replace(answer.beside, fit=fit(answer.beside.fit.problem, answer.beside.fit.point))
+                found[alone.names] = of_more_weight(found.get(alone.names), alone, gap)
+    return list(found.values())
+
+
+def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
+    """The set, and those with a further effect or two, with residuals in the sensor's noise alone.
+
+    A small effect that no gap shows may keep the innovations from being white.
+    """
+    yield _seen_in(top, data)
+    for _ in range(_FURTHER):
+        further = _evident(top, kinds)
+        if not further:
+            return
+        top = further[0]
+        yield _seen_in(top, data)
+
+
+def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
+    """The set with one more effect that is evident beside the random moment, the most evident first.
+
+    The noise is estimated from the residuals themselves, and no real spectrum has its form. So the scatter between
+    the runs says how much of a fall of χ² is chance.
+    """
+    if len(top.effects) >= MOST_CAUSES:
+        return []
+    able = {kind.name: kind for kind in kinds if not kind.line}
+    larger = sets_with_one_more([top], list(able.values()), None)
+    gains = [(top.fit.total - h.fit.total) / overdispersion(h.fit, able[h.effects[-1]]) for h in larger]
+    order = sorted(range(len(larger)), key=lambda i: -gains[i])
+    return [larger[i] for i in order if gains[i] > NEEDLESS_CHI2]
+
+
+def _may_act(best: Hypothesis, scale: Scale, spectra: Collection[str]) -> bool:
+    """Whether a random moment may be what the best set leaves.
+
+    With one that left nothing in the wind the set would weigh more, or what is left is steady noise: a strong
+    random motion misleads the fit of the wind-off runs too.
+    """
+    runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
+    if not any(run.wind_on for run, _ in runs) or scale.greatest(best) <= scale.weight(best):
+        return False
+    still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
+    if log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers) > scale.weight(best):
+        return True
+    process = _likeliest(random_moments(best.fit, spectra))
+    return process is not None and is_steady_noise(process)
+
+
+def wind_off_excess(fit: Fit) -> float:
+    """Mean squared scaled residual minus one of the wind-off runs; 0 where there are none."""
+    off = [
+        float(np.mean(residual**2)) - 1.0
+        for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True)
+        if not run.wind_on
+    ]
+    return float(np.mean(off)) if off else 0.0
+
+
+def follows_the_motion(fitted: Fit) -> bool:
+    """Whether residuals in the wind change the amplitude of the motion otherwise than its phase.
+
+    A random moment does not know the phase of the motion: what it adds along the motion and along the rate has the
+    same power. A missing damping adds to the first, and a missing stiffness to the second.
+
+    Args:
+        fitted: with residuals in the sensor's noise alone.
+
+    Returns:
+        By Fisher's test of the ratio of the two powers. Every run in the wind counts as one degree of freedom of
+        each, since a slow random motion may have no more.
+    """
+    runs = list(zip(fitted.problem.data.runs, fitted.residuals, strict=True))
+    windy = sum(run.wind_on for run, _ in runs)
+    seen = misfit(
+        fitted, [residual if run.wind_on else np.zeros_like(residual) for run, residual in runs]
+    ).chi2
+    along = {name: float(seen[CHANNELS.index(name)]) for name in CHANNELS}
+    motion = along["damping"] + along["damping of runs"]
+    rate = along["frequency"] + along["frequency of runs"]
+    larger = max(motion, rate) / max(min(motion, rate), 1e-300)
+    return 2.0 * float(fdtrc(windy, windy, larger)) < PHASE_FALSE_ALARM_RATE
+
+
+def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
+    """Variance of an effect's parameters over what independent noise would give, 1 or more.
+
+    Args:
+        fitted: with the effect.
+
+    Returns:
+        From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs
+        as clusters; Liang and Zeger, Biometrika 73 (1986) 13), the mean over the parameters.
+    """
+    matrices, gradients, _ = by_run(fitted.jacobian, fitted.residuals, products=fitted.products)
+    own = [i for i, name in enumerate(fitted.problem.names) if name.split(".")[0] == kind.name]
+    total = matrices.sum(axis=0)
+    size = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    inverse = np.linalg.pinv(total / np.outer(size, size), rcond=1e-12)
+    scatter = (gradients / size).T @ (gradients / size) * len(gradients) / max(len(gradients) - 1, 1)
+    robust = (inverse @ scatter @ inverse)[np.ix_(own, own)]
+    naive = inverse[np.ix_(own, own)]
+    return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
+
+
+def _likeliest(tried: Sequence[ProcessNoise]) -> ProcessNoise | None:
+    """The random moment that explains residuals best; None where white noise explains them as well."""
+    acting = [one for one in tried if one.drop > NEEDLESS_CHI2]
+    return min(acting, key=lambda p: p.cost + NEEDLESS_CHI2 * (p.spectrum.centre > 0.0), default=None)
+
+
+def _settled(
+    best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]], spectra: Collection[str]
+) -> Hypothesis:
+    """The best set of effects on rows in whose noise the response to the random moment is part.
+
+    Args:
+        best: the set from whose residuals the random moment is estimated first.
+        kinds: effects to try.
+        spectra: of random moments that may act.
+
+    Returns:
+        The set given where no random moment acts, or its filter does not settle. The random moment is estimated
+        from what the best set leaves when it is fitted with the sensor's noise alone: the fit with the response as
+        noise lets the motion wander as the response does, and its own residuals overstate it. The rounds end where
+        the best set is the one that the random moment was estimated beside.
+    """
+    data, known, top = nominal.problem.data, best.fit, best
+    with suppress(FitError, np.linalg.LinAlgError):
+        for _ in range(_ROUNDS):
+            process = _likeliest(random_moments(known, spectra))
+            noisy = None if process is None else with_response(known, process.spectrum)
+            if noisy is None:
+                break
+            base = fit(Problem(noisy), nominal.point)
+            sets = [Hypothesis((), base), *grow(base, kinds)]
+            found = max(sets, key=Scale.of(sets, misfit(base)).weight)
+            *_, top = _with_more_of_the_wind(_sought_again(found), kinds)
+            if top.names == best.names:
+                break
+            best = _seen_in(top, data)
+            known = fit(best.fit.problem, best.fit.point)
+    return top
+
+
+def _with_more_of_the_wind(top: Hypothesis, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
+    """The set, and those with one, two, … more effects, as long as one of the wind is evident in the noise.
+
+    A random moment leaves little of a gap in the wind for effects to be compared there. Of all effects the most
+    evident one is added, so that none of the wind mops up what another leaves.
+    """
+    windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
+    while True:
+        yield top
+        further = _evident(top, kinds)
+        if not any(h.effects[-1] in windy for h in further):
+            return
+        top = further[0]
+
+
+def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
+    """The set with instants and phases sought once more; each run keeps those that leave less.
+
+    They were found before the other effects were known.
+    """
+    known = hypothesis.fit
+    for kind in known.problem.effects:
+        if kind.skips or kind.line:
+            known = _better_in_each_run(known, kind)
+    return replace(hypothesis, fit=known)
+
+
+def _better_in_each_run(known: Fit, kind: type[Effect]) -> Fit:
+    """The fit with the instants or phases of one effect sought once more."""
+    others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
+    starts = starting_points(fit_at(others.problem, others.point), kind)
+    if not starts:
+        return known
+    sought = fit(starts[0].problem, starts[0].point)
+    width = known.point.release.shape[1]
+    if sought.point.release.shape[1] != width:  # another number of instants
+        return min(known, sought, key=lambda f: f.total)
+    release = sought.point.release.copy()
+    kept = known.chi2 < sought.chi2
+    old, new = (f.problem.own_places(width)[kind.name] for f in (known, sought))
+    release[kept, new] = known.point.release[kept, old]
+    merged = fit(sought.problem, Point(sought.point.common, release))
+    return min(known, sought, merged, key=lambda f: f.total)
+
+
+def _seen_in(hypothesis: Hypothesis, data: Data) -> Hypothesis:
+    """The hypothesis as it stands, with residuals in the noise of other data."""
+    problem = replace(hypothesis.fit.problem, data=data)
+    return replace(hypothesis, fit=fit_at(problem, hypothesis.fit.point), textbook=None)

@@ -1,0 +1,1 @@
+"""Where the nominal model departs from the runs."""

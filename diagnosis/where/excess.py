@@ -1,0 +1,333 @@
+"""How the squared residual is distributed over frequency, time and amplitude, and narrow lines in it.
+
+Residuals are decomposed by the orthonormal cosine transform (Ahmed, Natarajan & Rao, IEEE Trans. Comput. 23
+(1974) 90, doi 10.1109/T-C.1974.223784): it keeps the sum of squares, so that under white noise every squared
+coefficient is χ² with one degree of freedom, and it does not treat a record's two ends as neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.run_data import RunData
+from diagnosis.noise.gap import chance
+from diagnosis.noise.sensor_noise import estimate_variance
+from diagnosis.policy import FLOOR_STD, INTERVAL_SHARE, LINE_CONTRAST, PLACE_FALSE_ALARM_RATE
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+#: Bands by their upper edges in multiples of the run's own frequency.
+BANDS: tuple[tuple[str, float], ...] = (
+    ("0", 0.5),
+    ("f0", 1.5),
+    ("2f0", 2.5),
+    ("3f0", 3.5),
+    ("above", np.inf),
+)
+_OWN = 2.0  # parameters of a run that absorb residual: its angle and rate at the release
+
+
+@dataclass(frozen=True, eq=False)
+class RunExcess:
+    """One run's squared residual by frequency.
+
+    Args:
+        id: of the run.
+        frequency: of the coefficients, shape (n,), Hz.
+        power: squared coefficients, shape (n,), in noise variances: one each under white noise.
+        resonance: frequency of the run's free motion, Hz.
+        relative: standard deviation of the noise variance, as a share of it.
+        absorbed: degrees of freedom the fit took from the run.
+    """
+
+    id: str
+    frequency: Array
+    power: Array
+    resonance: float
+    relative: float
+    absorbed: float
+
+    @property
+    def excess(self) -> float:
+        """Mean power minus one."""
+        return float(self.power.mean()) - 1.0
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the excess where there is no gap."""
+        return float(np.hypot(np.sqrt(2.0 / self.power.size), self.relative))
+
+    @property
+    def band(self) -> np.ndarray:
+        """Index into `BANDS` of every coefficient, shape (n,)."""
+        return np.searchsorted([edge for _, edge in BANDS], self.frequency / self.resonance, side="right")
+
+    def p_value(self) -> float:
+        """Probability of as much power without a gap: the least of the tests, times their number."""
+        tests = [chance(float(self.power.sum()), self.power.size - self.absorbed, self.relative)]
+        for index, (name, _) in enumerate(BANDS):
+            power = self.power[self.band == index]
+            if power.size:
+                freedom = power.size - (self.absorbed if name == "f0" else 0.0)
+                tests.append(chance(float(power.sum()), freedom, self.relative))
+        return min(1.0, len(tests) * min(tests))
+
+
+def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
+    """Every run's squared residual by frequency.
+
+    Args:
+        campaign: the records, which give the uncertainty of the noise.
+
+    Returns:
+        One per run, in order.
+    """
+    data = fit.problem.data
+    records = {run.id: run.record for run in campaign.runs}
+    relative = [estimate_variance(records[run.id])[1] for run in data.runs]
+    # by sample, not by block: where all runs share one level it was pooled over them
+    levels = [run.noise_variance * run.block for run in data.runs]
+    if np.allclose(levels, levels[0], rtol=1e-9):
+        relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
+    relative = [float(np.hypot(value, FLOOR_STD)) for value in relative]
+    shared = len(fit.problem.names) / len(data.runs)
+    return [
+        RunExcess(
+            run.id,
+            np.arange(residual.size) / (2.0 * residual.size * run.interval),
+            np.asarray(dct(residual, norm="ortho")) ** 2,
+            resonance(fit, i),
+            relative[i],
+            _OWN + shared,
+        )
+        for i, (run, residual) in enumerate(zip(data.runs, fit.residuals, strict=True))
+    ]
+
+
+@dataclass(frozen=True)
+class BandExcess:
+    """One band of the residual, all runs together.
+
+    Args:
+        band: its name in `BANDS`.
+        excess: sum of power beyond that of white noise, in units of the noise variance.
+        mean: the same by coefficient, a ratio.
+        p_value: probability of as much without a gap.
+    """
+
+    band: str
+    excess: float
+    mean: float
+    p_value: float
+
+
+def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
+    """The bands of a campaign's residual.
+
+    Args:
+        runs: by run.
+
+    Returns:
+        One per band that holds coefficients.
+    """
+    result = []
+    for index, (name, _) in enumerate(BANDS):
+        power = np.concatenate([run.power[run.band == index] for run in runs])
+        if power.size == 0:
+            continue
+        absorbed = sum(run.absorbed for run in runs) if name == "f0" else 0.0
+        relative = float(np.mean([run.relative for run in runs]))
+        excess = float(power.sum()) - power.size
+        result.append(
+            BandExcess(
+                name,
+                excess,
+                excess / power.size,
+                chance(excess + power.size, power.size - absorbed, relative),
+            )
+        )
+    return tuple(result)
+
+
+def bands_beyond_chance(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
+    """The bands whose power is beyond chance; all of them where none is.
+
+    Args:
+        bands: of a campaign.
+    """
+    level = PLACE_FALSE_ALARM_RATE / max(len(bands), 1)
+    found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
+    return found or tuple(band.band for band in bands)
+
+
+def within_bands(residual: Array, run: RunExcess, bands: tuple[str, ...]) -> tuple[Array, float]:
+    """The part of a residual that lies in some bands.
+
+    Args:
+        residual: scaled, shape (n,).
+        run: its power.
+        bands: names.
+
+    Returns:
+        The filtered residual, shape (n,), and the share of white noise's power that passes.
+    """
+    index = [i for i, (name, _) in enumerate(BANDS) if name in bands]
+    keep = np.isin(run.band, index)
+    filtered = idct(np.where(keep, dct(residual, norm="ortho"), 0.0), norm="ortho")
+    return np.asarray(filtered, dtype=np.float64), float(keep.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Excess squared residual over one quantity, all runs together.
+
+    Args:
+        edges: of the bins, shape (n + 1,), in the quantity's unit.
+        energy: sum over a bin of power beyond that of white noise, shape (n,), in noise variances.
+        mean: the same by residual, shape (n,); NaN where a bin is empty.
+        std: of the mean where there is no gap, shape (n,); likewise.
+    """
+
+    edges: Array
+    energy: Array
+    mean: Array
+    std: Array
+
+    def interval(self, share: float = INTERVAL_SHARE) -> tuple[float, float] | None:
+        """The shortest interval that holds a share of the excess; None where there is no excess."""
+        return shortest_interval(self.edges, self.energy, share)
+
+
+def profile(
+    edges: Array, place: list[Array], power: list[Array], expected: list[float], variance: list[float]
+) -> Profile:
+    """Gather squared residuals into bins.
+
+    Args:
+        edges: of the bins, ascending, shape (n + 1,).
+        place: where every residual belongs, by run, arrays of one shape with ``power``.
+        power: squared residuals in noise variances, by run, arrays of shape (m,).
+        expected: mean of these under white noise, by run.
+        variance: what each adds to the variance of a sum of them under white noise, by run.
+    """
+    where = np.concatenate(place)
+    excess = np.concatenate([p - e for p, e in zip(power, expected, strict=True)])
+    spread = np.concatenate([np.full(p.size, v) for p, v in zip(power, variance, strict=True)])
+    count = np.histogram(where, edges)[0].astype(np.float64)
+    energy = np.histogram(where, edges, weights=excess)[0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(count > 0, energy / count, np.nan)
+        std = np.where(count > 0, np.sqrt(np.histogram(where, edges, weights=spread)[0]) / count, np.nan)
+    return Profile(edges, energy, mean, std)
+
+
+def shortest_interval(edges: Array, energy: Array, share: float) -> tuple[float, float] | None:
+    """The shortest run of bins that holds a share of the whole.
+
+    Args:
+        edges: of the bins, shape (n + 1,).
+        energy: by bin, shape (n,); single bins may be negative.
+        share: of the sum, a fraction.
+
+    Returns:
+        Its ends; None where the sum is not positive.
+    """
+    total = float(energy.sum())
+    if total <= 0.0:
+        return None
+    cumulative = np.concatenate([[0.0], np.cumsum(energy)])
+    best = (float(edges[0]), float(edges[-1]))
+    for i in range(energy.size):
+        enough = cumulative[i + 1 :] - cumulative[i] >= share * total
+        j = i + 1 + int(np.argmax(enough))
+        if enough.any() and edges[j] - edges[i] < best[1] - best[0]:
+            best = (float(edges[i]), float(edges[j]))
+    return best
+
+
+_WIDTH = 5  # coefficients a line spreads over
+_AROUND = 60  # coefficients on either side, whose median a line must exceed
+_HARMONIC = 0.2  # of the run's frequency: a line nearer to a harmonic belongs to the motion
+_MOTION = 0.4  # of the run's frequency: the same for the motion itself, whose frequency may drift
+_LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
+_APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
+_PER_RUN = 2
+
+
+@dataclass(frozen=True)
+class ResidualLine:
+    """A line in one run.
+
+    Args:
+        run: id.
+        frequency: Hz.
+        share: of the run's excess squared residual, a fraction.
+        amplitude: of the reading, rad.
+    """
+
+    run: str
+    frequency: float
+    share: float
+    amplitude: float
+
+
+def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[ResidualLine, ...]:
+    """The lines that stand out of the residual of single runs.
+
+    Args:
+        runs: squared residuals by frequency.
+        data: the runs they belong to.
+
+    Returns:
+        At most two per run, strongest first in each, in the order of the runs.
+    """
+    return tuple(line for run, own in zip(runs, data, strict=True) for line in _lines(run, own, len(runs)))
+
+
+def _lines(run: RunExcess, own: RunData, runs: int) -> list[ResidualLine]:
+    local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
+    open_to = away_from_motion(run.frequency / run.resonance)
+    found: list[ResidualLine] = []
+    for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
+        excess = float(local[index]) - _WIDTH
+        unlikely = runs * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
+        if unlikely > PLACE_FALSE_ALARM_RATE or len(found) == _PER_RUN:
+            break
+        near = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
+        if not open_to[index] or near or local[index] < LINE_CONTRAST * _around(local, index):
+            continue
+        whole = max(float(run.power.sum()) - run.power.size, excess)
+        frequency = float(np.average(run.frequency[_near(index, run)], weights=run.power[_near(index, run)]))
+        amplitude = float(own.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
+        found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
+    return found
+
+
+def away_from_motion(order: Array) -> NDArray[np.bool_]:
+    """Where a line does not belong to the motion, its drift or its harmonics.
+
+    Args:
+        order: frequency over that of the run's motion, any shape.
+    """
+    harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
+    harmonic |= np.abs(order - 1.0) < _MOTION
+    return (order > _LOWEST) & ~harmonic
+
+
+def _near(index: int, run: RunExcess) -> slice:
+    return slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
+
+
+def _around(local: Array, index: int) -> float:
+    """Median of the smoothed power on either side."""
+    beside = np.concatenate(
+        [local[max(index - _AROUND, 0) : max(index - _WIDTH, 0)], local[index + _WIDTH : index + _AROUND]]
+    )
+    return float(np.median(beside)) if beside.size else 0.0

@@ -1,0 +1,351 @@
+"""Drawing up the maps of a campaign's residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.where.backbone import backbones
+from diagnosis.where.excess import (
+    Profile,
+    RunExcess,
+    band_excesses,
+    bands_beyond_chance,
+    profile,
+    residual_lines,
+    run_excesses,
+    within_bands,
+)
+from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace, maps_in_own_units, trace_in_own_units
+from diagnosis.where.phase_plane import apparent_moment, motion, phase_plane
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.record import Array
+
+_TIME_BINS = 60
+_AMPLITUDE_BINS = 40
+_FREQUENCY_BINS = 110  # of equal ratio, for the picture
+_FINE_BINS = 1500  # of equal width, for the interval
+_GRID_ROWS, _GRID_COLUMNS = 6, 8
+_TRACE_POINTS = 20_000  # of all runs together
+_LEAST_POINTS = 200  # of a run
+_CYCLE_POINTS = 24  # of a cycle
+_SHOWN_CYCLES = 6  # in which the models differ most
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Maps, and what else the text about them needs.
+
+    Args:
+        maps: the maps.
+        excesses: by run.
+        frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
+        moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
+        moment_z: the sum of that over its standard deviation under white noise, a ratio.
+    """
+
+    maps: Maps
+    excesses: list[RunExcess]
+    frequency_interval: tuple[float, float] | None
+    moment_energy: Array
+    moment_z: float
+
+
+def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[str, ...]) -> Survey:
+    """Draw up all maps of the nominal model's residuals.
+
+    Args:
+        nominal: fit of the nominal model.
+        scaled: the same with residuals in units of the noise that counts.
+        excesses: its squared residuals, by run.
+        chosen: ids of the runs the phase plane is taken over; all where empty.
+    """
+    similarity = nominal.problem.data.similarity
+    bands = band_excesses(excesses)
+    inside = [
+        within_bands(r, run, bands_beyond_chance(bands))
+        for r, run in zip(scaled.residuals, excesses, strict=True)
+    ]
+    times = _times(nominal)
+    time = _time_profile(scaled, inside, times)
+    energy, z = _moment_energy(nominal, times, time.edges)
+    edges = _log_edges(excesses)
+    resonances = [run.resonance for run in excesses]
+    maps = Maps(
+        runs=_run_maps(scaled, excesses),
+        groups=_groups(scaled, excesses, similarity),
+        time=time,
+        time_by_run=_time_by_run(scaled, times, time.edges),
+        moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
+        amplitude=_amplitude_profile(scaled, inside),
+        frequency=_spectrum(excesses, edges),
+        frequency_by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
+        frequency_after=None,
+        resonance=(min(resonances), max(resonances)),
+        bands=bands,
+        lines=residual_lines(excesses, nominal.problem.data.runs),
+        backbones=tuple(backbones(nominal, [run.start for run in nominal.problem.data.runs])),
+        phase_plane=phase_plane(nominal, chosen),
+        traces=_traces(nominal, None, excesses),
+        grid=_grid(scaled, inside, times),
+        unit=similarity.reading,
+    )
+    interval = _frequency_interval(excesses)
+    if interval is not None:
+        interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
+    return Survey(maps_in_own_units(maps, similarity), excesses, interval, energy, z)
+
+
+def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
+    """The maps with what the answer leaves beside the nominal model's residuals.
+
+    Args:
+        campaign: as measured, of the units of the fits.
+        nominal: fit of the nominal model, from which the maps were drawn up.
+        answer: fit with the causes.
+    """
+    after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
+    traces = _traces(nominal, answer, found.excesses)
+    own = tuple(trace_in_own_units(trace, nominal.problem.data.similarity) for trace in traces)
+    return replace(found.maps, frequency_after=after, traces=own)
+
+
+def _shares(excesses: list[RunExcess]) -> list[float]:
+    energy = [max(float(run.power.sum()) - run.power.size, 0.0) for run in excesses]
+    whole = max(sum(energy), 1e-300)
+    return [value / whole for value in energy]
+
+
+def amplitudes(fit: Fit, index: int) -> Array:
+    """Amplitude of the fitted motion of one run.
+
+    Returns:
+        At every residual, shape (n,), rad.
+    """
+    angle, rate = motion(fit, index)
+    return np.hypot(angle, rate)
+
+
+def _run_maps(fit: Fit, excesses: list[RunExcess]) -> tuple[RunMap, ...]:
+    return tuple(
+        RunMap(
+            id=run.id,
+            spring_stiffness=run.spring_stiffness,
+            wind_speed=run.wind_speed,
+            amplitude=float(amplitudes(fit, i)[0]),
+            frequency=excess.resonance,
+            excess=excess.excess / run.block,
+            std=excess.std / run.block,
+            p_value=excess.p_value(),
+            share=share,
+        )
+        for i, (run, excess, share) in enumerate(
+            zip(fit.problem.data.runs, excesses, _shares(excesses), strict=True)
+        )
+    )
+
+
+def _groups(fit: Fit, excesses: list[RunExcess], similarity: Similarity) -> tuple[GroupExcess, ...]:
+    """Mean excess of the runs that share a condition; conditions that do not vary are left out."""
+    runs = fit.problem.data.runs
+    levels = [(e.excess / run.block, e.std / run.block) for e, run in zip(excesses, runs, strict=True)]
+    start = [float(amplitudes(fit, i)[0]) for i in range(len(runs))]
+    keys = {
+        "wind": ["on" if run.wind_on else "off" for run in runs],
+        "spring": [
+            ""
+            if run.spring_stiffness is None
+            else f"{similarity.own(run.spring_stiffness, 'N m/rad'):g} N m/rad"
+            for run in runs
+        ],
+        "speed": [f"{run.wind_speed:g} m/s" for run in runs],
+        "amplitude": [f"{0.05 * round(value / 0.05):.2f} rad" for value in start],
+    }
+    result = []
+    for by, labels in keys.items():
+        distinct = sorted(set(labels), key=_first_number)
+        if len(distinct) < 2:
+            continue
+        for label in distinct:
+            group = [pair for pair, own in zip(levels, labels, strict=True) if own == label]
+            mean = float(np.mean([e for e, _ in group]))
+            std = float(np.sqrt(np.sum([s**2 for _, s in group]))) / len(group)
+            result.append(GroupExcess(by, label, len(group), mean, std))
+    return tuple(result)
+
+
+def _first_number(label: str) -> tuple[float, str]:
+    head = label.split(" ")[0]
+    return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
+
+
+def _times(fit: Fit) -> list[Array]:
+    """Times of the residuals since the start of every record, s."""
+    return [
+        run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
+        for run in fit.problem.data.runs
+    ]
+
+
+def _time_profile(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Profile:
+    longest = max(float(time[-1] + 0.5 * (time[1] - time[0])) for time in times)
+    edges = np.linspace(0.0, longest, _TIME_BINS + 1)
+    return profile(edges, times, *_by_sample(fit, inside))
+
+
+def _by_sample(fit: Fit, inside: list[tuple[Array, float]]) -> tuple[list[Array], list[float], list[float]]:
+    """Squared residuals, their mean and variance under noise, as shares of the variance of one sample.
+
+    The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
+    size.
+    """
+    blocks = [run.block for run in fit.problem.data.runs]
+    return (
+        [r**2 / block for (r, _), block in zip(inside, blocks, strict=True)],
+        [share / block for (_, share), block in zip(inside, blocks, strict=True)],
+        # squares of filtered noise are correlated: as many are independent as coefficients pass
+        [2.0 * share / block**2 for (_, share), block in zip(inside, blocks, strict=True)],
+    )
+
+
+def _amplitude_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
+    place = [amplitudes(fit, i) for i in range(len(inside))]
+    edges = np.linspace(0.0, 1.0001 * max(float(p.max()) for p in place), _AMPLITUDE_BINS + 1)
+    return profile(edges, place, *_by_sample(fit, inside))
+
+
+def _grid(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Grid:
+    """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
+    amplitude = [amplitudes(fit, i) for i in range(len(inside))]
+    rows = np.linspace(0.0, 1.0001 * max(float(a.max()) for a in amplitude), _GRID_ROWS + 1)
+    power, expected, variance = _by_sample(fit, inside)
+    speeds = sorted({run.wind_speed for run in fit.problem.data.runs})
+    shared = len(speeds) == 1
+    longest = max(float(time[-1]) for time in times)
+    edges = np.linspace(0.0, 1.0001 * longest, _GRID_COLUMNS + 1)
+    places = [
+        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(run.wind_speed))
+        for run, time in zip(fit.problem.data.runs, times, strict=True)
+    ]
+    columns = []
+    for column in range(_GRID_COLUMNS if shared else len(speeds)):
+        inside_column = [place == column for place in places]
+        columns.append(
+            profile(
+                rows,
+                [a[keep] for a, keep in zip(amplitude, inside_column, strict=True)],
+                [p[keep] for p, keep in zip(power, inside_column, strict=True)],
+                expected,
+                variance,
+            )
+        )
+    return Grid(
+        rows,
+        None if shared else np.array(speeds),
+        edges if shared else None,
+        np.stack([column.mean for column in columns], axis=1),
+        np.stack([column.std for column in columns], axis=1),
+    )
+
+
+def _time_by_run(fit: Fit, times: list[Array], edges: Array) -> Array:
+    rows = []
+    for run, time, residual in zip(fit.problem.data.runs, times, fit.residuals, strict=True):
+        rows.append(
+            profile(edges, [time], [residual**2 / run.block], [1.0 / run.block], [2.0 / run.block**2]).mean
+        )
+    return np.stack(rows)
+
+
+def _moment_energy(fit: Fit, times: list[Array], edges: Array) -> tuple[Array, float]:
+    """Energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance."""
+    energy, variance = np.zeros(edges.size - 1), 0.0
+    for index, whole in enumerate(times):
+        found = apparent_moment(fit, index)
+        if found is None:
+            continue
+        spread = float(found.kernel @ found.kernel) * found.noise_std**2
+        time = whole[found.start : found.start + found.moment.size]
+        energy += np.histogram(time, edges, weights=found.moment**2 / spread - 1.0)[0]
+        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel are correlated
+    return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
+
+
+def _log_edges(excesses: list[RunExcess]) -> Array:
+    low = min(float(run.frequency[1]) for run in excesses)
+    high = max(float(run.frequency[-1]) for run in excesses)
+    edges = np.geomspace(low, high * 1.0001, _FREQUENCY_BINS + 1)
+    edges[0] = 0.0
+    return edges
+
+
+def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
+    ones = [1.0] * len(excesses)
+    places, powers = [run.frequency for run in excesses], [run.power for run in excesses]
+    return profile(edges, places, powers, ones, [2.0] * len(excesses))
+
+
+def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None:
+    """Shortest interval in Hz that holds most of the excess of the bands that show the gap."""
+    names = bands_beyond_chance(band_excesses(excesses))
+    index = [i for i, name in enumerate(("0", "f0", "2f0", "3f0", "above")) if name in names]
+    kept = [np.where(np.isin(run.band, index), run.power, 1.0) for run in excesses]
+    high = max(float(run.frequency[-1]) for run in excesses)
+    # no bin is narrower than the shortest record resolves
+    resolved = max(float(run.frequency[1]) for run in excesses)
+    edges = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
+    places, ones = [run.frequency for run in excesses], [1.0] * len(kept)
+    return profile(edges, places, kept, ones, [2.0] * len(kept)).interval()
+
+
+def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
+    times = _times(nominal)
+    order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)
+    most = max(_LEAST_POINTS, _TRACE_POINTS // len(order))
+    return tuple(_trace(nominal, best, i, times[i], most) for i in order)
+
+
+def _trace(nominal: Fit, best: Fit | None, index: int, times: Array, most: int) -> Trace:
+    run = nominal.problem.data.runs[index]
+    frequency = resonance(nominal, index)
+    enough = int(1.0 / (_CYCLE_POINTS * frequency * run.interval))  # more points show no more of a cycle
+    group = max(1, min(enough, run.reading.size // _LEAST_POINTS), -(-run.reading.size // most))
+    count = run.reading.size // group
+    std = run.noise_std
+
+    def means(values: Array) -> Array:
+        grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
+        return grouped
+
+    filled = (
+        np.full(count, True) if run.samples is None else means(run.samples.count.astype(np.float64)) > 0.0
+    )
+    time, reading, before = (
+        means(values)[filled] for values in (times, run.reading, run.unscaled(nominal.residuals[index]))
+    )
+    after = None if best is None else means(run.unscaled(best.residuals[index]))[filled]
+    return Trace(
+        run.id,
+        time,
+        reading,
+        before,
+        after,
+        std / float(np.sqrt(group)),
+        _most_energy(time, before if after is None else before - after, _SHOWN_CYCLES / frequency),
+    )
+
+
+def _most_energy(time: Array, difference: Array, length: float) -> tuple[float, float]:
+    """The stretch of a length, s, that holds the most of a difference's energy; the whole where that is shorter."""
+    first, last = float(time[0]), float(time[-1])
+    if last - first <= length:
+        return first, last
+    energy = np.concatenate([[0.0], np.cumsum(difference**2)])
+    ends = np.searchsorted(time, time + length, side="right")
+    whole = time <= last - length
+    start = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
+    return start, start + length

@@ -1,0 +1,147 @@
+"""Where a gap is, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+
+from diagnosis.decision import plain
+from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
+from diagnosis.result import Where
+from diagnosis.where.place import Finding
+from diagnosis.where.survey import Survey
+from identification.printing import p_text
+from tunnel_sim.effects import Effect
+
+_LISTED = 12  # ids listed in a sentence at most
+_NEARLY_NOTHING = 0.02  # of the power of the other runs
+_BAND_WORDS = {
+    "0": "slower than the oscillation",
+    "f0": "at the oscillation itself",
+    "2f0": "at twice its frequency",
+    "3f0": "at three times its frequency",
+    "above": "faster than its third harmonic",
+}
+_CHANNEL_WORDS = {
+    "stiffness": "the restoring moment (stiffness)",
+    "damping": "the damping",
+    "forcing": "the rig as a moment that does not depend on its motion (forcing)",
+    "sensor": "the reading of the sensor",
+    "calibration": "a value stated for the runs (calibration)",
+}
+_CONDITION_WORDS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
+
+
+def nowhere(found: Survey) -> str:
+    """The sentence for a campaign without a gap."""
+    count = len(found.maps.runs)
+    least = min(1.0, count * min(run.p_value for run in found.maps.runs))
+    return (
+        f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is consistent with the noise "
+        f"(p {p_text(least)} for the run that differs most, corrected for their number)."
+    )
+
+
+def describe(
+    where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
+) -> str:
+    """Where the gap is, in sentences.
+
+    Args:
+        where: the same in fields.
+        bands: names of the bands that show the gap.
+        channel: what it acts on, with the reason.
+        condition: when it acts, with the reason.
+    """
+    parts = [_runs(where, found), _extent(where, found), _bands(found, bands)]
+    both = any(group.by == "wind" for group in found.maps.groups)
+    parts.append(_nature(channel, condition, both))
+    return " ".join(part for part in parts if part)
+
+
+def agreement(where: Where, kinds: Sequence[type[Effect]]) -> str:
+    """Whether causes act where the residuals say that the gap is.
+
+    Args:
+        where: from the residuals.
+        kinds: the causes that are compared; none where none is named.
+
+    Returns:
+        A sentence; empty where there is nothing to compare.
+    """
+    if not kinds or where.channel is None:
+        return ""
+    names = plain(*(kind.name for kind in kinds))
+    if where.channel in {kind.channel for kind in kinds}:
+        return f"That agrees with {names}."
+    acts = " and ".join(dict.fromkeys(_CHANNEL_WORDS[kind.channel] for kind in kinds))
+    return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."
+
+
+def _runs(where: Where, found: Survey) -> str:
+    count = len(found.maps.runs)
+    if not where.runs:
+        rate = 100.0 * PLACE_FALSE_ALARM_RATE
+        return (
+            f"No single run is beyond chance (false-alarm rate {rate:.0f} % over all runs); "
+            "the gap shows only in all of them together."
+        )
+    share = sum(run.share for run in found.maps.runs if run.id in where.runs)
+    named = f" ({', '.join(where.runs)})" if len(where.runs) <= _LISTED else ""
+    if len(where.runs) == count:
+        text = f"All {count} runs show the gap" if count > 1 else "The run shows the gap"
+    elif len(where.runs) == 1:
+        text = f"{100.0 * share:.0f} % of the gap is in one run of {count}{named}"
+    else:
+        text = f"{100.0 * share:.0f} % of the gap is in {len(where.runs)} of {count} runs{named}"
+    return f"{text}{_wind_contrast(found)}."
+
+
+def _wind_contrast(found: Survey) -> str:
+    groups = {group.label: group for group in found.maps.groups if group.by == "wind"}
+    if len(groups) < 2:
+        return ""
+    more, less = sorted(("on", "off"), key=lambda wind: -groups[wind].excess)
+    most, least = groups[more].excess, groups[less].excess
+    if least < _NEARLY_NOTHING * most:
+        return f"; nearly all of it with the wind {more}"
+    return f"; {most / least:.2g} times as much power with the wind {more} as with it {less}"
+
+
+def _extent(where: Where, found: Survey) -> str:
+    """Time, amplitude and frequency."""
+    places = []
+    length = float(found.maps.time.edges[-1])
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
+        places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
+    greatest = float(found.maps.amplitude.edges[-1])
+    amplitude = where.amplitude_rad
+    if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
+        places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
+    if where.frequency_hz is not None:
+        places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
+    return f"Four fifths of it lie {', '.join(places)}." if places else ""
+
+
+def _bands(found: Survey, bands: tuple[str, ...]) -> str:
+    whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > LISTED_BAND_SHARE * whole]
+    if not shown or whole <= 0.0:
+        return ""
+    shown.sort(key=lambda band: -band.excess)
+    listed = ", ".join(f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)
+    return f"By frequency: {listed}."
+
+
+def _nature(channel: Finding, condition: Finding, both: bool) -> str:
+    """Channel and condition; without runs of both kinds the latter goes unsaid."""
+    words = _CHANNEL_WORDS.get(channel.value or "")
+    acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
+    if condition.value is None:
+        return f"{acts}: {channel.reason}; {condition.reason}."
+    when = _CONDITION_WORDS[condition.value]
+    if channel.reason == condition.reason:
+        return f"{acts}{f', {when}' if both else ''}, {channel.reason}."
+    if not both:
+        return f"{acts}: {channel.reason}."
+    return f"{acts}: {channel.reason}. It is there {when}: {condition.reason}."
