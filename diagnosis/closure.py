@@ -142,7 +142,7 @@ class Move:
 
 
 @dataclass(frozen=True)
-class Rest:
+class Remainder:
     """What remains after the named causes; the whole gap where none is named.
 
     Args:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from diagnosis.closure import Closable, Misfit, Rest, Waterfall
+from diagnosis.closure import Closable, Misfit, Remainder, Waterfall
 from diagnosis.decision import Decision, decision
 from diagnosis.patched import PatchedModel
 from diagnosis.printing import diagnosis_brief, diagnosis_parts
@@ -315,7 +315,7 @@ class Diagnosis:
     remarks: tuple[Remark, ...] = ()
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)
-    rest: Rest | None = None
+    rest: Remainder | None = None
     model: PatchedModel | None = None
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()

@@ -267,7 +267,7 @@ def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
     return inverse(normal) * (noise.std**2 * noise.slow_ratio)
 
 
-def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
+def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> Array:
     """Standard deviations of parameters from the scatter of the runs, whatever the spectrum of the residuals.
 
     The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
@@ -275,13 +275,13 @@ def scatter_of_runs(influences: Array, speaking: NDArray[np.int64]) -> Array:
 
     Args:
         influences: contribution of every run's residual to the parameters, shape (runs, q).
-        speaking: number of runs that determine each parameter, shape (q,).
+        informative_runs: number of runs that determine each parameter, shape (q,).
 
     Returns:
         Standard deviations, shape (q,): 1.96 of them on either side are a 95 % interval.
     """
-    free = np.maximum(speaking - 2, 1)
-    spread = np.sqrt(np.sum(influences**2, axis=0) * speaking / free)
+    free = np.maximum(informative_runs - 2, 1)
+    spread = np.sqrt(np.sum(influences**2, axis=0) * informative_runs / free)
     return np.asarray(spread * stdtrit(free, 0.975) / ndtri(0.975))
 
 

@@ -19,7 +19,7 @@ from diagnosis.answer.small_swings import coefficient_move, coefficient_names
 from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
-from diagnosis.answer.what_remains import rest
+from diagnosis.answer.what_remains import remainder
 from diagnosis.decision import decision
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.patched import PatchedModel
@@ -124,7 +124,7 @@ def assemble(
     begun = time.perf_counter()
     found = _coefficients(study, kinds)
     seconds["coefficients"] = time.perf_counter() - begun
-    left = rest(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
+    left = remainder(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,

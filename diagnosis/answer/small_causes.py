@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.answer.small_swings import coefficient_gradient, coefficient_names, wind_on_runs
 from diagnosis.likelihood.least_squares import Fit, normal_equations
-from diagnosis.likelihood.starting_points import StartingPoint, is_gross, project_out, starting_points
+from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
 from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, OWN_EVIDENCE
 from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import Effect
@@ -117,7 +117,7 @@ def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
     present = {kind.name for kind in fit.problem.effects}
     others = [kind for kind in kinds if kind.fitted and kind.name not in present]
     influence = _influence(fit, gradients)
-    causes = [] if is_gross(fit) else _causes(fit, others, influence)
+    causes = [] if misses_motion(fit) else _causes(fit, others, influence)
     if not causes:
         return replace(alone(fit), scatter=_scatter(fit, influence, fit.residuals))
     left = np.array([cause.left for cause in causes])
@@ -231,9 +231,9 @@ def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
     if excess <= CHANCE_STDS * math.sqrt(2.0 * fit.count):
         return np.zeros(len(names))
     windy = sum(run.wind_on for run in runs)
-    speaking = np.array([windy if name.startswith("cn_") else len(runs) for name in names])
+    informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in names])
     parts = [residual @ own for residual, own in zip(residuals, influence, strict=True)]
-    return scatter_of_runs(np.array(parts), speaking)
+    return scatter_of_runs(np.array(parts), informative_runs)
 
 
 def _causes(fit: Fit, kinds: Sequence[type[Effect]], influence: list[Array]) -> list[_Cause]:

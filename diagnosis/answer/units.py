@@ -125,7 +125,7 @@ _STEPS = {
 
 
 def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
-    """The answer with the parameters of the measured rig; what remains (`Rest`) has its units already.
+    """The answer with the parameters of the measured rig; what remains (`Remainder`) has its units already.
 
     Args:
         answer: for the similar campaign; its candidates, maps and places are in the measured campaign's units

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis.closure import Rest, of_swing, rms_shown
+from diagnosis.closure import Remainder, of_swing, rms_shown
 from diagnosis.decision import Decision, plain, undecided_words
 from diagnosis.noise.sensor_noise import Noise
 from diagnosis.policy import FEW_RUNS, NOISE_CONTRADICTED
@@ -115,7 +115,7 @@ def verdict(
     found: Decision,
     gap: GapSummary,
     *,
-    rest: Rest,
+    rest: Remainder,
     both_winds: bool,
 ) -> str:
     """The answer in one paragraph.

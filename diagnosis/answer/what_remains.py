@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from scipy.special import chdtrc
 
-from diagnosis.closure import Move, Rest
-from diagnosis.noise.gap import test_gap
+from diagnosis.closure import Move, Remainder
+from diagnosis.noise.gap import gap_test
 from diagnosis.noise.rounding import rounding_errors
 from diagnosis.policy import GAP_FALSE_ALARM_RATE, MATERIAL_SHARE
 from diagnosis.result import ParameterEstimate
@@ -19,7 +19,7 @@ from identification.printing import COEFFICIENTS, significant, unit_mark
 Estimates = Mapping[str, ParameterEstimate]
 
 
-def rest(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Rest:
+def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Remainder:
     """Judge what the answer leaves of the gap.
 
     Args:
@@ -35,7 +35,7 @@ def rest(study: Study, stated: Estimates, moved: Mapping[str, float], excess: fl
     moves = {name: _move(moved[name], given) for name, given in stated.items()}
     material = [name for name, move in moves.items() if significant and _is_material(move)]
     words = _words(study, excess, stated, moves, material, significant=significant)
-    return Rest(significant, excess, p_value, bool(material), moves, words)
+    return Remainder(significant, excess, p_value, bool(material), moves, words)
 
 
 def _move(value: float, given: ParameterEstimate) -> Move:
@@ -61,7 +61,7 @@ def _p_value(study: Study) -> float:
         return study.test.p_value
     # no cause changes the tests of the noise itself: those of the residuals count
     errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
-    return test_gap(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
+    return gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
 
 
 def _words(

@@ -21,7 +21,7 @@ _EDGE = (
 
 
 @dataclass(frozen=True, eq=False)
-class OwnNumbers:
+class PerRunParameters:
     """What was found.
 
     Args:
@@ -35,7 +35,7 @@ class OwnNumbers:
     drop: float
 
 
-def ringing(fit: Fit) -> OwnNumbers | None:
+def ringing(fit: Fit) -> PerRunParameters | None:
     """The strongest decaying line that starts at the release and has one frequency in all runs.
 
     Returns:
@@ -62,7 +62,7 @@ def ringing(fit: Fit) -> OwnNumbers | None:
     omega = abs(exponent)
     found = amplitude[:, at] / exponent ** runs[0].derivative
     size = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
-    return OwnNumbers((size, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
+    return PerRunParameters((size, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
 
 def _beside_the_motion(reading: Array, interval: float, grid: Array) -> np.ndarray:
@@ -88,7 +88,7 @@ def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:
     return np.array(amplitudes), np.array(drops)
 
 
-def skip(fit: Fit) -> OwnNumbers | None:
+def skip(fit: Fit) -> PerRunParameters | None:
     """The instants at which the runs jump ahead by one common time.
 
     Returns:
@@ -104,7 +104,7 @@ def skip(fit: Fit) -> OwnNumbers | None:
     return max(found, key=lambda one: one.drop - cost * one.numbers.shape[1])
 
 
-def _skips(runs: list[_Skipping], count: int) -> OwnNumbers:
+def _skips(runs: list[_Skipping], count: int) -> PerRunParameters:
     """So many skips in every run, all of one time."""
     steps, lost = [run.steps(count) for run in runs], 0.0
     for number in range(_ROUNDS):
@@ -121,7 +121,7 @@ def _skips(runs: list[_Skipping], count: int) -> OwnNumbers:
     numbers = np.array(
         [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
     )
-    return OwnNumbers((lost * count,), numbers, drop)
+    return PerRunParameters((lost * count,), numbers, drop)
 
 
 @dataclass(frozen=True)

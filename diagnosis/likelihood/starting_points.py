@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, normal_equations
-from diagnosis.likelihood.per_run_parameters import OwnNumbers, ringing, skip
+from diagnosis.likelihood.per_run_parameters import PerRunParameters, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, Line, mains_line, misfit, shedding_line
 from diagnosis.likelihood.run_data import Data, RunData, departure
@@ -172,12 +172,14 @@ class StartingPoint:
         return dataclasses.replace(self, point=Point(common, self.point.release))
 
 
-def _of_line(line: Line | None) -> OwnNumbers | None:
-    return None if line is None else OwnNumbers((line.amplitude, line.parameter), line.phases, line.drop)
+def _of_line(line: Line | None) -> PerRunParameters | None:
+    return (
+        None if line is None else PerRunParameters((line.amplitude, line.parameter), line.phases, line.drop)
+    )
 
 
 #: How an effect with a number of its own in every run is found: a periodic one by what sets its frequency.
-_FINDERS: Mapping[str, Callable[[Fit], OwnNumbers | None]] = {
+_FINDERS: Mapping[str, Callable[[Fit], PerRunParameters | None]] = {
     "mains": lambda base: _of_line(mains_line(base)),
     "shedding": lambda base: _of_line(shedding_line(base)),
     "ringing": ringing,
@@ -205,7 +207,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
 
 
-def is_gross(fit: Fit) -> bool:
+def misses_motion(fit: Fit) -> bool:
     """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
     Returns:
@@ -217,7 +219,7 @@ def is_gross(fit: Fit) -> bool:
     return fit.total > GROSS_MISFIT * readings
 
 
-def _own_start(base: Fit, kind: type[Effect], found: OwnNumbers) -> StartingPoint:
+def _own_start(base: Fit, kind: type[Effect], found: PerRunParameters) -> StartingPoint:
     problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
     infos = _own_parameters(problem, kind)
     values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]

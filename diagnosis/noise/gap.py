@@ -13,7 +13,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.starting_points import is_gross, nominal_start
+from diagnosis.likelihood.starting_points import misses_motion, nominal_start
 from diagnosis.noise.colour import noise_colour, whitened, zero_wanders
 from diagnosis.noise.rounding import repeated, rounding_errors, samples, with_rounding
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
@@ -120,7 +120,7 @@ class GapTest:
     noisy: bool
 
 
-def test_gap(
+def gap_test(
     fit: Fit,
     noise: Noise,
     trend: NoiseTrend,
@@ -166,7 +166,7 @@ def _misbehaves(tests: Mapping[str, float]) -> float:
     return GAP_FALSE_ALARM_RATE * NOISE_FALSE_ALARM_SHARE / len(tests)
 
 
-def judge(
+def gap_or_colour(
     nominal: Fit, noise: Noise, trend: NoiseTrend, *, step: float, coarse_step: bool
 ) -> tuple[Fit, Noise, GapTest]:
     """Test for a gap, and decide between a gap and coloured noise.
@@ -175,7 +175,7 @@ def judge(
         nominal: fit of the nominal model to runs prepared for white noise.
         trend: of the noise with the motion.
         step: of the lattice of the readings, rad; 0 where there is none.
-        coarse_step: as `test_gap` takes it.
+        coarse_step: as `gap_test` takes it.
 
     Returns:
         The fit, the noise and the verdict. The noise of the fit allows for rounding, whose error is not white where
@@ -189,14 +189,14 @@ def judge(
     allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
     if allowed is not None:
         nominal = refit(Problem(allowed), nominal.point)
-    plain = test_gap(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
-    for source in () if is_gross(nominal) else _colour_sources(nominal):
+    plain = gap_test(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
+    for source in () if misses_motion(nominal) else _colour_sources(nominal):
         found = noise_colour(source, throughout=source is not nominal)
         if found is None:
             continue
         white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
         coloured = noise.coloured(found, nominal.problem.data)
-        test = test_gap(white, coloured, trend, coarse_step=coarse_step, errors=errors)
+        test = gap_test(white, coloured, trend, coarse_step=coarse_step, errors=errors)
         still = any(not run.wind_on for run in nominal.problem.data.runs)
         excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
         believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None

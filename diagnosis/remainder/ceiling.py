@@ -79,7 +79,7 @@ class Evidence:
     solution: Ridge | None = None
 
 
-class Rest:
+class Unexplained:
     """What a fit leaves, and how much of it could be closed.
 
     Args:

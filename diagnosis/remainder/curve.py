@@ -14,7 +14,7 @@ from diagnosis.closure import Ceiling, Curve
 from diagnosis.likelihood.residuals import Spectrum, block_gain, resonance, smooth_spectra
 from diagnosis.policy import LINE_CONTRAST, LINE_STEADY, PLACE_FALSE_ALARM_RATE
 from diagnosis.remainder import bases
-from diagnosis.remainder.ceiling import GAPS, Evidence, Rest, Unit, gaps
+from diagnosis.remainder.ceiling import GAPS, Evidence, Unexplained, Unit, gaps
 from diagnosis.remainder.paths import Path
 from diagnosis.remainder.ridge import Normal, Ridge, Rows, normal, ratio
 from diagnosis.where.excess import away_from_motion
@@ -32,11 +32,11 @@ _OVER: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-def curve(rest: Rest, found: Evidence) -> Curve | None:
+def curve(unexplained: Unexplained, found: Evidence) -> Curve | None:
     """The law of a kind without a formula.
 
     Args:
-        rest: what is left.
+        unexplained: what is left.
         found: of the kind.
 
     Returns:
@@ -46,7 +46,7 @@ def curve(rest: Rest, found: Evidence) -> Curve | None:
     kind = found.ceiling.kind
     if found.solution is None or kind not in _OVER:
         return None
-    r = rest.ranges
+    r = unexplained.ranges
     count = _MAP if len(_OVER[kind]) > 1 else _POINTS
     reach = {
         "angle": np.linspace(-r.angle, r.angle, count),
@@ -66,12 +66,12 @@ def curve(rest: Rest, found: Evidence) -> Curve | None:
     if kind in bases.OF_READING:
         values, std = values * r.angle, std * r.angle
     places = tuple(tuple(axis.tolist()) for axis in axes)
-    unit = "rad" if kind in bases.OF_READING else _moment_unit(rest)
+    unit = "rad" if kind in bases.OF_READING else _moment_unit(unexplained)
     return Curve(_OVER[kind], places, tuple(values.tolist()), tuple(std.tolist()), unit)
 
 
-def _moment_unit(rest: Rest) -> str:
-    return "rad/s2" if rest.fit.problem.data.normalised else "N m"
+def _moment_unit(unexplained: Unexplained) -> str:
+    return "rad/s2" if unexplained.fit.problem.data.normalised else "N m"
 
 
 def _own_line(kind: str, grid: Mapping[str, Array]) -> Array:
@@ -90,11 +90,11 @@ def _with_band(basis: Array, solution: Ridge, line: Array) -> tuple[Array, Array
     return rows @ solution.solution[free:], np.sqrt(np.maximum(variance, 0.0))
 
 
-def events(rest: Rest, kind: str, precision: float) -> list[dict[str, Any]]:
+def events(unexplained: Unexplained, kind: str, precision: float) -> list[dict[str, Any]]:
     """The runs that show what differs from run to run, and when.
 
     Args:
-        rest: what is left.
+        unexplained: what is left.
         kind: of `diagnosis.remainder.bases.SINGLE`.
         precision: one over the variance of a coefficient in the prior, in the basis' units.
 
@@ -103,13 +103,13 @@ def events(rest: Rest, kind: str, precision: float) -> list[dict[str, Any]]:
         of the record, between which four fifths of it lie, in the units of the fit.
     """
     found = []
-    for path, columns in zip(rest.paths, rest.columns(kind), strict=True):
+    for path, columns in zip(unexplained.paths, unexplained.columns(kind), strict=True):
         unit = Unit(path, slice(None))
         part: Normal = normal(
             Rows(np.zeros((path.residual.size, 0)), unit.left(columns), unit.left(path.residual))
         )
         solution = Ridge(part, precision).solution
-        energy = (bases.SINGLE[kind](path, rest.ranges) @ solution) ** 2
+        energy = (bases.SINGLE[kind](path, unexplained.ranges) @ solution) ** 2
         found.append((path, max(part.power - part.cost(solution), 0.0), energy))
     whole = max(sum(drop for _, drop, _ in found), 1e-300)
     largest = max(drop for _, drop, _ in found)
@@ -157,29 +157,29 @@ class SteadyLine:
     events: tuple[Mapping[str, Any], ...]
 
 
-def steady_line(rest: Rest) -> SteadyLine | None:
+def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
 
     Args:
-        rest: what is left.
+        unexplained: what is left.
 
     Returns:
         In the units of the fit; None where chance may explain it, at a rate of `PLACE_FALSE_ALARM_RATE` for all
         frequencies together, and where it is the skirt of something broader or does not keep its phase in a run.
     """
-    start, floor = _strongest(rest)
+    start, floor = _strongest(unexplained)
     if start is None:
         return None
-    runs = [path.run for path in rest.paths]
+    runs = [path.run for path in unexplained.paths]
     width = 1.0 / max(run.duration for run in runs)
     frequency = float(
         minimize_scalar(
-            lambda f: -_drops(rest, f).sum(), bounds=(start - width, start + width), method="bounded"
+            lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
         ).x
     )
-    if _steadiness(rest, frequency, floor) < LINE_STEADY:
+    if _steadiness(unexplained, frequency, floor) < LINE_STEADY:
         return None
-    drops = _drops(rest, frequency)
+    drops = _drops(unexplained, frequency)
     whole = float(drops.sum())
     # Cramér–Rao bounds of sinusoids of unknown phase, in the noise beside the line
     sharpness = float(drops @ np.array([run.duration**2 for run in runs]))
@@ -190,20 +190,20 @@ def steady_line(rest: Rest) -> SteadyLine | None:
     amplitude = float(np.sqrt(np.mean(squares)))
     return SteadyLine(
         frequency, frequency_std, amplitude, amplitude * float(np.sqrt(floor / whole)),
-        _evidence(rest, frequency), _events(rest, drops),
+        _evidence(unexplained, frequency), _events(unexplained, drops),
     )  # fmt: skip
 
 
-def _strongest(rest: Rest) -> tuple[float | None, float]:
+def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
     """Frequency of the least likely line, Hz, and the power beside it over that of the noise."""
-    spectra = smooth_spectra(rest.fit)
+    spectra = smooth_spectra(unexplained.fit)
     longest = max(spectra, key=lambda one: one.duration)
-    top = _NYQUIST / max(path.run.interval for path in rest.paths)
+    top = _NYQUIST / max(path.run.interval for path in unexplained.paths)
     grid = longest.frequency[(longest.frequency > 0.0) & (longest.frequency < top)]
     power, count, floors = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
     for index, spectrum in enumerate(spectra):
         floor = np.interp(grid, *_floor(spectrum))
-        seen = away_from_motion(grid / resonance(rest.fit, index))
+        seen = away_from_motion(grid / resonance(unexplained.fit, index))
         power += np.where(seen, spectrum.power(grid) / floor, 0.0)
         count += seen
         floors += np.where(seen, floor, 0.0)
@@ -232,21 +232,21 @@ def _waves(path: Path, frequency: float) -> Array:
     return np.column_stack([np.sin(phase), np.cos(phase)])
 
 
-def _drops(rest: Rest, frequency: float) -> Array:
+def _drops(unexplained: Unexplained, frequency: float) -> Array:
     """Drop of χ² when the line is removed, by run, shape (runs,)."""
     found = []
-    for path in rest.paths:
-        waves, residual = _waves(path, frequency), rest.fit.residuals[path.index]
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency), unexplained.fit.residuals[path.index]
         seen = waves.T @ residual
         found.append(float(seen @ np.linalg.solve(waves.T @ waves, seen)))
     return np.array(found)
 
 
-def _steadiness(rest: Rest, frequency: float, floor: float) -> float:
+def _steadiness(unexplained: Unexplained, frequency: float, floor: float) -> float:
     """Share of the line in a half of a run that the other half predicts; 1 where phase and amplitude are kept."""
     predicted, fitted = 0.0, 0.0
-    for path in rest.paths:
-        waves, residual = _waves(path, frequency), rest.fit.residuals[path.index]
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency), unexplained.fit.residuals[path.index]
         first = np.arange(residual.size) < residual.size // 2
         ways = [np.linalg.lstsq(waves[own], residual[own], rcond=None)[0] for own in (first, ~first)]
         for own, mine, other in ((first, *ways), (~first, *ways[::-1])):
@@ -256,11 +256,11 @@ def _steadiness(rest: Rest, frequency: float, floor: float) -> float:
     return predicted / max(fitted, 1e-300)  # chance lowers the one by 2 in every half, and raises the other
 
 
-def _evidence(rest: Rest, frequency: float) -> Evidence:
+def _evidence(unexplained: Unexplained, frequency: float) -> Evidence:
     """Short gaps are predicted from the line around them, as for every kind that differs from run to run."""
     drops, left = [], []
-    for path in rest.paths:
-        waves, residual = _waves(path, frequency), rest.fit.residuals[path.index]
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency), unexplained.fit.residuals[path.index]
         turn = gaps(residual.size, path.group)
         after = 0.0
         for out in (turn == t for t in np.unique(turn)):
@@ -272,10 +272,10 @@ def _evidence(rest: Rest, frequency: float) -> Evidence:
     return Evidence(Ceiling("line", *ratio(np.array(drops), np.array(left)), GAPS), sum(drops), 0.0)
 
 
-def _events(rest: Rest, drops: Array) -> tuple[Mapping[str, Any], ...]:
+def _events(unexplained: Unexplained, drops: Array) -> tuple[Mapping[str, Any], ...]:
     """The runs that show it, over their whole time, the largest part first."""
     found = []
-    for path, drop in sorted(zip(rest.paths, drops.tolist(), strict=True), key=lambda one: -one[1]):
+    for path, drop in sorted(zip(unexplained.paths, drops.tolist(), strict=True), key=lambda one: -one[1]):
         if drop > LISTED * drops.max():
             first, last = path.time[[0, -1]] + path.run.start
             share = drop / float(drops.sum())

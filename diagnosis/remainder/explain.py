@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.policy import AS_MUCH, COMMON_SHARE, LEAST_CLOSABLE, PLACE_FALSE_ALARM_RATE
 from diagnosis.remainder import bases
-from diagnosis.remainder.ceiling import Evidence, Rest
+from diagnosis.remainder.ceiling import Evidence, Unexplained
 from diagnosis.remainder.curve import SteadyLine, curve, events, steady_line
 from diagnosis.remainder.formula import Proposal, choose, propose
 from diagnosis.remainder.ridge import ratio
@@ -54,23 +54,25 @@ def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
         similarity: how its units were made.
         named: whether causes are part of it.
     """
-    rest = Rest(left)
-    common = {kind: rest.common(kind) for kind in bases.COMMON}
-    line = steady_line(rest)
+    unexplained = Unexplained(left)
+    common = {kind: unexplained.common(kind) for kind in bases.COMMON}
+    line = steady_line(unexplained)
     single = {} if line is None else {"line": line.evidence}
-    single |= {kind: rest.single(kind) for kind in bases.SINGLE}
+    single |= {kind: unexplained.single(kind) for kind in bases.SINGLE}
     kind = chosen_kind(common, single)
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     law, shape = None, None
     where: tuple[Mapping[str, Any], ...] = ()
     if kind in common:
-        shape = _own_curve(curve(rest, common[kind]), similarity)
-        law = _law(rest, kind, common[kind].drop, similarity)
+        shape = _own_curve(curve(unexplained, common[kind]), similarity)
+        law = _law(unexplained, kind, common[kind].drop, similarity)
         kind = _of_formula(kind, law)
     elif line is not None and kind == "line":
         where = tuple(_own_event(one, similarity) for one in line.events)
     elif kind in single:
-        where = tuple(_own_event(one, similarity) for one in events(rest, kind, single[kind].precision))
+        where = tuple(
+            _own_event(one, similarity) for one in events(unexplained, kind, single[kind].precision)
+        )
     excess = left.excess / left.problem.data.runs[0].block
     shown = {one.kind: one for one in ceilings}
     words = _words(kind, shown, law, () if kind == "line" else where, named=named)
@@ -106,13 +108,13 @@ def _of_formula(kind: str, law: Law | None) -> str:
     return "state" if other and re.search(rf"\b{other}\b", formula) else kind
 
 
-def _law(rest: Rest, kind: str, drop: float, similarity: Similarity) -> Law | None:
+def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarity) -> Law | None:
     """The formula of a kind, where one is supported."""
-    formula = choose(rest, kind, drop)
-    proposal = None if formula is None else propose(rest, formula, kind)
+    formula = choose(unexplained, kind, drop)
+    proposal = None if formula is None else propose(unexplained, formula, kind)
     if proposal is None:
         return None
-    closed, std = _closed_by(proposal.fit, rest.fit)
+    closed, std = _closed_by(proposal.fit, unexplained.fit)
     if closed < LEAST_CLOSABLE:
         return None
     table, values = _own_table(proposal, similarity)

@@ -19,7 +19,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.problem import Point
 from diagnosis.policy import LAW_FALSE_RATE, LAW_REACHES, LAW_TERM_SHARE
 from diagnosis.remainder.bases import Ranges
-from diagnosis.remainder.ceiling import Rest
+from diagnosis.remainder.ceiling import Unexplained
 from diagnosis.remainder.ridge import Normal, Ridge, held_out, total
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
@@ -213,11 +213,11 @@ class Proposal:
     fit: Fit
 
 
-def choose(rest: Rest, kind: str, closable: float) -> Formula | None:
+def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | None:
     """Find the terms, one after another.
 
     Args:
-        rest: what is left.
+        unexplained: what is left.
         kind: of `diagnosis.closure.KINDS`.
         closable: drop of χ² on held-out runs that the kind's own basis reaches.
 
@@ -225,54 +225,56 @@ def choose(rest: Rest, kind: str, closable: float) -> Formula | None:
         The formula; None where no term is supported: by chance alone one would be in `LAW_FALSE_RATE` of the
         campaigns, and it must predict held-out runs.
     """
-    found = _chosen(rest, kind, closable)
+    found = _chosen(unexplained, kind, closable)
     if kind in ("angle", "rate") and (found is None or found.gained < LAW_REACHES * closable):
-        wider = _chosen(rest, "state", closable)
+        wider = _chosen(unexplained, "state", closable)
         found = found if wider is None or (found and found.gained >= wider.gained) else wider
     return found
 
 
-def _chosen(rest: Rest, kind: str, closable: float) -> Formula | None:
-    candidates = _with_factors(rest, kind)
+def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | None:
+    candidates = _with_factors(unexplained, kind)
     if not candidates:
         return None
     of_reading = kind in _READING_KINDS
-    if of_reading and rest.paths[0].run.derivative:
+    if of_reading and unexplained.paths[0].run.derivative:
         return None  # an effect's reading is an angle
-    columns = [_columns(rest, candidates, index, of_reading) for index in range(len(rest.paths))]
+    columns = [
+        _columns(unexplained, candidates, index, of_reading) for index in range(len(unexplained.paths))
+    ]
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
-    parts = rest.normals([c / size for c in columns])
-    chosen, gained = _greedy(rest, parts, len(candidates), closable)
+    parts = unexplained.normals([c / size for c in columns])
+    chosen, gained = _greedy(unexplained, parts, len(candidates), closable)
     while sum(1 + len(candidates[i].inner) for i in chosen) > limits.OWN_PARAMETERS:
         chosen.pop()
     if not chosen:
         return None
     whole = _of(total(parts), chosen)
     solution = Ridge(whole, 0.0).solution
-    common = rest.size.size
+    common = unexplained.size.size
     return Formula(
         tuple(candidates[i] for i in chosen),
         tuple(float(v) for v in solution[common:] / size[chosen]),
         of_reading,
-        solution[:common] / rest.size,
+        solution[:common] / unexplained.size,
         gained,
     )
 
 
-def _with_factors(rest: Rest, kind: str) -> list[Term]:
+def _with_factors(unexplained: Unexplained, kind: str) -> list[Term]:
     """The terms of a kind: with the wind, or as they are and, those of the angle, in proportion to the spring."""
-    found = terms(kind, rest.ranges)
+    found = terms(kind, unexplained.ranges)
     if kind == "wind":
         fast = [Term("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
         return [Term("V^2*" + term.text, term.inner) for term in found] + fast
-    if kind in _READING_KINDS or len({path.stiffness for path in rest.paths}) == 1:
+    if kind in _READING_KINDS or len({path.stiffness for path in unexplained.paths}) == 1:
         return found
     return found + [Term("Kr*" + term.text, term.inner) for term in found if "b" in term.formula.names]
 
 
-def _columns(rest: Rest, candidates: Sequence[Term], index: int, of_reading: bool) -> Array:
+def _columns(unexplained: Unexplained, candidates: Sequence[Term], index: int, of_reading: bool) -> Array:
     """Responses to every term in one run, shape (rows, terms)."""
-    path = rest.paths[index]
+    path = unexplained.paths[index]
     places: dict[str, float | Array] = {
         "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
         "Kr": path.stiffness, "omega": path.still_omega,
@@ -288,11 +290,13 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
     return Normal(whole.matrix[np.ix_(keep, keep)], whole.gradient[keep], whole.power, len(keep))
 
 
-def _greedy(rest: Rest, parts: Sequence[Normal], count: int, closable: float) -> tuple[list[int], float]:
+def _greedy(
+    unexplained: Unexplained, parts: Sequence[Normal], count: int, closable: float
+) -> tuple[list[int], float]:
     """Terms added as long as each pays on held-out runs."""
     whole = total(parts)
     threshold = float(chdtri(1, LAW_FALSE_RATE / count))
-    before = float(rest.before[rest.seen].sum())
+    before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
     while len(chosen) < _MOST_TERMS and gained < LAW_REACHES * closable:
@@ -301,8 +305,8 @@ def _greedy(rest: Rest, parts: Sequence[Normal], count: int, closable: float) ->
         tried = []
         for i in order:
             some = [_of(part, [*chosen, i]) for part in parts]
-            after = held_out(some, rest.groups, None)
-            tried.append((before - float(after[rest.seen].sum()), i))
+            after = held_out(some, unexplained.groups, None)
+            tried.append((before - float(after[unexplained.seen].sum()), i))
         if not tried or max(tried)[0] - gained < max(LAW_TERM_SHARE * closable, threshold):
             break
         gained, best = max(tried)
@@ -326,11 +330,11 @@ def _drops(whole: Normal, chosen: Sequence[int]) -> Array:
     return np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
 
 
-def propose(rest: Rest, formula: Formula, kind: str) -> Proposal | None:
+def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal | None:
     """Fit a formula like any other effect.
 
     Args:
-        rest: what is left, whose fit the effect is added to.
+        unexplained: what is left, whose fit the effect is added to.
         formula: from `choose`.
         kind: of `diagnosis.closure.KINDS`; names the effect.
 
@@ -342,7 +346,7 @@ def propose(rest: Rest, formula: Formula, kind: str) -> Proposal | None:
         effect = effect_of(table)
     except TunnelError:
         return None
-    base = rest.fit
+    base = unexplained.fit
     start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}
     problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, effect))
     own = np.array([start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]])

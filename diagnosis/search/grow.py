@@ -12,7 +12,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.prepare import Stretches, fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.starting_points import StartingPoint, is_gross, starting_points
+from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.policy import (
     ALWAYS_FITTED,
     FREED_FROM,
@@ -89,7 +89,7 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
     """
     modes = [kind for kind in kinds if kind.line == "ringing"]
     found = sets_with_one_more([Hypothesis((), nominal)], modes, None)
-    return found[0] if found and not is_gross(found[0].fit) else None
+    return found[0] if found and not misses_motion(found[0].fit) else None
 
 
 def _distinct(ranked: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
@@ -282,7 +282,7 @@ def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
 
 def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
     with suppress(FitError, np.linalg.LinAlgError):
-        if is_gross(base):
+        if misses_motion(base):
             found = fit(start.problem, start.point)
         else:
             found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
@@ -383,7 +383,7 @@ def _longer_sets(
     tried = sets_with_one_more([g.short for g in level if g.short is not None], kinds, progress)
     best = sorted(tried, key=lambda h: h.fit.total)[:LENGTHENED]
     grown = {h.names: g for h in best if (g := _lengthened(h, short, data)) is not None}
-    following = [g.long for g in level if g.long.effects and not is_gross(g.long.fit)]
+    following = [g.long for g in level if g.long.effects and not misses_motion(g.long.fit)]
     for child in sets_with_one_more(following, kinds, progress):
         other = grown.get(child.names)
         if other is None or child.fit.total < other.long.fit.total:

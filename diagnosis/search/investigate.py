@@ -16,8 +16,8 @@ from diagnosis.likelihood.prepare import prepare, without_long_rest, without_res
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, mains_interval, misfit
 from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.starting_points import decays_start, is_gross, nominal_start
-from diagnosis.noise.gap import GapTest, judge
+from diagnosis.likelihood.starting_points import decays_start, misses_motion, nominal_start
+from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.noise.rounding import rounding_errors
 from diagnosis.noise.sensor_noise import (
@@ -205,7 +205,7 @@ def fit_nominal(data: Data) -> Fit:
     """
     try:
         found = fit(Problem(data), nominal_start(data))
-        nearer = decays_start(data) if is_gross(found) else None
+        nearer = decays_start(data) if misses_motion(found) else None
         if nearer is not None:
             found = min(found, fit(Problem(data), nearer), key=lambda one: one.total)
     except (FitError, np.linalg.LinAlgError) as error:
@@ -233,11 +233,11 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
             cleaned, noise, hum = _without_hum(campaign, frequency, noise)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
-        missed = is_gross(nominal) and not campaign.driven
+        missed = misses_motion(nominal) and not campaign.driven
         cut = missed and second_mode_alone(nominal, kinds) is None
         if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
-        nominal, noise, test = judge(nominal, noise, trend, step=step, coarse_step=coarse)
+        nominal, noise, test = gap_or_colour(nominal, noise, trend, step=step, coarse_step=coarse)
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, cut)
 
 
@@ -261,9 +261,9 @@ def _without_hum(campaign: Campaign, frequency: float, noise: Noise) -> tuple[Ca
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study with sets of effects and random moments fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
-    first = second_mode_alone(found.nominal, fitted) if is_gross(found.nominal) else None
+    first = second_mode_alone(found.nominal, fitted) if misses_motion(found.nominal) else None
     # an input holds the phase of the motion, so that no stretches are needed
-    if fitted and first is None and is_gross(found.nominal) and not found.campaign.driven:
+    if fitted and first is None and misses_motion(found.nominal) and not found.campaign.driven:
         return _weigh_in_stretches(found, fitted, clock)
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima

@@ -120,9 +120,9 @@ def _joint_estimate(
     )
     if Status.MODEL_DEPARTS in statuses and found.names:
         windy = sum(run.wind_speed > 0.0 for run in runs)
-        speaking = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
+        informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
         influences = _influences(fit.runs, design.links, found.jacobian, own_zeros)
-        own = widened_covariance(own, scatter_of_runs(influences, speaking))
+        own = widened_covariance(own, scatter_of_runs(influences, informative_runs))
     zero = None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad")
     return replace(
         filled_estimate(campaign, estimate, runs, design, found, own, statuses), sensor_zero=zero, noise=noise

@@ -27,14 +27,8 @@ sys.exit(lint_imports(no_cache=True))
 
 #: What runs the engine or Gymnasium itself and says so; no command of ``tunnel`` but its own loads it.
 ENGINE_ROOMS = (
-    "diagnosis.patch.joint_law",
-    "diagnosis.patch.patched_model",
-    "diagnosis.patch.patched_model",
+    "diagnosis.patch.",
     "tunnel_lab.envs.",
-    "tunnel_lab.show.live",
-    "tunnel_lab.show.live",
-    "tunnel_lab.show.live",
-    "tunnel_lab.show.live",
     "tunnel_lab.show.live",
 )
 

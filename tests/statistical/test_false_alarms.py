@@ -40,7 +40,7 @@ def judged(data):
     """All tests of a campaign."""
     noise = campaign_noise(data)
     nominal = fit_nominal(prepare(data, noise.variance))
-    return gap.test_gap(nominal, noise, noise_trend(data), coarse_step=False, errors=None)
+    return gap.gap_test(nominal, noise, noise_trend(data), coarse_step=False, errors=None)
 
 
 @pytest.mark.slow

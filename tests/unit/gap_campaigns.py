@@ -12,7 +12,7 @@ from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import nominal_start
-from diagnosis.noise.gap import GapTest, judge
+from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.search.hypothesis import Hypothesis
@@ -135,4 +135,4 @@ def judged(data: Campaign) -> GapTest:
     """Fit, noise and verdict."""
     noise = campaign_noise(data)
     fitted = fit_nominal(prepare(data, noise.variance))
-    return judge(fitted, noise, noise_trend(data), step=reading_step(data), coarse_step=False)
+    return gap_or_colour(fitted, noise, noise_trend(data), step=reading_step(data), coarse_step=False)

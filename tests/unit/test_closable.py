@@ -15,7 +15,7 @@ from diagnosis.closure import KINDS, Ceiling, closable_table, closable_words
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.remainder.ceiling import Evidence, Rest
+from diagnosis.remainder.ceiling import Evidence, Unexplained
 from diagnosis.remainder.curve import steady_line
 from diagnosis.remainder.explain import chosen_kind, closable
 from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
@@ -138,7 +138,7 @@ def test_a_vibration_is_a_steady_line():
     assert found.law is None
     assert closed(found)["line"] > 0.95
     assert len(found.events) == RUNS.spring_stiffness.size
-    change, line = study.similarity, steady_line(Rest(study.nominal))
+    change, line = study.similarity, steady_line(Unexplained(study.nominal))
     frequency, std = change.own(line.frequency, "Hz"), change.own(line.frequency_std, "Hz")
     assert std < 0.005
     assert frequency == pytest.approx(7.2, abs=4.0 * std)
@@ -166,7 +166,7 @@ def test_what_does_not_keep_its_phase_is_not_a_line(detent):
     lines = []
     for shape in (np.zeros, ringing, sinusoid):
         residuals = tuple(shape(r.size) + rng.standard_normal(r.size) for r in fit.residuals)
-        lines.append(steady_line(Rest(replace(fit, residuals=residuals))))
+        lines.append(steady_line(Unexplained(replace(fit, residuals=residuals))))
     assert lines[:2] == [None, None]
     assert lines[2].frequency == pytest.approx(7.0, abs=4.0 * lines[2].frequency_std)
     noise = np.sqrt(np.mean([run.noise_variance for run in fit.problem.data.runs]))

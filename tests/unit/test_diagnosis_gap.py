@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import binom, kstest
 
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.noise import gap  # its test_gap would be collected here by name
+from diagnosis.noise import gap
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend
 from diagnosis.policy import GAP_FALSE_ALARM_RATE
 from tests.unit.gap_campaigns import campaign, nominal
@@ -32,7 +32,7 @@ def at_a_kilohertz(fitted):
 
 
 def verdict(fit, *, noise=NOISE, trend=STEADY, coarse_step=False, errors=None):
-    return gap.test_gap(fit, noise, trend, coarse_step=coarse_step, errors=errors)
+    return gap.gap_test(fit, noise, trend, coarse_step=coarse_step, errors=errors)
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ def with_zero(data, zero, seed=1):
 
 def judged(data):
     """Fit, noise and verdict."""
-    return gap.judge(
+    return gap.gap_or_colour(
         nominal(data), campaign_noise(data), noise_trend(data), step=reading_step(data), coarse_step=False
     )
 
@@ -147,7 +147,7 @@ def test_two_parts_of_records_show_no_colour():
 def test_white_noise_is_left_alone(seed):
     data = campaign(seed=seed)
     before = nominal(data)
-    fit, noise, _ = gap.judge(
+    fit, noise, _ = gap.gap_or_colour(
         before, campaign_noise(data), noise_trend(data), step=reading_step(data), coarse_step=False
     )
     assert fit is before

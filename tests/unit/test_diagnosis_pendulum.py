@@ -12,7 +12,7 @@ from diagnosis.likelihood.least_squares import FitError, fit_at
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.starting_points import is_gross, starting_points
+from diagnosis.likelihood.starting_points import misses_motion, starting_points
 from diagnosis.remainder.bases import COMMON, SINGLE, ranges
 from diagnosis.remainder.paths import paths
 from diagnosis.search.grow import _of_each, grow_in_stretches
@@ -157,7 +157,7 @@ def test_what_acts_on_a_pendulum_of_large_amplitude_is_found(amplitude, friction
 def test_gravity_is_found_where_the_nominal_model_does_not_miss_the_motion():
     """Linear theory sees gravity's curvature only if it takes the place of the spring."""
     found = fit_nominal(without_start(prepared(pendulum(0.5, 10.0))))
-    assert not is_gross(found)
+    assert not misses_motion(found)
     (gravity,) = starting_points(found, effect_class("gravity_stiffness"))
     (cubic,) = starting_points(found, effect_class("cubic_stiffness"))
     assert gravity.predicted_drop == pytest.approx(cubic.predicted_drop, rel=0.1)
@@ -173,7 +173,7 @@ def test_the_nominal_fit_is_the_one_that_identify_finds():
     data = pendulum(2.5, 30.0)
     found, run = fit_nominal(prepared(data)), identify(data).runs[0]
     omega = float(np.sqrt(found.value("stiffness")))
-    assert is_gross(found)
+    assert misses_motion(found)
     assert abs(omega - run.omega_n.value) < run.omega_n.std
     assert abs(found.value("mechanical_damping") / (2.0 * omega) - run.zeta.value) < run.zeta.std
 

@@ -9,7 +9,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import residual_spectra, resonance, shedding_line
-from diagnosis.likelihood.starting_points import is_gross, nominal_start, project_out, starting_points
+from diagnosis.likelihood.starting_points import misses_motion, nominal_start, project_out, starting_points
 from diagnosis.search.hypothesis import _within
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
@@ -234,5 +234,5 @@ def test_resonance_is_the_undamped_frequency_with_the_air():
 
 
 def test_a_gross_misfit_is_distinguished_from_a_small_one():
-    assert not is_gross(nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))))
-    assert is_gross(nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.3}))))
+    assert not misses_motion(nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))))
+    assert misses_motion(nominal(campaign(effect_from("coulomb_friction", {"friction_moment": 0.3}))))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.other_motions import second_modes
-from diagnosis.likelihood.starting_points import is_gross
+from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.search.investigate import investigate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -64,7 +64,7 @@ def two_modes(derivative, share):
 def test_a_second_mode_is_an_answer_however_large_and_whatever_the_sensor_measures(derivative, share):
     kinds = [effect_class(name) for name in ("second_mode", "cubic_stiffness", "coulomb_friction")]
     study = investigate(two_modes(derivative, share), kinds)
-    assert is_gross(study.nominal) == (share > 0.1)
+    assert misses_motion(study.nominal) == (share > 0.1)
     assert study.fitted == ("second_mode",)
     assert study.weighed[0].probability > 0.9
     found = study.chosen

@@ -9,7 +9,7 @@ from diagnosis_document import campaign, document
 
 from diagnosis.answer.reported import held_out_totals
 from diagnosis.answer.verdict import verdict
-from diagnosis.closure import Misfit, Rest, Step, Waterfall
+from diagnosis.closure import Misfit, Remainder, Step, Waterfall
 from diagnosis.decision import decision
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
@@ -36,7 +36,7 @@ def said(
         causes,
         decision(answers or ((" + ".join(causes), 0.9), ("unknown", 0.1))),
         gap(True) if size is None else size,
-        rest=Rest(material, 0.1, 0.0, material, {}, "What remains is small."),
+        rest=Remainder(material, 0.1, 0.0, material, {}, "What remains is small."),
         both_winds=both_winds,
     )
 
