@@ -35,7 +35,7 @@ from tunnel_lab.experiments.training_samples import (
     sizes_at_unit_excess,
     truth_of,
 )
-from tunnel_reference.linear_families import LINEAR_IN_A_RECORD
+from tunnel_reference.catalogue import LINEAR_IN_A_RECORD
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array, Record
 

@@ -5,11 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_reference import air_moments as m
-from tunnel_reference.binding import ParamMaker, calibration, lag_time, moving, speed_offset
-from tunnel_reference.catalogue import Draw, Extra, Form, Group
+from tunnel_reference.air_moments import turbulence, wandering_vortex
+from tunnel_reference.catalogue import (
+    Draw,
+    Extra,
+    Form,
+    Group,
+    ParamMaker,
+    calibration,
+    lag_time,
+    moving,
+    speed_offset,
+)
 from tunnel_reference.conditions import WIDTH, Array, Conditions
-from tunnel_reference.forcings import turbulence, wandering_vortex
-from tunnel_reference.terms import Phase
+from tunnel_reference.integrator import Phase
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_reference import moments as m
-from tunnel_reference.binding import calibration, flexible_rod, moving, one_spring
-from tunnel_reference.catalogue import Draw, Extra, Form, Group
+from tunnel_reference.catalogue import Draw, Extra, Form, Group, calibration, flexible_rod, moving, one_spring
 from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.terms import Phase
+from tunnel_reference.integrator import Phase
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunnel_reference.binding import ParamMaker, reading
-from tunnel_reference.catalogue import Draw, Extra, Form, Group
+from tunnel_reference.catalogue import Draw, Extra, Form, Group, ParamMaker, reading
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.readings import Order, Params, Reading
 

@@ -11,8 +11,7 @@ import numpy as np
 from tunnel_reference.conditions import FRONTAL_AREA, NOMINAL_INERTIA, REFERENCE_LENGTH, WIDTH
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES
-from tunnel_reference.separable import size_separably
-from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Record

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_reference.conditions import Array
-from tunnel_reference.terms import Params, Rows, Stage
+from tunnel_reference.integrator import Params, Rows, Stage
 
 # ---- friction: a law only gives the level; the integrator handles its sign and sticking
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from tunnel_reference import air_moments as air
+from tunnel_reference import laws_outside as r
 from tunnel_reference import moments as m
-from tunnel_reference import outside_readings as r
-from tunnel_reference.binding import moving, reading
-from tunnel_reference.catalogue import Draw, Extra, Form, Group
+from tunnel_reference.catalogue import Draw, Extra, Form, Group, moving, reading
 from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.integrator import Phase
 from tunnel_reference.readings import Order
-from tunnel_reference.terms import Phase
 
 UNKNOWN = "unknown"
 C, R = Group.COMMON, Group.RARE

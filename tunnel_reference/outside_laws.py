@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunnel_reference import law_moments as m
-from tunnel_reference.binding import moving, reading
-from tunnel_reference.catalogue import Form, Group
+from tunnel_reference import laws_outside as m
+from tunnel_reference.catalogue import Form, Group, moving, reading
 from tunnel_reference.conditions import Conditions
+from tunnel_reference.integrator import Phase
 from tunnel_reference.outside import UNKNOWN
 from tunnel_reference.readings import Order
-from tunnel_reference.terms import Phase
 
 C = Group.COMMON
 _BOTH = (-1, 1)

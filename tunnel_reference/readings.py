@@ -13,7 +13,7 @@ from enum import IntEnum
 import numpy as np
 
 from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.terms import Motion
+from tunnel_reference.integrator import Motion
 
 
 class Order(IntEnum):

@@ -25,7 +25,7 @@ class Track:
     Args:
         count: number of campaigns.
         kinds: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
-        certain: circumstances of every campaign, of `tunnel_reference.circumstances.CIRCUMSTANCES`.
+        certain: circumstances of every campaign, of `tunnel_reference.draw.CIRCUMSTANCES`.
         first: families of which one acts in every campaign, in turn; empty: all.
         about: what it is, in a few words.
     """

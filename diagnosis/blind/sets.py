@@ -17,8 +17,7 @@ from typing import Any
 from diagnosis._diagnose import diagnose, vocabulary
 from tunnel_reference.draw import DEFAULT_SHARES, Mixture, redraw
 from tunnel_reference.make import as_campaign, draw_set, simulate_set, truth_of
-from tunnel_reference.separable import ATTEMPTS
-from tunnel_reference.severity import Simulated
+from tunnel_reference.severity import ATTEMPTS, Simulated
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.registry import answering_with

@@ -7,9 +7,9 @@ import pytest
 
 from tests.reference.effect_cases import VOCABULARY
 from tests.reference.rigs import rig
+from tunnel_reference.air_moments import turbulence
 from tunnel_reference.catalogue import Group
 from tunnel_reference.draw import KINDS, NUMBERS, CampaignDraw, EffectDraw, Mixture, draw_campaign
-from tunnel_reference.forcings import turbulence
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
 from tunnel_reference.nominal_fit import fit_nominal
 from tunnel_reference.outside import OUTSIDE_FORMS

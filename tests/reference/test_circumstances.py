@@ -9,13 +9,27 @@ import pytest
 
 from tests.reference.rigs import rig
 from tunnel_reference import make
-from tunnel_reference.circumstances import CIRCUMSTANCES, draw_circumstances
-from tunnel_reference.draw import BEYOND, CampaignDraw, EffectDraw, Mixture, draw_campaign, redraw
+from tunnel_reference.draw import (
+    BEYOND,
+    CIRCUMSTANCES,
+    CampaignDraw,
+    EffectDraw,
+    Mixture,
+    draw_campaign,
+    draw_circumstances,
+    redraw,
+)
 from tunnel_reference.forms import forms_of
+from tunnel_reference.integrator import Motion
 from tunnel_reference.readings import read_motion
-from tunnel_reference.separable import _separable, own_excesses
-from tunnel_reference.severity import _excess, read_and_fit, simulate_motions, size_effects
-from tunnel_reference.terms import Motion
+from tunnel_reference.severity import (
+    _excess,
+    _separable,
+    own_excesses,
+    read_and_fit,
+    simulate_motions,
+    size_effects,
+)
 
 RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
 

@@ -10,8 +10,7 @@ from tests.reference.rigs import rig
 from tunnel_reference import air_moments as air
 from tunnel_reference import moments as m
 from tunnel_reference.conditions import REFERENCE_LENGTH, Rod
-from tunnel_reference.integrator import integrate
-from tunnel_reference.terms import Phase, Term
+from tunnel_reference.integrator import Phase, Term, integrate
 
 
 def closed_form(c, run):

@@ -22,8 +22,7 @@ from identification import identify
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_reference import moments
 from tunnel_reference.conditions import Conditions
-from tunnel_reference.integrator import integrate
-from tunnel_reference.terms import Phase, Term
+from tunnel_reference.integrator import Phase, Term, integrate
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record

@@ -17,7 +17,7 @@ from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.noise.scattered_and_driven import scattered_variance
 from diagnosis.noise.sensor_noise import campaign_noise
 from tests.reference.free_decays import AREA, LENGTH, Setting, Truth, angle_of
-from tunnel_sim.effects.dropped_samples import DroppedSamples
+from tunnel_sim.effects.sensor import DroppedSamples
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 

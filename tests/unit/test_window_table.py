@@ -12,9 +12,8 @@ from docs.studies.window_table import Columns, read_table, rig_state, simulate_w
 from identification.datasets import WindowRow, paper_windows
 from tunnel_lab.paper.networks import infer_springs
 from tunnel_sim.effects import effect_from
-from tunnel_sim.effects.coulomb_friction import CoulombFriction
-from tunnel_sim.effects.cubic_stiffness import CubicStiffness
-from tunnel_sim.effects.quadratic_damping import QuadraticDamping
+from tunnel_sim.effects.damping import CoulombFriction, QuadraticDamping
+from tunnel_sim.effects.stiffness import CubicStiffness
 from tunnel_sim.vocabulary.errors import TunnelError
 
 OMEGA, ZETA, COUNT = 12.6, 0.006, 8

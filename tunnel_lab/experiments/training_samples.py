@@ -16,16 +16,14 @@ from safetensors.numpy import load_file, save
 from identification.campaign.derivatives import build_design
 from identification.neural.posterior.demodulated import Demodulated, demodulate
 from identification.neural.posterior.features import Features, campaign_features, record_features
-from tunnel_reference.catalogue import Form, Group
+from tunnel_reference.catalogue import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD, Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS
-from tunnel_reference.integrator import integrate
-from tunnel_reference.linear_families import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD
+from tunnel_reference.integrator import Motion, Term, integrate
 from tunnel_reference.make import as_campaign
 from tunnel_reference.readings import ReadingTerm, read_motion
 from tunnel_reference.severity import Simulated, bind_effects, read_and_fit
-from tunnel_reference.terms import Motion, Term
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array, Record

@@ -1,0 +1,435 @@
+"""Effects of the sensor and its logger, and a second oscillation in the reading."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tunnel_sim.effects.base import NEAR_MOTION, Drawn, Effect
+from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
+from tunnel_sim.physics.forward import backlash
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.plan import SensorModel
+from tunnel_sim.vocabulary.record import Array
+
+_REFERENCE = 0.2  # rad: angle at which every exponent gives the same error
+
+
+@dataclass(frozen=True)
+class SensorNonlinearity(Effect):
+    """A sensor whose gain changes with the angle.
+
+    Args:
+        coefficient: cubic coefficient, 1/rad2.
+        exponent: power of the angle in the error (unchanged at 0.2 rad), dimensionless; 3 in the textbook form.
+        quadratic: coefficient of an additional quadratic error, 1/rad; 0 in the textbook form.
+    """
+
+    name = "sensor_nonlinearity"
+    place = 16
+    channel = "sensor"
+    condition = "always"
+    advice = "Calibrate the sensor over the whole swing"
+    equation = "y = β + s β³; general form: |β|^p sgn β for β³, plus q β²"
+    signature = (
+        "A third harmonic of s A³/4; the frequency is unchanged, and the decay looks faster by the relative "
+        "amount (3/2) s A² for every spring and wind speed."
+    )
+    references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.2,)
+
+    coefficient: float = parameter(
+        "s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1e6, upper=1e6, fit_lower=-1.0, fit_upper=1.0
+    )
+
+    exponent: float = exponent("p", "power of the angle in the error (unchanged at 0.2 rad)", 3.0)
+
+    quadratic: float = parameter(
+        "q",
+        "1/rad",
+        "coefficient of an additional quadratic error",
+        scale=0.02,
+        lower=-1e6,
+        upper=1e6,
+        fit_lower=-1.0,
+        fit_upper=1.0,
+        form=True,
+    )
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """First a cubic error, then one that is mostly quadratic."""
+        scale = {info.name: info.scale for info in cls.parameters()}
+        mostly_square = {"coefficient": 0.01 * scale["coefficient"], "quadratic": scale["quadratic"]}
+        return [*super().trials(campaign), Trial(mostly_square, "quadratic")]
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Apply the nonlinear characteristic."""
+        del time_s, stated, drawn
+        if self.is_null:
+            return angle
+        if self.exponent == 3.0:
+            cubed = angle**3
+        else:
+            cubed = np.sign(angle) * _REFERENCE**3 * (np.abs(angle) / _REFERENCE) ** self.exponent
+        shown = angle + self.coefficient * cubed
+        return shown if self.quadratic == 0.0 else shown + self.quadratic * angle**2
+
+
+@dataclass(frozen=True)
+class SensorHysteresis(Effect):
+    """Backlash between rod and sensor.
+
+    Args:
+        half_width: half width of the play, rad.
+        roundness: relative difference k of two plays, (1 ± k) times as wide, whose mean is read, dimensionless;
+            0 in the textbook form.
+    """
+
+    name = "sensor_hysteresis"
+    place = 18
+    channel = "sensor"
+    condition = "always"
+    advice = "Take up the backlash between rod and sensor"
+    equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
+    signature = (
+        "The reading stands still for a moment at each reversal of the motion and lags by w in between."
+    )
+    references = (
+        "Visintin, Differential Models of Hysteresis, Springer 1994, doi 10.1007/978-3-662-11557-2",
+    )
+    example = (0.003,)
+    autonomous = False
+    remembers = True
+    ahead_of_sensor = True
+
+    half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
+    roundness: float = parameter(
+        "k",
+        "1",
+        "relative difference of two plays whose mean is read",
+        scale=0.3,
+        lower=0.0,
+        upper=1.0,
+        form=True,
+    )
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Follow when pushed; the release has just pushed the reading outward."""
+        del time_s, stated, drawn
+        if self.is_null:
+            return angle
+        widths = {self.half_width * (1.0 + self.roundness), self.half_width * (1.0 - self.roundness)}
+        plays = [backlash(angle, w, float(angle[0] - np.sign(angle[0]) * w)) for w in sorted(widths)]
+        return np.asarray(sum(plays) / len(plays), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class SensorDrift(Effect):
+    """A sensor zero that drifts during the run.
+
+    Args:
+        drift: drift over the run, rad.
+        settling: length of the run over the drift's time constant, dimensionless; 0: linear (textbook form).
+    """
+
+    name = "sensor_drift"
+    place = 19
+    channel = "sensor"
+    condition = "always"
+    advice = "Let the sensor warm up, and record its zero before and after each run"
+    equation = f"y = β + d t/T over a run of length T; general form: {EQUATION} for t/T"
+    signature = (
+        "The centre of the oscillation moves with time, in the same way for every wind speed and spring."
+    )
+    references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.01,)
+    autonomous = False
+
+    drift: float = parameter("d", "rad", "drift over the run", scale=0.002, lower=-1.0, upper=1.0)
+    settling: float = settling()
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Add the drift."""
+        del drawn
+        if self.is_null:
+            return angle
+        return angle + self.drift * ramp(time_s / stated.duration, self.settling)
+
+
+_FAR = 2.0  # rad: the other limit, where only one side clips
+
+
+@dataclass(frozen=True)
+class SensorClipping(Effect):
+    """A reading that saturates.
+
+    Args:
+        limit: greatest possible reading, rad; 0: no limit.
+        centre: middle of the possible readings, rad; 0 in the textbook form.
+        knee: share of the limit over which the reading saturates gradually, dimensionless; 0 in the textbook form.
+    """
+
+    name = "sensor_clipping"
+    place = 21
+    channel = "sensor"
+    condition = "always"
+    advice = "Widen the sensor's range, or release from smaller angles"
+    equation = "|y| ≤ L; general form: |y − c| ≤ L, approached exponentially within k L of the limit"
+    signature = "The peaks of the largest swings are flat; all other readings are unchanged."
+    references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.2,)
+    tries = 2
+
+    limit: float = parameter(
+        "L", "rad", "greatest possible reading (0: no limit)", scale=0.3, lower=0.0, upper=10.0
+    )
+    centre: float = parameter(
+        "c", "rad", "middle of the possible readings", scale=0.05, lower=-5.0, upper=5.0, form=True
+    )
+    knee: float = parameter(
+        "k",
+        "1",
+        "share of the limit over which the reading saturates gradually",
+        scale=0.05,
+        lower=0.0,
+        upper=0.9,
+        form=True,
+    )
+
+    @classmethod
+    def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
+        """Limits slightly below the greatest reading: first on both sides, then on one side only."""
+        limits = [campaign.greatest_reading * share for share in (0.999, 0.99, 0.97, 0.93, 0.87, 0.8)]
+        both = [Trial({"limit": limit}, None) for limit in limits]
+        one = [
+            Trial({"limit": _FAR, "centre": side * (_FAR - limit)}, None)
+            for limit in limits
+            for side in (-1.0, 1.0)
+        ]
+        return [*both, *one]
+
+    def on_reading(self, reading: Array) -> Array:
+        """Clip at the limit, or saturate gradually."""
+        if self.is_null:
+            return reading
+        if self.knee == 0.0:
+            return np.clip(reading, self.centre - self.limit, self.centre + self.limit)
+        room = self.knee * self.limit
+        size = np.abs(reading - self.centre)
+        linear = self.limit - room
+        over = np.maximum(size - linear, 0.0)
+        limited = np.minimum(size, linear) - room * np.expm1(-over / room)
+        return self.centre + np.copysign(limited, reading - self.centre)
+
+
+@dataclass(frozen=True)
+class SensorQuantisation(Effect):
+    """A resolution that is coarser than stated.
+
+    Args:
+        step: true step of the reading, rad.
+    """
+
+    name = "sensor_quantisation"
+    place = 17
+    channel = "sensor"
+    condition = "always"
+    advice = "State the sensor's real resolution, or use a finer one"
+    equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
+    signature = (
+        "The readings are multiples of a coarser step than stated; their error is a sawtooth of the angle."
+    )
+    references = ("Widrow & Kollár, Quantization Noise, CUP 2008, doi 10.1017/CBO9780511754661",)
+    example = (0.004,)
+    fitted = False
+    lattice = True
+
+    step: float = parameter("q", "rad", "true step of the reading", scale=0.002, lower=0.0, upper=1.0)
+
+    def on_sensor(self, sensor: SensorModel) -> SensorModel:
+        """Use the true step where it is coarser than the stated one."""
+        return dataclasses.replace(sensor, resolution=max(self.step, sensor.resolution))
+
+
+_MARGIN = 0.1  # s of motion beyond what is read: samples need not divide the time lost
+
+
+@dataclass(frozen=True)
+class DroppedSamples(Effect):
+    """Samples missing without a gap in the time stamps.
+
+    Args:
+        lost_time: time that the missing samples would have taken, s; an equal part at each instant.
+    """
+
+    name = "dropped_samples"
+    place = 25
+    channel = "calibration"
+    condition = "always"
+    advice = "Replace the logger, or state the time of every sample"
+    equation = (
+        "y(t) = β(t) until the instant and β(t + τ) after it, shared out over one sample interval; "
+        "the instant is drawn for every run. With n instants in a run, τ/n is lost at each"
+    )
+    signature = (
+        "The phase jumps at an instant of a run; before and after it frequency and damping are the same."
+    )
+    references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.02,)
+    autonomous = False
+    skips = True
+
+    lost_time: float = parameter(
+        "τ", "s", "time that the missing samples would have taken", scale=0.005, lower=0.0, upper=1.0
+    )
+
+    def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
+        """The instant, as a share of the run, well inside it."""
+        del stated
+        return float(rng.uniform(0.1, 0.9))
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Let the motion go on for as long as it is read."""
+        del stated
+        if self.is_null:
+            return run
+        self._instants(drawn)  # an error here, before the motion is computed
+        return replace(run, duration=run.duration + self.lost_time + _MARGIN)
+
+    def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """The true time runs ahead of the stamps from every instant on."""
+        if self.is_null:
+            return time_s
+        instants = self._instants(drawn) * stated.duration
+        interval = time_s[1] - time_s[0]
+        after = sum(np.clip((time_s - instant) / interval + 0.5, 0.0, 1.0) for instant in instants)
+        return np.asarray(time_s + self.lost_time * (after / instants.size), np.float64)
+
+    def _instants(self, drawn: Drawn) -> Array:
+        """Shares of the run, shape (n,)."""
+        return drawn if isinstance(drawn, np.ndarray) else np.array([self.drawn_number(drawn)])
+
+
+@dataclass(frozen=True)
+class MainsHum(Effect):
+    """Mains hum in the reading.
+
+    Args:
+        amplitude: amplitude of the hum, rad.
+        frequency: mains frequency, Hz.
+    """
+
+    name = "mains_hum"
+    place = 20
+    channel = "sensor"
+    condition = "always"
+    advice = "Shield the sensor's cable, or ground it at one end only"
+    equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
+    signature = "A spectral line at the mains frequency in every run, independent of the motion."
+    references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
+    example = (0.002, 60.0)
+    autonomous = False
+    fitted = False
+    line = "mains"
+
+    amplitude: float = parameter("a", "rad", "amplitude of the hum", scale=0.0005, lower=0.0, upper=1.0)
+    frequency: float = parameter(
+        "f", "Hz", "mains frequency", scale=0.05, lower=45.0, upper=65.0, default=50.0
+    )
+
+    def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
+        """Add the hum at the phase drawn for the run."""
+        del stated
+        if self.is_null:
+            return angle
+        phase = self.drawn_number(drawn)
+        return angle + self.amplitude * np.sin(2.0 * np.pi * self.frequency * time_s + phase)
+
+
+_LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
+_DECAYS = 1.01  # a fit that ends at the least damping has found a line that something drives
+_SLOWEST = 0.1  # of the motion's frequency: judgement; what is slower is a drift in a record of ten cycles
+_REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
+
+
+@dataclass(frozen=True)
+class SecondMode(Effect):
+    """A second oscillation beside the first, as of a bending sting or a coupled freedom.
+
+    Args:
+        amplitude: amplitude at the release, rad.
+        frequency: undamped angular frequency, rad/s.
+        damping_ratio: share of critical damping, dimensionless.
+        exponent: power of the release angle that the amplitude follows, dimensionless; 0 is the textbook's.
+    """
+
+    name = "second_mode"
+    place = 24
+    channel = "sensor"
+    condition = "always"
+    advice = "Stiffen what oscillates beside the body, or model both modes"
+    equation = (
+        "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.35 rad)^n for a, "
+        "β0 the release angle"
+    )
+    signature = "A decaying line from the release on, at one frequency whatever the spring and the wind."
+    references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
+    example = (0.005, 60.0, 0.01)
+    autonomous = False
+    line = "ringing"
+    ahead_of_sensor = True
+
+    amplitude: float = parameter(
+        "a", "rad", "amplitude at the release", scale=0.002, lower=0.0, upper=1.0, default=0.0
+    )
+    frequency: float = parameter(
+        "ω2", "rad/s", "undamped angular frequency", scale=50.0, lower=0.01, upper=1e5, default=50.0
+    )
+    damping_ratio: float = parameter(
+        "ζ2",
+        "1",
+        "share of critical damping",
+        scale=0.01,
+        lower=0.0,
+        upper=0.9,
+        default=0.01,
+        fit_lower=_LEAST_DAMPING,
+        fit_upper=0.2,
+    )
+    exponent: float = parameter(
+        "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
+    )
+
+    def plausible(self, omega: float) -> bool:
+        """Whether it is an oscillation of its own: it decays, is not the motion's, and not as slow as a drift."""
+        decays = self.damping_ratio > _DECAYS * _LEAST_DAMPING
+        return (
+            decays and self.frequency > _SLOWEST * omega and abs(self.frequency / omega - 1.0) > NEAR_MOTION
+        )
+
+    def oscillation(
+        self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
+    ) -> Array | None:
+        """The second oscillation, at a phase of the run's own."""
+        if self.is_null:
+            return None
+        phase = self.drawn_number(drawn)
+        size = self.amplitude * (abs(stated.release_angle) / _REFERENCE_RELEASE) ** self.exponent
+        since = np.maximum(time_s, 0.0)  # the body is held before the release
+        turn = self.frequency * since
+        # a derivative multiplies exp(s t) by s, s = ω2 (i − ζ2)
+        factor, lead = (
+            self.frequency * np.hypot(1.0, self.damping_ratio),
+            np.arctan2(1.0, -self.damping_ratio),
+        )
+        wave = (
+            size
+            * factor**derivative
+            * np.exp(-self.damping_ratio * turn)
+            * np.cos(turn + phase + derivative * lead)
+        )
+        return np.asarray(wave if derivative == 0 else np.where(time_s >= 0.0, wave, 0.0), np.float64)
