@@ -14,8 +14,8 @@ from diagnosis.noise.colour import _steady, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.policy import COLOUR_FALSE_ALARM_RATE
+from tests.unit.diagnosis.test_diagnosis_process_noise import buffeted
 from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
-from tests.unit.test_diagnosis_process_noise import buffeted
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
 

@@ -24,7 +24,7 @@ from tunnel_lab.envs.policies import (
 )
 from tunnel_sim.vocabulary.errors import TunnelError
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def rows(path, policy):

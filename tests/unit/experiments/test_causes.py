@@ -25,7 +25,7 @@ from tests.reference.rigs import rig
 from tunnel_reference import draw
 from tunnel_sim.vocabulary.errors import TunnelError
 
-EXAMPLES = Path(__file__).parents[2] / "benchmarks/causes/examples"
+EXAMPLES = Path(__file__).parents[3] / "benchmarks/causes/examples"
 COUNTS = {"none": 1, "one": 2}
 
 

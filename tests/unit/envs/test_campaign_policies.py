@@ -23,7 +23,7 @@ from tunnel_lab.envs import policies
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.policies import best_rivals, expected_gain, greedy, run_campaign, scripted, separating
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 SMALL = {
     "springs": (3, 5),
     "wind_speeds": (20.0, 0.0),

@@ -14,8 +14,8 @@ from diagnosis.blind import answer_set, answers_folder, make_blind, score_set
 from diagnosis.blind import sets as answer
 from identification.statistics import Proportion
 from tests.reference.rigs import rig
+from tests.unit.diagnosis.test_blind_score import document
 from tests.unit.gone_reader import unheard
-from tests.unit.test_blind_score import document
 from tunnel_lab.cli import main
 from tunnel_reference import draw
 from tunnel_reference.draw import Mixture

@@ -9,7 +9,7 @@ from diagnosis.blind.calibration import smooth_calibration
 from diagnosis.blind.cases import case, found_by_group, inclusions
 from diagnosis.blind.score import Score
 from identification.statistics import Proportion
-from tests.unit.test_blind_score import document
+from tests.unit.diagnosis.test_blind_score import document
 from tunnel_lab.report import blind
 from tunnel_lab.report.blind import calibration_figure, confusion_figure
 
