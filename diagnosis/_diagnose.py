@@ -15,15 +15,11 @@ from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cyc
 from diagnosis.answer.units import in_own_units
 from diagnosis.diagnosable import (
     NOT_SOUGHT,
-    SLIDE,
-    comparable_runs,
-    diagnosable,
+    Chosen,
+    choose,
     gain_words,
-    kinds_for,
     reach,
-    refuse_hopeless,
     refuse_undiagnosable,
-    refuse_without_resonance,
     with_law,
 )
 from diagnosis.noise.gap import noise_remarks
@@ -105,45 +101,48 @@ def read_model(
 def _diagnose(
     campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None, model: JointModel | None
 ) -> Diagnosis:
-    found = diagnosable(campaign)
-    if not found.limit_cycles:
-        refuse_hopeless(found.campaign)
-        refuse_without_resonance(found.campaign)
-    campaign, left_out = comparable_runs(found.campaign)
-    if campaign.sensor.derivative:
-        # Their sizes are those of angles, and their ranges too; a mode moves the body.
-        kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
-        said = f"A second mode is the only effect of the sensor that is tried on {campaign.sensor.quantity}s."
-        left_out = (*left_out, said)
-    kinds, said_of_drive = kinds_for(campaign, kinds)
-    left_out = (*left_out, *said_of_drive)
-    if campaign.law is not None and campaign.law.slide:
-        left_out = (*left_out, SLIDE)
-    try:
-        known = () if found.limit_cycles else kinds
-        study = investigate(campaign, known, progress)
-    except TunnelError as error:
-        if not found.limit_cycles:
-            raise
-        raise refused_limit_cycles(found.remarks) from error
-    if progress is not None:
-        progress("how far it closes")
-    where, maps = localise(study)
-    remarks = (*found.remarks, *noise_remarks(study.noise, study.trend))
-    patched, unpatched = (None, ()) if model is None else _patched(study, model)
-    left_out = (*left_out, *gain_words(campaign, study.chosen))
-    assembled = assemble(study, where, maps, (*left_out, *unpatched), patched, known)
-    sized = replace(assembled, remarks=remarks, sizes=cause_sizes(study) if study.named else ())
-    sized = replace(sized, data=found.campaign)
-    answer = in_own_units(sized, study.similarity)
-    if found.limit_cycles:
-        return limit_cycle_answer(answer, found.remarks)
-    if said_of_drive:  # its laws are sought along free decays
+    say = progress or (lambda _: None)
+    chosen = choose(campaign, kinds)
+    study = _studied(chosen, progress)  # noise, nominal fit, where, search
+    say("how far it closes")
+    answer = _answered(study, chosen, model)
+    if chosen.limit_cycles:
+        return limit_cycle_answer(answer, chosen.remarks)
+    if chosen.campaign.driven:  # the remainder's laws are sought along free decays
         answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
     else:
-        if progress is not None:
-            progress("what no effect explains")
+        say("what no effect explains")
         answer = _with_closable(answer, study)
+    return _with_second_modes(answer, chosen.campaign)
+
+
+def _studied(chosen: Chosen, progress: Progress | None) -> Study:
+    """The study of the chosen runs; limit cycles that have no nominal fit are refused as what they are."""
+    try:
+        return investigate(chosen.campaign, chosen.kinds, progress)
+    except TunnelError as error:
+        if not chosen.limit_cycles:
+            raise
+        raise refused_limit_cycles(chosen.remarks) from error
+
+
+def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnosis:
+    """The answer in the units of the measured campaign, without what no effect explains."""
+    where, maps = localise(study)
+    patched, unpatched = (None, ()) if model is None else _patched(study, model)
+    left_out = (*chosen.left_out, *gain_words(chosen.campaign, study.chosen), *unpatched)
+    assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
+    sized = replace(
+        assembled,
+        remarks=(*chosen.remarks, *noise_remarks(study.noise, study.trend)),
+        sizes=cause_sizes(study) if study.named else (),
+        data=chosen.examined,
+    )
+    return in_own_units(sized, study.similarity)
+
+
+def _with_second_modes(answer: Diagnosis, campaign: Campaign) -> Diagnosis:
+    """The answer, whose verdict begins with a second mode where ``unknown`` is most probable and a mode is seen."""
     # below one half a set of effects comes first, though each of them may be less probable than none
     odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
     likeliest = max(odds, key=odds.__getitem__, default="")

@@ -113,6 +113,54 @@ def diagnosable(campaign: Campaign) -> Diagnosable:
     return Diagnosable(whole, examined.remarks, limit_cycles=True)
 
 
+@dataclass(frozen=True)
+class Chosen:
+    """What is diagnosed.
+
+    Args:
+        examined: all runs that show the kind of motion diagnosed.
+        campaign: those of them that one model can be fitted to.
+        kinds: the effects to answer with; none where all runs are in limit cycles.
+        remarks: of the examination.
+        left_out: sentences that say which runs and effects were left out, and why.
+        limit_cycles: whether all runs are in limit cycles.
+    """
+
+    examined: Campaign
+    campaign: Campaign
+    kinds: tuple[type[Effect], ...]
+    remarks: tuple[Remark, ...]
+    left_out: tuple[str, ...]
+    limit_cycles: bool
+
+
+def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
+    """Choose the runs of a campaign that are diagnosed together, and the effects to answer with.
+
+    Args:
+        kinds: the effects known.
+
+    Raises:
+        TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
+    """
+    found = diagnosable(campaign)
+    if not found.limit_cycles:
+        refuse_hopeless(found.campaign)
+        refuse_without_resonance(found.campaign)
+    compared, left_out = comparable_runs(found.campaign)
+    if compared.sensor.derivative:
+        # Their sizes are those of angles, and their ranges too; a mode moves the body.
+        kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
+        said = f"A second mode is the only effect of the sensor that is tried on {compared.sensor.quantity}s."
+        left_out = (*left_out, said)
+    kinds, said_of_drive = kinds_for(compared, kinds)
+    left_out = (*left_out, *said_of_drive)
+    if compared.law is not None and compared.law.slide:
+        left_out = (*left_out, SLIDE)
+    known = () if found.limit_cycles else kinds
+    return Chosen(found.campaign, compared, known, found.remarks, left_out, found.limit_cycles)
+
+
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     """Leave out the runs that cannot be fitted together with the others.
 
