@@ -30,7 +30,9 @@ class Conditions(StrictModel):
     """Conditions of runs, and sizes of the rig, as in ``campaign.toml``."""
 
     wind_speed: NotNegative | None = Field(default=None, description="a number in m/s, 0 for wind-off")
-    spring_stiffness: Positive | None = Field(default=None, description="a positive number in N m/rad")
+    spring_stiffness: NotNegative | None = Field(
+        default=None, description="a positive number in N m/rad, or 0 for a driven body without a spring"
+    )
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
     release_angle: float | None = Field(default=None, description="a number in rad")
     yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
