@@ -30,9 +30,7 @@ class Conditions(StrictModel):
     """Conditions of runs, and sizes of the rig, as in ``campaign.toml``."""
 
     wind_speed: NotNegative | None = Field(default=None, description="a number in m/s, 0 for wind-off")
-    spring_stiffness: NotNegative | None = Field(
-        default=None, description="a positive number in N m/rad, or 0 for a driven body without a spring"
-    )
+    spring_stiffness: Positive | None = Field(default=None, description="a positive number in N m/rad")
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
     release_angle: float | None = Field(default=None, description="a number in rad")
     yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")

@@ -50,7 +50,6 @@ from tunnel_sim.vocabulary.drive import (
     Hold,
     InputColumn,
     checked_drive,
-    without_spring_needs_drive,
 )
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
@@ -225,7 +224,8 @@ def _part(
     stated = raw.stated | measured | raw.named | in_table | given
     sizes = {key: stated.pop(key) for key in RIG_KEYS if key in stated}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
-    validate(Conditions, stated | sizes, raw.source)
+    loose = raw.input is not None and stated.get("spring_stiffness") == 0.0  # a driven body without a spring
+    validate(Conditions, {**stated, **sizes, **({"spring_stiffness": None} if loose else {})}, raw.source)
     plausible_values(stated | sizes, where)
     if "wind_speed" not in stated:
         if _WIND_ON.search(f"{raw.source.stem} {name}"):
@@ -245,7 +245,6 @@ def _part(
         )
     drive = None if raw.input is None else _drive(raw.input[0], raw.input[1][kept], raw.input_facts, said)
     try:
-        without_spring_needs_drive(stated.get("spring_stiffness"), drive, where)
         if drive is None:
             record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
         else:
