@@ -79,7 +79,7 @@ DRIVEN_ESTIMATORS = ("output_error",)
 
 
 def refuse_driven(campaign: Campaign, name: str) -> None:
-    """Refuse driven runs that an estimator would take for free decays, and bodies without a spring.
+    """Refuse driven runs that an estimator would take for free decays.
 
     Args:
         name: of the estimator.
@@ -104,9 +104,9 @@ def refuse_driven(campaign: Campaign, name: str) -> None:
                 where=where,
                 remedy="record the angle",
             )
-        if run.spring_stiffness == 0.0:
+        if run.spring_stiffness == 0.0 and not run.drive.on_body:
             raise TunnelError(
-                "a body without a spring is not identified yet",
+                "the motion of the root acts through the spring, and spring_stiffness = 0 states none",
                 where=where,
-                remedy="leave the run out",
+                remedy="state the spring's stiffness, or name the input moment_nm or drive",
             )

@@ -134,11 +134,11 @@ class RunEstimate:
     Args:
         id: the run's.
         statuses: from the gravest; only OK where there are no others.
-        omega_n: natural angular frequency, rad/s.
-        zeta: damping ratio.
-        initial_angle: at the first sample, from the sensor's zero, rad.
+        omega_n: natural angular frequency, rad/s; None of a body without a spring.
+        zeta: damping ratio; None of a body without a spring.
+        initial_angle: at the first sample, from the sensor's zero, rad; without a spring as the sensor reads it.
         initial_rate: at the first sample, rad/s.
-        sensor_zero: from this run alone, rad.
+        sensor_zero: from this run alone, rad; None of a body without a spring.
         aerodynamic_stiffness: Ka, N m/rad, from the whole campaign; wind-on runs only.
         aerodynamic_damping: Ca, N m s/rad, from the whole campaign; wind-on runs only.
         process_noise: spectral intensity of a random moment over the inertia, rad²/s³; None where the method
@@ -166,6 +166,11 @@ class RunEstimate:
     def status(self) -> Status:
         """The gravest status."""
         return self.statuses[0]
+
+    @property
+    def identified(self) -> bool:
+        """Whether there is a result: ωn, or the fitted motion of a body without a spring."""
+        return self.omega_n is not None or self.initial_angle is not None
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; None where there is no value."""

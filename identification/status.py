@@ -16,10 +16,17 @@ if TYPE_CHECKING:
 class Status(Enum):
     """The outcome of an estimate; its text states the remedy. Listed from the gravest to the least."""
 
-    NO_RUN_IDENTIFIED = "no run could be identified: check that the records hold a free decay in radians"
-    NOT_CONVERGED = "the fit did not converge: cut the record to the free decay, or lengthen it"
+    NO_RUN_IDENTIFIED = (
+        "no run could be identified: check that the records hold a free decay, or the response to their input, in "
+        "radians"
+    )
+    NOT_CONVERGED = (
+        "the fit did not converge: cut a free record to its decay, check the input of a driven one, or lengthen "
+        "the record"
+    )
     NO_OSCILLATION = (
-        "no decaying motion above the noise: check the sensor, or start the record at the release"
+        "no decaying motion above the noise: check the sensor, start a free record at its release, or check the "
+        "input of a driven one"
     )
     NOT_DETERMINED = "the record does not determine frequency and damping: lengthen it, or sample faster"
     TOO_FEW_CYCLES = (

@@ -136,7 +136,7 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
     """Link runs of stated spring stiffness to the shared parameters.
 
     Args:
-        runs: at least one, each with its spring_stiffness.
+        runs: at least one, each with its spring_stiffness. A driven run whose moment is known determines g.
 
     Returns:
         The design; ``columns`` lacks g and n, or d and m, where the runs do not separate them.
@@ -144,6 +144,7 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
     springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
     pairs = np.array([loads(run, rig) for run in runs])
     windy = bool(np.any(pairs[:, 0] > 0.0))
+    known = any(run.input_gain for run in runs)
     columns: dict[str, int] = {}
     blocks: list[tuple[int, Array]] = []
     for row, names, fixed, load in (
@@ -152,7 +153,8 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
     ):
         block = np.column_stack((fixed, -load)) if windy else fixed[:, None]
         offset = sum(other.shape[1] for _, other in blocks)
-        if _full_rank(block):
+        by_input = [[np.abs(block).max() or 1.0, 0.0][: block.shape[1]]] if known and row == 1 else []
+        if _full_rank(np.vstack((block, *by_input))):
             columns |= {name: offset + index for index, name in enumerate(names[: block.shape[1]])}
         else:
             block = np.eye(len(runs))
@@ -282,7 +284,7 @@ def combined_estimate(
         for place, (run, item) in enumerate(zip(campaign.runs, found, strict=True))
         if item.decay is not None
         and item.covariance is not None
-        and item.estimate.omega_n is not None
+        and item.estimate.identified
         and run.spring_stiffness is not None
     ]
     statuses |= noise_statuses([run.noise for run in estimate.runs])
@@ -351,7 +353,7 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
     Returns:
         The statuses; only NO_RUN_IDENTIFIED where no run was identified.
     """
-    identified = [estimate.omega_n is not None for estimate in estimates]
+    identified = [estimate.identified for estimate in estimates]
     if not any(identified):
         return {Status.NO_RUN_IDENTIFIED}
     statuses = set()

@@ -1,4 +1,4 @@
-"""Output error: maximum likelihood of the free decay, for each run and jointly for the campaign.
+"""Output error: maximum likelihood of the motion, for each run and jointly for the campaign.
 
 The measurement is the model's output plus white Gaussian noise. Every run is fitted separately (ωn, ζ, initial
 state, zero). These fits start the joint fit, in which Izz, Cr, Cnβ, Cnr and the sensor's zero are common and
@@ -29,6 +29,7 @@ from identification.campaign.derivatives import (
 from identification.campaign.driven import driven_estimate
 from identification.estimate import Estimate, Quantity, Status, by_severity
 from identification.signal.decay_fit import DecayFit, RunFit, fit_decays
+from identification.signal.driven_fit import driven_run
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import FittedRun, identify_run, residuals_of
 from identification.statistics import (
@@ -73,16 +74,19 @@ class OutputError:
         """
         for run in campaign.runs:
             loads(run, campaign.rig)  # refuses a wind-on run without density before any work is done
-        if campaign.driven:
-            return driven_estimate(campaign, self.name)
         fitted = [
             identify_run(run, campaign.sensor, cycles_per_window=self.cycles_per_window)
+            if run.drive is None
+            else driven_run(run, campaign.sensor)
             for run in campaign.runs
         ]
         estimate = Estimate(campaign.name, self.name, tuple(item.estimate for item in fitted))
         statuses = statuses_of_runs(campaign, estimate.runs)
         if Status.NO_RUN_IDENTIFIED in statuses:
             return replace(estimate, statuses=by_severity(statuses))
+        if campaign.driven:
+            pairs = list(zip(campaign.runs, fitted, strict=True))
+            return driven_estimate(campaign, estimate, pairs, statuses)
         pairs = [
             (run, item)
             for run, item in zip(campaign.runs, fitted, strict=True)

@@ -62,7 +62,9 @@ def _dynamics(rate: float, stiffness: float) -> Array:
     return matrix
 
 
-def driven_start(time: Array, reading: Array, values: Array) -> tuple[float, float, float] | None:
+def driven_start(
+    time: Array, reading: Array, values: Array, *, sprung: bool = True
+) -> tuple[float, float, float] | None:
     """Decay rate, stiffness and gain from the spectra of input and response.
 
     The equation of motion holds line by line, with a polynomial for the ends of the record; the weights of its
@@ -73,6 +75,7 @@ def driven_start(time: Array, reading: Array, values: Array) -> tuple[float, flo
         time: of the samples, shape (n,), s.
         reading: of the response, shape (n,), rad.
         values: of the input, shape (n,).
+        sprung: whether there is a stiffness to be found; else k is 0.
 
     Returns:
         a (1/s), k (1/s²) and g (rad/s² per unit); None where the response holds no motion.
@@ -87,15 +90,17 @@ def driven_start(time: Array, reading: Array, values: Array) -> tuple[float, flo
     y, u, s = response[used], moved[used], 1j * turn
     unit = float(turn[-1])
     columns = np.column_stack([s / unit * y, y, -u, -np.ones_like(y), -s / unit])
+    sought = [0, 1, 2, 3, 4] if sprung else [0, 2, 3, 4]
     weight = np.ones(turn.size)
     found = np.zeros(5)
     for _ in range(_ROUNDS):
-        left = columns * weight[:, None]
+        left = columns[:, sought] * weight[:, None]
         right = -((s / unit) ** 2) * y * weight
         size = np.linalg.norm(left, axis=0)
         if not size.min() > 0.0:
             return None
         stacked = np.vstack([left.real, left.imag]) / size
-        found = np.linalg.lstsq(stacked, np.concatenate([right.real, right.imag]), rcond=None)[0] / size
+        solved = np.linalg.lstsq(stacked, np.concatenate([right.real, right.imag]), rcond=None)[0]
+        found[sought] = solved / size
         weight = 1.0 / np.maximum(np.abs((s / unit) ** 2 + found[0] * s / unit + found[1]), 1e-9)
     return 0.5 * float(found[0]) * unit, float(found[1]) * unit**2, float(found[2]) * unit**2

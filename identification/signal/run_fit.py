@@ -87,7 +87,7 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
     estimate = describe_run(
         run, reading, fitted, fit.zero, covariance, variance, noise=noise, windows=windows
     )
-    found = None if estimate.omega_n is None else fitted
+    found = fitted if estimate.identified else None
     return FittedRun(reading, found, noise, estimate)
 
 
@@ -125,13 +125,22 @@ def residuals_of(
         Residual(
             values=run.residual,
             block=eighth_of_a_cycle(
-                float(np.sqrt(abs(run.decay.stiffness))), float(reading.time[-1]) / (reading.time.size - 1)
+                _pace(reading, run), float(reading.time[-1] - reading.time[0]) / (reading.time.size - 1)
             ),
             unknowns=unknowns,
             peak=float(np.abs(reading.yaw - zero).max()),
         )
         for reading, run in zip(readings, runs, strict=True)
     ]
+
+
+def _pace(reading: Reading, run: RunFit) -> float:
+    """ωn, or of a body without a spring its root-mean-square rate over that of its angle, rad/s."""
+    if run.decay.stiffness != 0.0:
+        return float(np.sqrt(abs(run.decay.stiffness)))
+    motion = reading.yaw - run.residual
+    rate, angle = float(np.std(np.gradient(motion, reading.time))), float(np.std(motion))
+    return max(rate, 1e-300) / max(angle, 1e-300)
 
 
 def decay_covariance_of(fitted: RunFit) -> Array:
@@ -193,13 +202,14 @@ def describe_run(
     own = inverse(fitted.information[np.ix_(rest, rest)])
     move = own @ fitted.information[np.ix_(rest, decay)]
     deviations = np.sqrt(np.diag(own * noise_variance + move @ covariance @ move.T))
-    omega_n, zeta = modal_quantities(fitted.decay, covariance)
+    held = not run.unrestrained
+    omega_n, zeta = modal_quantities(fitted.decay, covariance) if held else (None, None)
     statuses = set()
     if noise is not None and noise.departs:
         statuses.add(Status.MODEL_DEPARTS)
     if noise is not None and noise.disagrees:
         statuses.add(Status.NOISE_DISAGREES)
-    if fitted.decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
+    if held and fitted.decay.omega_d * float(reading.time[-1]) < 2.0 * np.pi * FEW_CYCLES:
         statuses.add(Status.FEW_CYCLES)
     if run.spring_stiffness is None:
         statuses.add(Status.NO_STIFFNESS)
@@ -210,7 +220,7 @@ def describe_run(
         zeta=zeta,
         initial_angle=Quantity(fitted.angle, float(deviations[1]), "rad"),
         initial_rate=Quantity(fitted.rate, float(deviations[2]), "rad/s"),
-        sensor_zero=Quantity(zero, float(deviations[0]), "rad"),
+        sensor_zero=Quantity(zero, float(deviations[0]), "rad") if held else None,
         noise=noise,
         windows=windows,
     )

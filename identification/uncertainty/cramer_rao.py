@@ -1,7 +1,7 @@
 """The Cramér–Rao bound: the smallest standard deviations any unbiased estimator can reach.
 
-Exact Fisher information of real damped sinusoids in white Gaussian noise at given sample times, with the
-closed-form sensitivities of `damped_oscillation`. For long records of light damping it tends to
+Exact Fisher information of real damped sinusoids, and of motions under an input, in white Gaussian noise at given
+sample times, with their exact sensitivities. For long records of light damping it tends to
 
     std(ζ)/ζ = 4 (S/A) √(σ/fs),   std(f)/f = ζ · std(ζ)/ζ,
 
@@ -17,10 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.campaign.derivatives import build_design, derivatives, has_size
+from identification.campaign.driven import with_gains
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import information_at
+from identification.signal.driven_fit import normal_equations
 from identification.signal.free_decay import Decay
-from identification.statistics import eliminate, embed, inverse
+from identification.statistics import eliminate, inverse
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -108,6 +110,8 @@ def damped_sinusoid_bound(
 class CampaignBound:
     """The bound of a campaign's common parameters, every run's initial state and the zero unknown.
 
+    The zero is common to the runs, unless one of them has no spring.
+
     Args:
         parameters: names, as in `Estimate.parameters`.
         covariance: smallest covariance, shape (p, p), in the products of their units.
@@ -139,54 +143,51 @@ def campaign_bound(
     yaw_inertia: float,
     mechanical_damping: float,
     noise_std: float,
+    drive_gain: float = 1.0,
     initial_states: Sequence[tuple[float, float]] | None = None,
 ) -> CampaignBound:
-    """The bound of Cnβ, Cnr, Izz and Cr together.
+    """The bound of Cnβ, Cnr, Izz and Cr together, of free and driven runs; an input is exact between its samples.
 
     Args:
-        campaign: conditions and sample times; the readings themselves are not used.
+        campaign: conditions, inputs and sample times; the readings themselves are not used.
         cn_beta: true Cnβ, 1/rad.
         cn_r: true Cnr, 1/rad.
         yaw_inertia: true Izz, kg m².
         mechanical_damping: true Cr, N m s/rad.
         noise_std: of the reading, quantisation included (add resolution²/12 to the variance), rad.
+        drive_gain: true gain of inputs that state none, unknown to the estimator, N m per unit.
         initial_states: angle [rad] and rate [rad/s] at each run's first sample; where None, the runs' nominal
-            release angles at rest.
+            release angles at rest, and 0 of a driven run.
 
     Raises:
         TunnelError: when a run states no spring stiffness, the rig states no size although the wind is on, or a
             run has neither an initial state nor a release angle.
     """
-    if any(run.spring_stiffness is None for run in campaign.runs):
+    runs = campaign.runs
+    if any(run.spring_stiffness is None for run in runs):
         raise TunnelError(
             "run without spring_stiffness", where=campaign.name, remedy="state it for every run"
         )
-    if any(run.wind_on for run in campaign.runs) and not has_size(campaign.rig):
+    if any(run.wind_on for run in runs) and not has_size(campaign.rig):
         remedy = "state frontal_area and reference_length"
         raise TunnelError("rig without size", where=campaign.name, remedy=remedy)
-    design = build_design(campaign.runs, campaign.rig)
+    design = build_design(runs, campaign.rig)
+    linked = with_gains(design, runs)
+    truths = []
+    for run, load, damping in zip(runs, design.stiffness_loads, design.damping_loads, strict=True):
+        stated = drive_gain if run.input_gain is None else run.input_gain
+        rate = 0.5 * (mechanical_damping - damping * cn_r)
+        truths += [rate, (run.spring_stiffness or 0.0) - load * cn_beta, stated if run.drive else 0.0]
+    parameters: Array = np.linalg.lstsq(
+        np.vstack(linked.links), np.array(truths, dtype=np.float64) / yaw_inertia, rcond=None
+    )[0].astype(np.float64)
     states = initial_states if initial_states is not None else _released(campaign)
-    normal = np.zeros((design.size + 1, design.size + 1))
-    for run, link, (angle, rate), loads in zip(
-        campaign.runs,
-        design.links,
-        states,
-        zip(design.stiffness_loads, design.damping_loads, strict=True),
-        strict=True,
-    ):
-        stiffness = float(run.spring_stiffness or 0.0) - float(loads[0]) * cn_beta
-        damping = mechanical_damping - float(loads[1]) * cn_r
-        decay = Decay(0.5 * damping / yaw_inertia, stiffness / yaw_inertia)
-        information = information_at(run.record.time_s - run.record.time_s[0], decay, angle, rate)
-        reduced, _ = eliminate(information, np.zeros(5), 3)
-        extended = embed(link, with_zero=True)
-        normal += extended.T @ reduced @ extended
-    truth = {"g": 1.0, "n": cn_beta, "d": mechanical_damping, "m": cn_r}
-    parameters = np.zeros(design.size)
-    for name, column in design.columns.items():
-        parameters[column] = truth[name] / yaw_inertia
-    found = derivatives(design, parameters)
-    covariance = found.jacobian @ (inverse(normal) * noise_std**2)[:-1, :-1] @ found.jacobian.T
+    own = np.array([(0.0, angle, rate) for angle, rate in states])
+    drifting = any(run.unrestrained for run in runs)
+    normal = normal_equations(runs, linked.links, parameters, own, own_zeros=drifting)[1]
+    information, _ = eliminate(normal, np.zeros(len(normal)), design.size)
+    found = derivatives(design, parameters[: design.size])
+    covariance = found.jacobian @ (inverse(information) * noise_std**2) @ found.jacobian.T
     names = tuple(name for name in PARAMETERS if name in found.names)
     return CampaignBound(names, tuple(map(tuple, covariance.tolist())))
 
@@ -194,8 +195,8 @@ def campaign_bound(
 def _released(campaign: Campaign) -> list[tuple[float, float]]:
     states = []
     for run in campaign.runs:
-        if run.release_angle is None:
+        if run.release_angle is None and run.drive is None:
             where = f"run {run.id}"
             raise TunnelError("no initial state", where=where, remedy="state release_angle or initial_states")
-        states.append((run.release_angle, 0.0))
+        states.append((run.release_angle or 0.0, 0.0))
     return states

@@ -17,6 +17,7 @@ from tunnel_sim.vocabulary.drive import INPUT_COLUMNS
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
+_INPUT = ("drive_hold", "drive_gain")
 _RIG = ("yaw_inertia", "frontal_area", "reference_length", "width")
 _SHEET_ROWS = 1_048_576
 
@@ -54,7 +55,10 @@ def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     frames = [
         pl.DataFrame(_record(campaign, run)).select(
             pl.lit(run.id).alias("run"),
-            *(pl.lit(value, dtype=pl.Float64).alias(key) for key, value in _numbers(campaign, run).items()),
+            *(
+                pl.lit(value, dtype=pl.String if key == "drive_hold" else pl.Float64).alias(key)
+                for key, value in _cells(campaign, run).items()
+            ),
             pl.all(),
         )
         for run in campaign.runs
@@ -67,8 +71,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     """A structure array ``runs``, and a structure ``rig``."""
     from scipy.io import savemat
 
-    held = ("drive_hold", "drive_gain") if _input_columns(campaign) else ()
-    keys = ("id", *_CONDITIONS, *held, "time_s", _column(campaign), *_input_columns(campaign))
+    keys = ("id", *_condition_keys(campaign), "time_s", _column(campaign), *_input_columns(campaign))
     runs = np.zeros(len(campaign.runs), dtype=[(key, object) for key in keys])
     for place, run in enumerate(campaign.runs):
         stated = {key: value for key, value in _conditions(run).items() if value is not None}
@@ -78,9 +81,14 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
 
 
-def _numbers(campaign: Campaign, run: Run) -> dict[str, float | None]:
+def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
+    return (*_CONDITIONS, *_INPUT) if _input_columns(campaign) else _CONDITIONS
+
+
+def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:
     """The conditions of a run, None where they are not stated, and the stated sizes of the rig."""
-    return {key: getattr(run, key) for key in _CONDITIONS} | _stated(campaign.rig, _RIG)
+    stated = _conditions(run)
+    return {key: stated.get(key) for key in _condition_keys(campaign)} | _stated(campaign.rig, _RIG)
 
 
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
@@ -131,9 +139,9 @@ def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
     with xlsxwriter.Workbook(stream, options) as book:
         names = [f"run {place}" for place in range(1, len(campaign.runs) + 1)]
         sheet = book.add_worksheet("conditions")
-        sheet.write_row(0, 0, ["sheet", "run", *_CONDITIONS, *_stated(campaign.rig, _RIG)])
+        sheet.write_row(0, 0, ["sheet", "run", *_condition_keys(campaign), *_stated(campaign.rig, _RIG)])
         for row, (name, run) in enumerate(zip(names, campaign.runs, strict=True), 1):
-            sheet.write_row(row, 0, [name, run.id, *_numbers(campaign, run).values()])
+            sheet.write_row(row, 0, [name, run.id, *_cells(campaign, run).values()])
         for name, run in zip(names, campaign.runs, strict=True):
             sheet = book.add_worksheet(name)
             for place, (heading, values) in enumerate(_record(campaign, run).items()):

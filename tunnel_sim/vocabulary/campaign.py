@@ -108,6 +108,19 @@ class Run:
         """Whether the wind is on."""
         return self.wind_speed > 0.0
 
+    @property
+    def unrestrained(self) -> bool:
+        """Whether neither a spring nor the air holds the body, so that its stiffness is known to be 0."""
+        return self.spring_stiffness == 0.0 and not self.wind_on
+
+    @property
+    def input_gain(self) -> float | None:
+        """The moment on the body per unit of the input, N m; None where it is not known, and of a free decay."""
+        if self.drive is None:
+            return None
+        known = {"moment_nm": 1.0, "drive": self.drive.gain, "base_rad": self.spring_stiffness}
+        return known[self.drive.column]
+
     def to_xarray(self) -> Dataset:
         """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
 

@@ -13,6 +13,9 @@ from tunnel_sim.vocabulary.record import Array, Record, read_only
 Hold = Literal["zero", "linear"]
 """Between samples the input keeps its value, or is linear."""
 
+HOLDS: tuple[Hold, ...] = ("zero", "linear")
+"""The holds by their order, 0 and 1."""
+
 InputColumn = Literal["moment_nm", "drive", "base_rad"]
 """A known moment on the body, N m; an input of unknown gain, any unit; the angle of the spring's root, rad."""
 

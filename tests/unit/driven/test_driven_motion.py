@@ -223,8 +223,6 @@ def test_what_is_not_done_yet_is_refused() -> None:
     from tunnel_sim.engine.model import build_model
 
     mixed = campaign(("moment_nm", None))
-    with pytest.raises(TunnelError, match="a body without a spring is not identified yet"):
-        identify(replace(mixed, runs=(replace(mixed.runs[0], spring_stiffness=0.0),)))
     rates = replace(mixed, sensor=SensorProperties(RATE, quantity="rate"))
     with pytest.raises(TunnelError, match="driven runs of rates are not identified yet"):
         identify(rates)

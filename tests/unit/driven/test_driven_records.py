@@ -159,11 +159,25 @@ def test_an_input_on_another_clock_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["mat", "csv", "xlsx", "hdf5"])
-def test_export_writes_the_input_and_import_reads_it(tmp_path: Path, kind: str) -> None:
-    path = export_campaign(campaign(), tmp_path / f"c.{kind}", kind)
-    runs = {run.id: run for run in read_records([path], ImportChoices(cut=False)).campaign.runs}
-    driven = [run for run in runs.values() if run.drive is not None]
-    assert len(driven) == 1
-    assert driven[0].drive is not None
-    assert np.max(np.abs(driven[0].drive.values - INPUT)) < 1e-15 * (kind == "xlsx") + 1e-300
-    assert len(runs) == 2
+@pytest.mark.parametrize(
+    ("drive", "spring"),
+    [
+        (Drive("moment_nm", INPUT, "zero"), 0.0),
+        (Drive("drive", INPUT, "zero", -2.5), 16.0),
+        (Drive("drive", INPUT, "linear"), 0.0),
+        (Drive("base_rad", 0.1 * INPUT, "zero"), 16.0),
+    ],
+)
+def test_import_is_the_inverse_of_export(tmp_path: Path, kind: str, drive: Drive, spring: float) -> None:
+    given = campaign(drive, spring)
+    path = export_campaign(given, tmp_path / f"c.{kind}", kind)
+    read = read_records([path], ImportChoices(cut=False)).campaign
+    assert [run.id for run in read.runs] == ["driven", "free"]
+    for before, after in zip(given.runs, read.runs, strict=True):
+        assert after.spring_stiffness == before.spring_stiffness
+        assert after.release_angle == before.release_angle
+        assert (after.drive is None) == (before.drive is None)
+    found = read.runs[0].drive
+    assert found is not None
+    assert (found.column, found.hold, found.gain) == (drive.column, drive.hold, drive.gain)
+    assert np.max(np.abs(found.values - drive.values)) < 1e-15 * (kind == "xlsx") + 1e-300

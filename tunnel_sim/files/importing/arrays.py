@@ -11,7 +11,7 @@ from typing import Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import Channel, Table, known_unit, split_unit
+from tunnel_sim.files.importing.tables import Channel, Table, hold_order, known_unit, split_unit
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
@@ -127,6 +127,8 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                     attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
                 elif group and name in RUN_IDS and isinstance(text := item.attrs[name], str):
                     runs[path] = text
+                elif group and name == "drive_hold" and isinstance(text := item.attrs[name], str):
+                    attributes[f"{path}/{name}"] = np.array(hold_order(text))
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened
@@ -173,6 +175,10 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
     arrays = {path: value for path, value in leaves.items() if not isinstance(value, str)}
     texts = {path.rpartition("/"): value for path, value in leaves.items() if isinstance(value, str)}
     runs = {group: text for (group, _, name), text in texts.items() if name in RUN_IDS}
+    holds = {
+        path: text for path, text in leaves.items() if isinstance(text, str) and path.endswith("/drive_hold")
+    }
+    arrays |= {path: np.array(hold_order(text)) for path, text in holds.items()}
     return tables_of(arrays, "MAT file", runs=runs)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from tunnel_sim.files.importing.columns import (
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of, from_column, from_facts
 from tunnel_sim.files.importing.inputs import at_times, find_input
 from tunnel_sim.files.importing.source import Source
-from tunnel_sim.files.importing.tables import Channel, Table, kind_of
+from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table, kind_of
 from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.drive import InputColumn
@@ -50,6 +50,7 @@ class RawRecord:
         clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
         whole: whether the file itself says that it is one run.
         input: of a driven record: what it is, and its values at the cleaned times, shape (n,); None of free decays.
+        input_facts: the order of its hold (0 or 1) and its gain in N m per unit, by key of the format.
     """
 
     id: str
@@ -65,6 +66,7 @@ class RawRecord:
     clock: Array
     whole: bool
     input: tuple[InputColumn, Array] | None = None
+    input_facts: Mapping[str, float] = field(default_factory=dict)
 
     def measured(self, first: float, last: float, said: list[str]) -> dict[str, float]:
         """Conditions that columns of the file state.
@@ -167,6 +169,7 @@ def _raws(
                     time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
                     table.named and len(starts) == 2,
                     given,
+                    {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))},
                 )
             )
     return found

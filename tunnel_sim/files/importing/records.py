@@ -44,7 +44,13 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import Drive, checked_drive
+from tunnel_sim.vocabulary.drive import (
+    HOLDS,
+    Drive,
+    Hold,
+    InputColumn,
+    checked_drive,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -218,7 +224,8 @@ def _part(
     stated = raw.stated | measured | raw.named | in_table | given
     sizes = {key: stated.pop(key) for key in RIG_KEYS if key in stated}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
-    validate(Conditions, stated | sizes, raw.source)
+    loose = raw.input is not None and stated.get("spring_stiffness") == 0.0  # a driven body without a spring
+    validate(Conditions, {**stated, **sizes, **({"spring_stiffness": None} if loose else {})}, raw.source)
     plausible_values(stated | sizes, where)
     if "wind_speed" not in stated:
         if _WIND_ON.search(f"{raw.source.stem} {name}"):
@@ -236,7 +243,7 @@ def _part(
             where=where,
             remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
         )
-    drive = None if raw.input is None else Drive(raw.input[0], raw.input[1][kept])
+    drive = None if raw.input is None else _drive(raw.input[0], raw.input[1][kept], raw.input_facts, said)
     try:
         if drive is None:
             record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
@@ -248,6 +255,17 @@ def _part(
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
+
+
+def _drive(column: InputColumn, values: Array, facts: Mapping[str, float], said: list[str]) -> Drive:
+    """The input of a run with the hold and the gain that its file states."""
+    order, gain = facts.get("drive_hold"), facts.get("drive_gain") or None
+    hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
+    said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
+    if column != "drive" or gain is None:
+        return Drive(column, values, hold)
+    said.append(f"drive_gain = {gain:g} from the file")
+    return Drive(column, values, hold, gain)
 
 
 def _judged(

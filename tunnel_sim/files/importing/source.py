@@ -11,7 +11,7 @@ import numpy as np
 
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.guard import read_guarded
-from tunnel_sim.files.importing.tables import Table, by_run
+from tunnel_sim.files.importing.tables import Table, by_run, with_input_facts
 from tunnel_sim.files.importing.text import TEXT, read_text_tables
 from tunnel_sim.files.readers import Reader, load_reader, reader_place
 from tunnel_sim.files.reading import check_count, read_regular
@@ -71,7 +71,9 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
         tables, known = read_text_tables(content, where, choices)
     else:
         tables = read_guarded(place, content, where)
-    tables = [part for table in tables if table.channels for part in by_run(_computable(table))]
+    tables = [
+        with_input_facts(part) for table in tables if table.channels for part in by_run(_computable(table))
+    ]
     if not tables:
         raise TunnelError(
             "no column of numbers", where=where, remedy="name a file that holds times and angles"

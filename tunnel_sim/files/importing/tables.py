@@ -11,10 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.vocabulary.drive import HOLDS
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     import polars as pl
+
+INPUT_FACTS = ("drive_hold", "drive_gain")
+"""What a file may state of the input of a run, as an export writes it."""
 
 UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
@@ -173,6 +177,19 @@ def by_run(table: Table) -> list[Table]:
     return by_label(
         table, channel.name, starts, [f"{n:.15g}" if n > -np.inf else "" for n in number[[0, *starts]]]
     )
+
+
+def with_input_facts(table: Table) -> Table:
+    """A table whose columns ``drive_hold`` and ``drive_gain``, as an export writes them, are single numbers."""
+    stated = [channel for channel in table.channels if channel.name in INPUT_FACTS]
+    facts = {c.name: float(good[0]) for c in stated if (good := c.values[np.isfinite(c.values)]).size}
+    channels = tuple(channel for channel in table.channels if channel not in stated)
+    return replace(table, channels=channels, facts={**table.facts, **facts}) if stated else table
+
+
+def hold_order(text: str) -> float:
+    """The order of a hold that a file states as a text: 0 of ``zero``, 1 of ``linear``, NaN of any other text."""
+    return float(HOLDS.index(text)) if text in HOLDS else float("nan")
 
 
 def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:

@@ -16,6 +16,7 @@ from tunnel_sim.files.importing.tables import (
     Channel,
     Table,
     by_texts,
+    hold_order,
     kind_of,
     known_unit,
     names_runs,
@@ -362,7 +363,10 @@ def tables_of(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
     ):
         number, lost = column, 0
-        if column.dtype == pl.String:
+        if column.dtype == pl.String and name == "drive_hold":
+            number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
+            lost = number.null_count() - column.null_count()
+        elif column.dtype == pl.String:
             cells = column.str.strip_chars(' \t\r"')
             cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
             number = cells.cast(pl.Float64, strict=False)

@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tunnel_sim.files.importing.tables import Table
+from tunnel_sim.files.importing.tables import Table, hold_order
 from tunnel_sim.files.importing.text import find_layout, is_number, tables_of
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
@@ -49,7 +49,9 @@ def _descriptions(book: Any, name: str, rows: Sequence[Sequence[str]]) -> dict[s
     if "sheet" not in heading:
         return {}
     # As texts, numbers would lose digits.
-    kinds = {i: "string" if key in ("sheet", "run") else "float" for i, key in enumerate(heading)}
+    kinds = {
+        i: "string" if key in ("sheet", "run", "drive_hold") else "float" for i, key in enumerate(heading)
+    }
     body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
     found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
     return (
@@ -69,6 +71,8 @@ def _tables(book: Any, name: str, rows: Sequence[Sequence[str]], described: Mapp
     heading = "names in the row above the numbers" if layout.headed else "no names of columns"
     said = f"workbook: sheet '{name}', {width} columns, numbers from row {layout.first + 1}, {heading}"
     facts = {key: cell for key, cell in described.items() if isinstance(cell, float)}
+    if hold := described.get("drive_hold"):
+        facts["drive_hold"] = hold_order(hold)
     run = described.get("run") or ""
     part = run or (name if len(book.sheet_names) > 1 else "")
     labels = None if layout.runs is None else body.to_series(layout.runs)

@@ -1,0 +1,253 @@
+"""Least squares of runs with an input, exact between its samples: one run by itself, or several together.
+
+A run has the decay rate a, the stiffness k and the gain g of its input per unit inertia, (a, k, g) = L φ, and three
+numbers of its own: initial angle, initial rate, and the sensor's zero. A body without a spring has k = 0, and its
+zero cannot be told from its initial angle. Its third number is a constant acceleration instead, by a moment beside
+the input: with a spring the two are one. The method is that of Levenberg and Marquardt, with exact derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.estimate import Quantity, RunEstimate, Status
+from identification.signal.decay_fit import Reading, RunFit
+from identification.signal.driven import driven_rows, driven_start
+from identification.signal.free_decay import Decay, response_rows, sensitivity_weights
+from identification.signal.run_fit import FittedRun, decay_covariance_of, describe_run, noise_and_failure
+from identification.statistics import determined, eliminate, inverse, scaled_solve
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
+
+_MOST_STEPS = 60
+_SETTLED = 1e-10  # share of the sum of squares by which a last step may lower it
+_OWN = 3  # numbers of each run: zero or constant acceleration, initial angle, initial rate
+_GROWTH = 5.0  # logarithm of the growth over the record, beyond which a start overflows
+
+
+@dataclass(frozen=True, eq=False)
+class InputFit:
+    """Runs at the optimum.
+
+    Args:
+        parameters: φ, shape (p,).
+        own: zero (rad; without a spring the constant acceleration, rad/s²), initial angle (rad) and rate (rad/s) of
+            each run, shape (r, 3).
+        residuals: reading less model, by run, rad.
+        normal: information of φ, of the common zero where there is one, and then of the runs' own numbers.
+        converged: whether a last step no longer paid.
+    """
+
+    parameters: Array
+    own: Array
+    residuals: list[Array]
+    normal: Array
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenRun(FittedRun):
+    """A driven run and its fit.
+
+    Args:
+        coefficients: a (1/s), k (1/s²) and g (rad/s² per unit of the input), shape (3,).
+        weight: their information times the noise variance in rad², all else unknown, shape (3, 3); rows of zeros
+            for a k that is known to be 0, and for a g that is k.
+        offset: of a body without a spring, the constant moment beside the input, in the unit of the input.
+    """
+
+    coefficients: Array
+    weight: Array
+    offset: Quantity | None = None
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the coefficients, shape (3,), in their units; 0 where the weight has no row."""
+        assert self.noise is not None
+        known = np.flatnonzero(self.weight.diagonal() > 0.0)
+        found = np.zeros(3)
+        found[known] = np.sqrt(inverse(self.weight[np.ix_(known, known)]).diagonal() * self.noise.slow_ratio)
+        return found * self.noise.std
+
+
+def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
+    """Identify a driven run by itself.
+
+    Args:
+        run: with its input; stiffness and gain are not used, except that a body without a spring has k = 0.
+
+    Returns:
+        A `DrivenRun`, or a run without a fit whose status says why.
+    """
+    reading = Reading.from_record(run.record)
+    drive, drifts = run.drive, run.unrestrained
+    assert drive is not None
+    start = driven_start(reading.time, reading.yaw, drive.values, sprung=not drifts)
+    if start is None or not (drifts or start[1] > 0.0):
+        return _failed(run, reading, Status.NO_OSCILLATION)
+    # the root's motion acts through the spring: its gain is k
+    places = [0, 2] if drifts else [0, 1] if not drive.on_body else [0, 1, 2]
+    link = np.eye(3)[:, places]
+    link[2, 1] = 1.0 if len(places) == 2 else 0.0
+    steps = np.diff(reading.time)
+    rate = max(start[0], -_GROWTH / float(reading.time[-1] - reading.time[0])) if drifts else start[0]
+    found = fit_with_inputs([run], [link], np.array([rate, *start[1:]])[places], own_zeros=True)
+    coefficients = link @ found.parameters
+    # a record shows no resonance above half its sample rate
+    fastest = np.pi / float(steps.min())
+    if not found.converged or not (drifts or 0.0 < coefficients[1] < fastest**2):
+        return _failed(run, reading, Status.NOT_CONVERGED)
+    if not determined(found.normal):
+        return _failed(run, reading, Status.NOT_DETERMINED)
+    fit = _as_run_fit(found, coefficients, places)
+    zero = float(reading.yaw.mean()) if drifts else float(found.own[0, 0])
+    noise, failure = noise_and_failure(reading, fit, zero, sensor)
+    if failure is not None:
+        return _failed(run, reading, failure)
+    variance = noise.std**2 * noise.slow_ratio
+    estimate = describe_run(
+        run, reading, fit, zero, decay_covariance_of(fit) * variance, variance, noise=noise
+    )
+    weight = np.zeros((3, 3))
+    weight[np.ix_(places, places)] = eliminate(found.normal, np.zeros(len(found.normal)), len(places))[0]
+    offset = _offset(found, variance, drive.unit) if drifts else None
+    return DrivenRun(
+        reading, fit if estimate.identified else None, noise, estimate, coefficients, weight, offset
+    )
+
+
+def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
+    return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))
+
+
+def _as_run_fit(found: InputFit, coefficients: Array, places: Sequence[int]) -> RunFit:
+    """The fit in the order of free runs: the gain eliminated, and a known k with a row of its own."""
+    size, kept = len(places), sum(place < 2 for place in places)
+    order = [*range(kept), *range(size, size + _OWN), *range(kept, size)]
+    normal = found.normal[np.ix_(order, order)]
+    if size > kept:
+        normal = eliminate(normal, np.zeros(len(order)), kept + _OWN)[0]
+    information, at = np.eye(2 + _OWN), [*range(kept), 2, 3, 4]
+    information[np.ix_(at, at)] = normal
+    decay = Decay(float(coefficients[0]), float(coefficients[1]))
+    angle, rate = found.own[0, 1:].tolist()
+    return RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
+
+
+def _offset(found: InputFit, variance: float, unit: str) -> Quantity:
+    """The constant acceleration of a body without a spring, over the gain."""
+    gain, constant = float(found.parameters[1]), float(found.own[0, 0])
+    slope = np.array([0.0, -constant / gain**2, 1.0 / gain, 0.0, 0.0])
+    return Quantity(constant / gain, float(np.sqrt(slope @ inverse(found.normal) @ slope * variance)), unit)
+
+
+def fit_with_inputs(
+    runs: Sequence[Run], links: Sequence[Array], start: Array, *, own_zeros: bool
+) -> InputFit:
+    """Fit runs together.
+
+    Args:
+        runs: driven or free.
+        links: one per run, shape (3, p): (a, k, g) = L φ.
+        start: of φ, shape (p,), SI.
+        own_zeros: whether every run has its own zero; needed where one has no spring.
+
+    Returns:
+        The fit; ``converged`` is False where a start overflows, or the steps come to no end.
+    """
+    parameters, own = start.astype(np.float64), np.zeros((len(runs), _OWN))
+    for i, (run, link) in enumerate(zip(runs, links, strict=True)):
+        with np.errstate(all="ignore"):  # a start far off may overflow
+            residual, jacobian = _linearised(run, link, parameters, own[i])
+        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
+            return InputFit(parameters, own, [], np.zeros((0, 0)), False)
+        own[i] = np.linalg.lstsq(jacobian[:, -_OWN:], residual, rcond=None)[0]
+    if not own_zeros:
+        own[:, 0] = own[:, 0].mean()
+    damping, converged = 1e-9, False
+    residuals, normal, gradient = normal_equations(runs, links, parameters, own, own_zeros=own_zeros)
+    cost = sum(float(r @ r) for r in residuals)
+    for _ in range(_MOST_STEPS):
+        try:
+            step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
+        except np.linalg.LinAlgError:
+            break
+        moved, moved_own = _moved(parameters, own, step, own_zeros)
+        with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
+            trial = normal_equations(runs, links, moved, moved_own, own_zeros=own_zeros)
+        after = sum(float(r @ r) for r in trial[0])
+        if np.isfinite(after) and after <= cost:
+            converged = cost - after <= _SETTLED * cost
+            parameters, own, cost, damping = moved, moved_own, after, damping / 10.0
+            residuals, normal, gradient = trial
+        else:
+            damping = max(10.0 * damping, 1e-6)
+            converged = damping > 1e6
+        if converged:
+            break
+    return InputFit(parameters, own, residuals, normal, converged)
+
+
+def _moved(parameters: Array, own: Array, step: Array, own_zeros: bool) -> tuple[Array, Array]:
+    size = parameters.size
+    changed = own.copy()
+    if own_zeros:
+        changed += step[size:].reshape(-1, _OWN)
+    else:
+        changed[:, 0] += step[size]
+        changed[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
+    return parameters + step[:size], changed
+
+
+def normal_equations(
+    runs: Sequence[Run], links: Sequence[Array], parameters: Array, own: Array, *, own_zeros: bool
+) -> tuple[list[Array], Array, Array]:
+    """Residuals, information and score of φ, the common zero where there is one, and the runs' own numbers.
+
+    Args:
+        links: one per run, shape (3, p): (a, k, g) = L φ.
+        parameters: φ, shape (p,), SI.
+        own: of each run as in `InputFit`, shape (r, 3).
+        own_zeros: whether every run has its own zero.
+
+    Returns:
+        Residuals in rad; JᵀJ, shape (m, m); Jᵀ residual, shape (m,).
+    """
+    shared = parameters.size + (not own_zeros)
+    width = _OWN if own_zeros else _OWN - 1
+    normal = np.zeros((shared + width * len(runs),) * 2)
+    gradient, residuals = np.zeros(len(normal)), []
+    for i, (run, link) in enumerate(zip(runs, links, strict=True)):
+        residual, jacobian = _linearised(run, link, parameters, own[i])
+        places = np.r_[np.arange(shared), shared + width * i + np.arange(width)]
+        normal[np.ix_(places, places)] += jacobian.T @ jacobian
+        gradient[places] += jacobian.T @ residual
+        residuals.append(residual)
+    return residuals, normal, gradient
+
+
+def _linearised(run: Run, link: Array, parameters: Array, own: Array) -> tuple[Array, Array]:
+    """Residual and Jacobian of one run: φ, zero or constant acceleration, initial angle, initial rate."""
+    time = run.record.time_s - run.record.time_s[0]
+    rate, stiffness, gain = (float(value) for value in link @ parameters)
+    constant, angle, initial = own.tolist()
+    decay = Decay(rate, stiffness)
+    rows = response_rows(time, decay)
+    local = np.zeros((3, time.size))
+    local[:2] = sensitivity_weights(decay, angle, initial) @ rows
+    ones = np.ones(time.size)
+    rest = (
+        driven_rows(time, ones, rate, stiffness, held=True) if run.unrestrained else np.outer([1, 0, 0], ones)
+    )
+    model = constant * rest[0] + angle * rows[0] + initial * rows[1]
+    local[:2] += constant * rest[1:]
+    if run.drive is not None:
+        driven = driven_rows(time, run.drive.values, rate, stiffness, held=run.drive.hold == "zero")
+        model = model + gain * driven[0]
+        local[:2] += gain * driven[1:]
+        local[2] = driven[0]
+    jacobian = np.column_stack([local.T @ link, rest[0], rows[0], rows[1]])
+    return run.record.yaw_rad - model, jacobian
