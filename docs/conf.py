@@ -5,8 +5,11 @@ import re
 from importlib.metadata import version as _version
 from pathlib import Path
 
+from docutils import nodes
+from latex2mathml.converter import convert
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
+from sphinx.writers.html5 import HTML5Translator
 
 _DOCS = Path(__file__).parent
 _LINK = re.compile(r"(!?\[(?:[^\]\[]|\[[^\]]*\])*\])\(([^)\s:#]+)(#[^)\s]*)?\)")
@@ -29,6 +32,8 @@ html_theme = "furo"
 html_title = f"Virtual wind tunnel {version}"
 
 myst_enable_extensions = ["dollarmath"]
+myst_update_mathjax = False
+html_math_renderer = "mathml"  # browsers draw it themselves: the site needs no network and no script for it
 myst_heading_anchors = 4
 nb_execution_mode = "cache"
 nb_execution_raise_on_error = True
@@ -66,7 +71,18 @@ def _links(text: str, source: Path, page: Path) -> str:
     return _LINK.sub(replaced, text)
 
 
+def _inline(page: HTML5Translator, node: nodes.math) -> None:
+    page.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def _displayed(page: HTML5Translator, node: nodes.math_block) -> None:
+    page.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>\n')
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> None:
     """Connect to Sphinx."""
     app.add_lexer("csv", TextLexer)
+    app.add_html_math_renderer("mathml", (_inline, None), (_displayed, None))
     app.connect("source-read", _read)
