@@ -12,6 +12,7 @@ from sphinx.application import Sphinx
 from sphinx.writers.html5 import HTML5Translator
 
 _DOCS = Path(__file__).parent
+_PAGES = {_DOCS.parent / "README.md": _DOCS / "overview.md", _DOCS / "README.md": _DOCS / "index.md"}
 _LINK = re.compile(r"(!?\[(?:[^\]\[]|\[[^\]]*\])*\])\(([^)\s:#]+)(#[^)\s]*)?\)")
 
 project = "Virtual wind tunnel"
@@ -30,6 +31,8 @@ extensions = [
 exclude_patterns = ["README.md", "_build", "studies"]
 html_theme = "furo"
 html_title = f"Virtual wind tunnel {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 
 myst_enable_extensions = ["dollarmath"]
 myst_update_mathjax = False
@@ -46,22 +49,21 @@ napoleon_use_rtype = False
 
 
 def _read(_: Sphinx, name: str, content: list[str]) -> None:
-    """Put the README into the first page, and keep only links to what the site holds.
+    """Put the README into the overview, and keep only links to what the site holds.
 
     The pages are also read in the source tree, where they may refer to any file of it.
     """
     text, place = content[0], (_DOCS / name).parent
-    if name == root_doc:
-        readme = _links((_DOCS.parent / "README.md").read_text(encoding="utf-8"), _DOCS.parent, place)
-        text = text.replace("<!-- README -->", readme)
-    content[0] = _links(text, place, place)
+    if name == "overview":
+        readme = _DOCS.parent / "README.md"
+        text, place = readme.read_text(encoding="utf-8"), readme.parent
+    content[0] = _links(text, place, (_DOCS / name).parent)
 
 
 def _links(text: str, source: Path, page: Path) -> str:
     def replaced(match: re.Match[str]) -> str:
         words, target, part = match[1], (source / match[2]).resolve(), match[3] or ""
-        if target in (_DOCS.parent / "README.md", _DOCS / "README.md"):
-            target = _DOCS / "index.md"
+        target = _PAGES.get(target, target)
         if not target.exists():
             return match[0]  # Sphinx warns
         if target.is_relative_to(_DOCS) and target.is_file():
