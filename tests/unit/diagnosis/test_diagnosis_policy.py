@@ -1,10 +1,11 @@
-"""The weights are those of the formula in decision 0007, written out here with its numbers."""
+"""The weights are those of the formula in decision 0007, written out here."""
 
 from math import exp, log
 
 import numpy as np
 import pytest
 
+from diagnosis import policy
 from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.search.weigh import FittedSet, weigh
 
@@ -21,29 +22,41 @@ SETS = {
 def misfit(left, scales):
     """Sum of logarithms over the channels, with the leak from the others."""
     above = [max(x, 0.0) for x in left]
-    return sum(log(1.0 + (x + 0.02 * (sum(above) - x)) / s) for x, s in zip(above, scales, strict=True))
+    return sum(
+        log(1.0 + (x + policy.LEAK * (sum(above) - x)) / s) for x, s in zip(above, scales, strict=True)
+    )
 
 
 def test_the_probabilities_are_those_of_the_decision():
     least = [min(0.0, *(left[c] for left, _ in SETS.values())) for c in range(6)]
-    scale = [20.0 + 1e-3**2 * MOTION] * 6
+    scale = [policy.NEEDLESS_CHI2 + policy.MODEL_ERROR**2 * MOTION] * 6
     weights = {
-        key: exp(-1.25 * misfit(left - least, scale) - 3.0 * len(key) - 1.0 * numbers)
+        key: exp(
+            -policy.STEEPNESS * misfit(left - least, scale)
+            - policy.SET_PRICE * len(key)
+            - policy.FORM_PRICE * numbers
+        )
         for key, (left, numbers) in SETS.items()
     }
-    by_chance = [2.0 * (2.0 * n) ** 0.5 + 1e-3**2 * MOTION for n in COUNT]
+    by_chance = [policy.CHANCE_STDS * (2.0 * n) ** 0.5 + policy.MODEL_ERROR**2 * MOTION for n in COUNT]
     gap = misfit(GAP, by_chance)
     odds = {}
     for key, (left, _) in SETS.items():
         remains = misfit(left, by_chance)
         closed = log(max(1.0 - remains / gap, 0.0) + 0.02)
-        odds[key] = exp(0.6 + 0.21 * gap - 2.0 * log(1.0 + remains) + 2.0 * closed)
+        odds[key] = exp(
+            policy.UNKNOWN_AT
+            + policy.UNKNOWN_GAP * gap
+            - policy.UNKNOWN_LEFT * log(1.0 + remains)
+            + policy.UNKNOWN_CLOSED * closed
+        )
     total = sum(weights.values())
     against = sum(weights[key] * odds[key] for key in SETS) / total
+    even, own = policy.EVEN_SHARE / 4, 1.0 - policy.EVEN_SHARE
     expected = {
-        key: 0.97 * against / (1.0 + against) * weight / total + 0.03 / 4 for key, weight in weights.items()
+        key: own * against / (1.0 + against) * weight / total + even for key, weight in weights.items()
     }
-    expected[("unknown",)] = 0.97 / (1.0 + against) + 0.03 / 4
+    expected[("unknown",)] = own / (1.0 + against) + even
     sets = [FittedSet(key, 0.1, left, numbers) for key, (left, numbers) in SETS.items()]
     found = weigh(sets, ChannelMisfit(COUNT + GAP, COUNT, MOTION))
     assert {answer.effects: answer.probability for answer in found} == pytest.approx(expected)
