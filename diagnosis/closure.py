@@ -9,7 +9,7 @@ from typing import Any
 
 from identification.printing import TextTable, significant
 from tunnel_sim.effects import known_effects
-from tunnel_sim.files.json_text import as_json
+from tunnel_sim.files.writing import as_json
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.joint_law import JointLaw
+from tunnel_sim.vocabulary.rig import JointLaw
 
 SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
 

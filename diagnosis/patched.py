@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from identification.printing import TextTable, significant, unit_mark
-from tunnel_sim.files.json_text import as_json
+from tunnel_sim.files.writing import as_json
 
 if TYPE_CHECKING:
     import mujoco

@@ -17,7 +17,7 @@ from diagnosis.printing import diagnosis_brief, diagnosis_parts
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text
 from identification.status import Remark
-from tunnel_sim.files.json_text import as_json
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -19,8 +19,8 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 from identification.status import Remark
 from identification.status import Status as Status
 from identification.status import by_severity as by_severity
-from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described, check_shape
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 

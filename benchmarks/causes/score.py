@@ -21,8 +21,8 @@ from diagnosis.blind.calibration import calibration, smooth_calibration
 from diagnosis.blind.cases import NAMES as COEFFICIENTS
 from diagnosis.blind.cases import Case, case, found_by_group, inclusions
 from identification.statistics import Proportion
-from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 FLOOR = 0.01

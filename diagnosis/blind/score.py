@@ -24,8 +24,8 @@ from diagnosis.blind.sets import (
 from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
 from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
-from tunnel_sim.files.json_text import as_json
 from tunnel_sim.files.reading import as_described
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 

@@ -22,9 +22,8 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
-from tunnel_sim.files.json_text import json_text
 from tunnel_sim.files.reading import read_json, read_regular
-from tunnel_sim.files.writing import clear_leftovers, output_folder, whole_folder, write_whole
+from tunnel_sim.files.writing import clear_leftovers, json_text, output_folder, whole_folder, write_whole
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -40,7 +39,7 @@ def write_document(path: Path, document: Mapping[str, Any]) -> str:
 
     Args:
         path: the file; replaced when it exists.
-        document: as for `tunnel_sim.files.json_text.json_text`.
+        document: as for `tunnel_sim.files.writing.json_text`.
 
     Returns:
         SHA-256 of what was written, in hexadecimal.

@@ -18,8 +18,8 @@ from identification.signal.driven import driven_start
 from identification.signal.frequency import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
+from tunnel_sim.vocabulary.rig import JointLaw
 from tunnel_sim.vocabulary.units import dimension
 
 REFERENCE_FREQUENCY = 2.0

@@ -13,9 +13,9 @@ from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY
 from diagnosis.likelihood.whitening import WHITE, colour, colouring, response, whiten
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
-from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.rig import JointLaw
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,17 @@ from typing import Any
 import numpy as np
 from safetensors.numpy import save
 
-from identification.neural.stored import open_stored, read_packaged, read_stored
 from identification.neural.three_cycles import cycles_time, network_inputs
-from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, held_out_points
+from identification.neural.training_set import (
+    DAMPING,
+    FREQUENCY,
+    SIZES,
+    DataSpec,
+    held_out_points,
+    open_stored,
+    read_packaged,
+    read_stored,
+)
 from tunnel_sim.vocabulary.record import Array
 
 

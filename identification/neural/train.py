@@ -37,8 +37,8 @@ from identification.neural.networks import (
     weights_bytes,
 )
 from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
-from tunnel_sim.files.json_text import json_line
 from tunnel_sim.files.reading import parse_json, read_regular
+from tunnel_sim.files.writing import json_line
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

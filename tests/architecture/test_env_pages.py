@@ -46,7 +46,7 @@ def test_the_diagnosis_is_what_is_shown(tmp_path: Path) -> None:
 
 
 def test_the_arguments_are_those_of_the_code() -> None:
-    from tunnel_sim.envs.config import FreeDecayConfig
+    from tunnel_sim.envs.conditions import FreeDecayConfig
 
     table = {name.strip("`"): default.strip("`") for name, default, _ in rows(TEXT, "Arguments")}
     defaults = FreeDecayConfig()

@@ -34,7 +34,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
     from identification.estimate import Estimate
     from identification.estimators import ALL_ESTIMATORS
     from tunnel_lab.terminal.outputs import show_estimate
-    from tunnel_sim.files.json_text import json_text
+    from tunnel_sim.files.writing import json_text
 
     campaign = accepted_campaign(folder, rng)
     name = ALL_ESTIMATORS[rng.integers(len(ALL_ESTIMATORS))]
@@ -66,7 +66,7 @@ def diagnose_campaign(folder: Path, rng: Rng) -> None:
     from tunnel_lab.commands.diagnose import show
     from tunnel_lab.report import write_report
     from tunnel_sim.effects import ALL_EFFECTS
-    from tunnel_sim.files.json_text import json_text
+    from tunnel_sim.files.writing import json_text
 
     campaign = accepted_campaign(folder, rng)
     chosen = sorted(rng.choice(len(ALL_EFFECTS), size=int(rng.integers(1, 4)), replace=False))

@@ -159,8 +159,7 @@ def run(
     from tunnel_lab.terminal.inputs import file_hashes, given_campaign
     from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
     from tunnel_lab.terminal.tables import say, say_written
-    from tunnel_sim.files.json_text import json_text
-    from tunnel_sim.files.writing import write_json
+    from tunnel_sim.files.writing import json_text, write_json
     from tunnel_sim.vocabulary.errors import TunnelError
 
     del effects_file  # its effects are known already

@@ -102,8 +102,7 @@ def run(
     from tunnel_lab.terminal.options import known_estimator
     from tunnel_lab.terminal.outputs import show_estimate
     from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.json_text import json_text
-    from tunnel_sim.files.writing import refuse_unwritable, write_json
+    from tunnel_sim.files.writing import json_text, refuse_unwritable, write_json
     from tunnel_sim.vocabulary.errors import TunnelError
 
     for name in (estimator, *(models or ())):

@@ -66,8 +66,7 @@ def run(
       0 printed, 2 bad input.
     """
     from tunnel_lab.terminal.tables import say_written
-    from tunnel_sim.files.json_text import json_text
-    from tunnel_sim.files.writing import write_json
+    from tunnel_sim.files.writing import json_text, write_json
     from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
     if document not in SCHEMAS:

@@ -34,11 +34,6 @@ from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:
     import polars as pl
-
-    from tunnel_sim.vocabulary.campaign import Campaign
-
-if TYPE_CHECKING:
-    import polars as pl
     from matplotlib.figure import Figure
     from rich.table import Table
 

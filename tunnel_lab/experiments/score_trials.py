@@ -21,7 +21,6 @@ from identification.scoring import ScoredEstimate, Trials, collect
 from tunnel_lab.experiments.runner import Progress, processes, run_tasks
 from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_sim.files.json_text import json_line
 from tunnel_sim.files.reading import (
     as_described,
     frame_schema,
@@ -30,7 +29,7 @@ from tunnel_sim.files.reading import (
     read_json,
     read_regular,
 )
-from tunnel_sim.files.writing import output_folder, write_json, write_whole
+from tunnel_sim.files.writing import json_line, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 

@@ -34,9 +34,8 @@ from tunnel_lab.experiments.training_samples import (
     write_shard,
 )
 from tunnel_reference.forms import FAMILIES
-from tunnel_sim.files.json_text import json_line
 from tunnel_sim.files.reading import read_json, read_regular
-from tunnel_sim.files.writing import output_folder, write_json, write_whole
+from tunnel_sim.files.writing import json_line, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array

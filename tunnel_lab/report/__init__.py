@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING
 from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from tunnel_lab.report.page import Byline, draw, render_fit, render_report, write_report
-    from tunnel_lab.report.summary import find_browser, write_summary
+    from tunnel_lab.report.page import (
+        Byline,
+        draw,
+        find_browser,
+        render_fit,
+        render_report,
+        write_report,
+        write_summary,
+    )
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,

@@ -1,10 +1,14 @@
-"""The report of a diagnosis as one HTML page: its parts put together, and its provenance."""
+"""The report of a diagnosis as one HTML page, its provenance, and its summary on one printed page."""
 
 from __future__ import annotations
 
 import base64
 import io
 import math
+import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -22,12 +26,13 @@ from tunnel_lab.report.figures import diagnosis_figures
 from tunnel_lab.report.fit import fit_charts, fit_figure
 from tunnel_lab.report.view import Document
 from tunnel_lab.report.where import Chart, charts
-from tunnel_sim.files.writing import write_encoded
+from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 DESCRIPTIONS = {
     "place": "Map of the misfit of the nominal model by amplitude and wind speed, or by amplitude and time.",
@@ -344,3 +349,55 @@ def font_face(characters: str) -> str:
         font.save(buffer)
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     return f'@font-face {{ font-family: "{FAMILY}"; src: url(data:font/woff;base64,{data}) format("woff"); }}'
+
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_TIMEOUT = 120.0  # s
+
+
+def find_browser() -> str:
+    """The Chromium of this machine.
+
+    Raises:
+        TunnelError: where there is none.
+    """
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        raise TunnelError(
+            "there is no Chromium to print with",
+            where="--summary",
+            remedy="install Chromium, or print the page of --report from a browser",
+        )
+    return found
+
+
+def write_summary(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
+    """Write the summary of a diagnosis as a PDF of one page.
+
+    Args:
+        document: as for `tunnel_lab.report.write_report`.
+        path: the PDF; replaced when it exists, written completely or not at all.
+
+    Raises:
+        TunnelError: where there is no Chromium, it fails, or the file cannot be written.
+    """
+    browser = find_browser()
+    with tempfile.TemporaryDirectory() as name:
+        page, printed = Path(name) / "summary.html", Path(name) / "summary.pdf"
+        page.write_text(render_report(document, campaign, byline, summary=True), encoding="utf-8")
+        arguments = [
+            "--headless", "--disable-gpu", "--no-pdf-header-footer", f"--user-data-dir={name}/profile",
+            f"--print-to-pdf={printed}", page.as_uri(),
+        ]  # fmt: skip
+        # Chromium's own sandbox does not start for root.
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            arguments.insert(0, "--no-sandbox")
+        try:
+            done = subprocess.run([browser, *arguments], capture_output=True, timeout=_TIMEOUT, check=False)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise TunnelError(
+                "Chromium could not print", where="--summary", remedy="print the report"
+            ) from error
+        if done.returncode or not printed.is_file():
+            raise TunnelError("Chromium could not print", where="--summary", remedy="print the report")
+        return write_whole(path, printed.read_bytes())

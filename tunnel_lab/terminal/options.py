@@ -167,7 +167,7 @@ def rendered(table: Table, kind: TableFormat) -> str:
     rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
     title = _plain(table.title or "")
     if kind is TableFormat.JSON:
-        from tunnel_sim.files.json_text import json_line
+        from tunnel_sim.files.writing import json_line
 
         records = [{head: _value(cell) for head, cell in zip(heads, row, strict=True)} for row in rows]
         return json_line({"table": title, "rows": records}) + "\n"

@@ -18,8 +18,8 @@ from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.processes import LimitReached, in_limited_process
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
-from tunnel_sim.vocabulary.joint_law import FREE_PARAMETERS, JointLaw, Term
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import FREE_PARAMETERS, JointLaw, Term
 
 _GRID = 361  # positions at which the moment is tabulated
 _EXACT = 1e-8  # of the greatest moment: what the terms of the law may leave, the engine's own rounding

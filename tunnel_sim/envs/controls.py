@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.vocabulary.record import Array
 

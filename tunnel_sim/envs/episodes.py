@@ -15,8 +15,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
-from tunnel_sim.envs.conditions import RunPlan, plan_run
-from tunnel_sim.envs.config import FreeDecayConfig, angle_limit
+from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
 from tunnel_sim.envs.controls import OperatorLog, WindAnswer, check_plain, decode
 from tunnel_sim.envs.engines import Operation
 from tunnel_sim.envs.errors import EnvError, as_env_error

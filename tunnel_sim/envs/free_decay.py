@@ -11,7 +11,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from tunnel_sim.envs.config import free_decay_config
+from tunnel_sim.envs.conditions import free_decay_config
 from tunnel_sim.envs.controls import action_space, operator_action
 from tunnel_sim.envs.engines import ManyRuns, Models, OneRun
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
 from tunnel_sim.effects.chain import quantise
-from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record

@@ -15,7 +15,6 @@ import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tunnel_sim.files.json_text import json_text
 from tunnel_sim.files.plausible import (
     checked_record,
     plausible_values,
@@ -31,7 +30,7 @@ from tunnel_sim.files.toml_input import (
     shown,
     validate,
 )
-from tunnel_sim.files.writing import clear_leftovers, whole_folder
+from tunnel_sim.files.writing import clear_leftovers, json_text, whole_folder
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
     Campaign,

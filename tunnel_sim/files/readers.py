@@ -70,14 +70,14 @@ class Reader:
 
 READERS: Mapping[str, str] = {
     ".csv": "tunnel_sim.files.run_files:CSV",
-    ".parquet": "tunnel_sim.files.importing.parquet:PARQUET",
-    ".xlsx": "tunnel_sim.files.importing.workbook:WORKBOOK",
-    ".xlsm": "tunnel_sim.files.importing.workbook:WORKBOOK",
-    ".mat": "tunnel_sim.files.importing.arrays:MAT",
-    ".h5": "tunnel_sim.files.importing.arrays:HDF5",
-    ".hdf5": "tunnel_sim.files.importing.arrays:HDF5",
-    ".hdf": "tunnel_sim.files.importing.arrays:HDF5",
-    ".tdms": "tunnel_sim.files.importing.arrays:TDMS",
+    ".parquet": "tunnel_sim.files.importing.binary:PARQUET",
+    ".xlsx": "tunnel_sim.files.importing.binary:WORKBOOK",
+    ".xlsm": "tunnel_sim.files.importing.binary:WORKBOOK",
+    ".mat": "tunnel_sim.files.importing.binary:MAT",
+    ".h5": "tunnel_sim.files.importing.binary:HDF5",
+    ".hdf5": "tunnel_sim.files.importing.binary:HDF5",
+    ".hdf": "tunnel_sim.files.importing.binary:HDF5",
+    ".tdms": "tunnel_sim.files.importing.binary:TDMS",
 }
 """Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
 

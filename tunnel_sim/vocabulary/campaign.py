@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.joint_law import JointLaw
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
-from tunnel_sim.vocabulary.rig import Rig
+from tunnel_sim.vocabulary.rig import JointLaw, Rig
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -24,7 +24,7 @@ from scipy.special import ndtr
 from identification.estimate import Quantity
 from identification.neural.posterior.features import LEVEL, Features
 from identification.neural.posterior.rivals import MORE, SETS
-from identification.neural.stored import open_stored, read_packaged, read_stored
+from identification.neural.training_set import open_stored, read_packaged, read_stored
 from tunnel_sim.vocabulary.record import Array
 
 LEVELS = (0.025, 0.5, 0.975)

@@ -8,7 +8,7 @@ import pytest
 from identification.estimate import Quantity
 from identification.scoring import ScoredEstimate, collect, overall, score
 from identification.statistics import Proportion
-from tunnel_sim.files.json_text import as_json
+from tunnel_sim.files.writing import as_json
 
 
 def outcomes(errors, *, std=1.0, truth=10.0, bound=1.0):

@@ -24,7 +24,7 @@ from tunnel_lab.show.live import Controls, History, LiveRun, Puppet, missing_dis
 from tunnel_lab.show.request import Request, shown_run
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
-from tunnel_sim.files.json_text import as_json
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Tunnel = Callable[..., tuple[int, str, str]]

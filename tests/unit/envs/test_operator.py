@@ -9,7 +9,7 @@ import pytest
 from env_episodes import episode, make
 from scipy.integrate import solve_ivp
 
-from tunnel_sim.envs.config import FreeDecayConfig
+from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.controls import WindAnswer
 from tunnel_sim.files.rig_file import load_rig
 

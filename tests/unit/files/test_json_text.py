@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from tunnel_sim.files.json_text import json_line, json_text
+from tunnel_sim.files.writing import json_line, json_text
 
 
 def test_numpy_values_are_plain_numbers() -> None:

@@ -23,7 +23,7 @@ import xlsxwriter
 
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.arrays import _unpacked_size
+from tunnel_sim.files.importing.binary import _unpacked_size
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.readers import load_reader

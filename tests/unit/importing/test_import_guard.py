@@ -10,8 +10,8 @@ import pytest
 
 from tests.unit.importing.odd_readers import TABLES
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing import guard
-from tunnel_sim.files.importing.guard import read_guarded
+from tunnel_sim.files.importing import source as guard
+from tunnel_sim.files.importing.source import read_guarded
 from tunnel_sim.files.importing.tables import Table
 from tunnel_sim.vocabulary import limits
 

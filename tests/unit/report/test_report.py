@@ -279,7 +279,7 @@ def test_hashes_and_versions_are_on_the_page(document, written):
 
 
 def test_without_a_browser_the_summary_is_refused(document, data, tmp_path, monkeypatch):
-    monkeypatch.setattr("tunnel_lab.report.summary.shutil.which", lambda _: None)
+    monkeypatch.setattr("tunnel_lab.report.page.shutil.which", lambda _: None)
     with pytest.raises(TunnelError, match=r"no Chromium to print with.*--report"):
         write_summary(document, data, tmp_path / "summary.pdf")
     assert not (tmp_path / "summary.pdf").exists()
@@ -287,7 +287,7 @@ def test_without_a_browser_the_summary_is_refused(document, data, tmp_path, monk
 
 def test_a_browser_that_fails_leaves_no_file(document, data, tmp_path, monkeypatch):
     monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")
-    monkeypatch.setattr("tunnel_lab.report.summary.find_browser", lambda: "false")
+    monkeypatch.setattr("tunnel_lab.report.page.find_browser", lambda: "false")
     with pytest.raises(TunnelError, match="Chromium could not print"):
         write_summary(document, data, tmp_path / "summary.pdf")
     assert not (tmp_path / "summary.pdf").exists()

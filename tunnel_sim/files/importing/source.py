@@ -1,22 +1,230 @@
-"""Files of any known format as tables, before anybody knows what their columns mean."""
+"""From a file to its tables: its reader is chosen, and runs in a process with limits.
+
+A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process serves
+one file after another. It is ended when it exceeds a limit, and another one takes its place. Tables come back as
+JSON and raw numbers. `tunnel_sim.vocabulary.limits` holds the limits.
+"""
 
 from __future__ import annotations
 
+import atexit
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+import json
+import math
+import os
+import pkgutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any, BinaryIO, cast
 
 import numpy as np
 
 from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.guard import read_guarded
-from tunnel_sim.files.importing.tables import Table, by_run, with_input_facts
+from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
 from tunnel_sim.files.importing.text import TEXT, read_text_tables
 from tunnel_sim.files.readers import Reader, load_reader, reader_place
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
+
+_SERVE = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from tunnel_sim.files.importing.source import serve; serve()"
+)
+_LATEST = 3.0  # times the allowed time
+_OUT_OF_TIME = -getattr(
+    signal, "SIGXCPU", math.inf
+)  # exit status of a process that Linux or macOS ended for it
+_DAMAGED = "export it again, or as text"
+_lock = threading.Lock()
+_kept: list[_Server] = []
+
+
+def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
+    """The tables of a file, read in a process with limits.
+
+    Args:
+        reader: where the `Reader` of the format is, ``module:name``.
+        content: of the file.
+
+    Raises:
+        TunnelError: as the reader, or when a limit is exceeded or the process dies.
+    """
+    with _lock:
+        if _kept and not _kept[0].usable():
+            _kept.pop().end()
+        if not _kept:
+            _kept.append(_Server())
+        try:
+            return _kept[0].read(reader, content, where)
+        except BaseException as error:
+            # What is left of an answer that nobody waits for would be taken for the next one.
+            if not isinstance(error, TunnelError) or not _kept[0].usable():
+                _kept.pop().end()
+            raise
+
+
+@atexit.register
+def _end() -> None:
+    while _kept:
+        _kept.pop().end()
+
+
+class _Server:
+    """The process, seen from the one that asks."""
+
+    def __init__(self) -> None:
+        from multiprocessing.spawn import get_executable  # a program that embeds Python may have set it
+
+        from tunnel_sim.processes import ONE_THREAD
+
+        self._process = subprocess.Popen(
+            [os.fsdecode(get_executable()), "-W", "ignore", "-c", _SERVE, json.dumps([*map(str, sys.path)])],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        self._asked, self._answers = cast(BinaryIO, self._process.stdin), cast(BinaryIO, self._process.stdout)
+        self._owner = os.getpid()
+
+    def usable(self) -> bool:
+        """Whether the process runs and belongs to this one: a fork must not talk on its parent's pipes."""
+        return self._owner == os.getpid() and self._process.poll() is None
+
+    def end(self) -> None:
+        """End the process at once."""
+        if self._owner == os.getpid():
+            self._process.kill()
+            self._process.wait()
+        for stream in (self._asked, self._answers):
+            with suppress(OSError):  # what was left to be sent cannot be
+                stream.close()
+
+    def read(self, reader: str, content: bytes, where: str) -> list[Table]:
+        """The tables of a file, as `read_guarded`."""
+        allowed = limits.READER_SECONDS + len(content) / limits.READER_PACE
+        late = threading.Event()
+
+        def stop() -> None:
+            late.set()
+            self._process.kill()
+
+        watch = threading.Timer(allowed, stop)
+        watch.daemon = True
+        watch.start()
+        try:
+            request = {"reader": reader, "where": where, "seconds": allowed, "sizes": [len(content)]}
+            _send(self._asked, request, [content])
+            answer, arrays = _received(self._answers)
+        except (EOFError, OSError):
+            status = self._process.wait()
+            too_long = late.is_set() or status == _OUT_OF_TIME
+            ended = f"ends the program that reads it (exit status {status})"
+            raise TunnelError(
+                f"takes longer than {allowed:.3g} s to read" if too_long else ended,
+                where=where,
+                remedy=f"it may be damaged: {_DAMAGED}",
+            ) from None
+        finally:
+            watch.cancel()
+        if "last" in answer:
+            self._process.wait()
+        if "error" in answer:
+            raise TunnelError(answer["error"], where=where, remedy=answer["remedy"])
+        return _unpacked(answer["tables"], arrays)
+
+
+def serve() -> None:
+    """Read files for another process, until it closes the pipe."""
+    asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whatever a library prints is not an answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the asking process ends this one
+    _limit("RLIMIT_AS", limits.READER_MEMORY)
+    with suppress(EOFError):
+        while True:
+            request, content = _received(asked)
+            # The asking process ends this one earlier, unless it has been killed itself.
+            # The limit counts whole seconds.
+            _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
+            try:
+                tables = pkgutil.resolve_name(request["reader"]).read_tables(content.pop(), request["where"])
+                _send(answers, *_packed(tables))
+            except TunnelError as error:
+                _send(answers, {"error": error.what, "remedy": error.remedy, "sizes": []}, [])
+            except MemoryError:
+                what = f"needs more than {limits.READER_MEMORY / 2**30:g} GiB of memory to be read"
+                remedy = f"split it; if it is damaged, {_DAMAGED}"
+                _send(answers, {"error": what, "remedy": remedy, "sizes": [], "last": True}, [])
+                return  # the next file gets a process that holds nothing
+
+
+def _limit(name: str, most: int) -> None:
+    """Bound a resource of this process where the system can: Linux all, macOS the processor's time."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        kind = getattr(resource, name)
+        _, hard = resource.getrlimit(kind)
+        resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memoryview]) -> None:
+    """Send a line of JSON, and the parts whose sizes it holds."""
+    stream.write(json.dumps(head).encode() + b"\n")
+    for part in parts:
+        stream.write(part)
+    stream.flush()
+
+
+def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
+    """What `_send` has sent.
+
+    Raises:
+        EOFError: the other process has ended.
+    """
+    line = stream.readline()
+    if not line.endswith(b"\n"):
+        raise EOFError
+    head = json.loads(line)
+    parts = [stream.read(size) for size in head["sizes"]]
+    if [len(part) for part in parts] != head["sizes"]:
+        raise EOFError
+    return head, parts
+
+
+def _packed(tables: Sequence[Table]) -> tuple[dict[str, Any], list[memoryview]]:
+    """Tables as JSON, and the values of their columns."""
+    columns = [np.ascontiguousarray(c.values, dtype=np.float64) for table in tables for c in table.channels]
+    described = [
+        {field.name: getattr(table, field.name) for field in fields(Table)}
+        | {"channels": [(c.name, c.unit) for c in table.channels]}
+        for table in tables
+    ]
+    return {"tables": described, "sizes": [c.nbytes for c in columns]}, [c.data for c in columns]
+
+
+def _unpacked(described: Sequence[dict[str, Any]], arrays: Sequence[bytes]) -> list[Table]:
+    """The tables that `_packed` has described."""
+    values = (np.frombuffer(array) for array in arrays)
+    return [
+        Table(
+            **table
+            | {
+                "channels": tuple(Channel(name, next(values), unit) for name, unit in table["channels"]),
+                "said": tuple(table["said"]),
+            }
+        )
+        for table in described
+    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,21 +1,165 @@
-"""Readers of files that hold arrays by name: MAT, HDF5 and TDMS."""
+"""Tables of binary formats: Parquet, workbooks, MATLAB, HDF5 and TDMS."""
 
 from __future__ import annotations
 
 import io
+import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import Channel, Table, hold_order, known_unit, split_unit
-from tunnel_sim.files.readers import Reader, faults
-from tunnel_sim.files.reading import check_count
+from tunnel_sim.files.importing.tables import (
+    Channel,
+    Table,
+    by_texts,
+    hold_order,
+    known_unit,
+    names_runs,
+    split_unit,
+)
+from tunnel_sim.files.importing.text import find_layout, is_number, tables_of
+from tunnel_sim.files.readers import USED_COLUMNS, FileTable, Reader, faults
+from tunnel_sim.files.reading import check_count, frame_schema, read_frame
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import library
+from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
+
+_REMEDY = "write the file again, as Parquet or as text"
+
+
+def _read_run(content: bytes, where: str, most: int) -> FileTable:
+    """The columns of a run file that are used; arguments as in `Reader`."""
+    remedy = "write the file again, as Parquet or as CSV"
+    schema = frame_schema(content, where, remedy, rows=most, counted="samples")
+    used = [name for name in schema if name in USED_COLUMNS]
+    for name in used:
+        if not schema[name].is_numeric():
+            raise TunnelError(
+                f"the column {name} holds {one_line(schema[name], 30)}, not numbers",
+                where=where,
+                remedy=f"write {name} as floating-point numbers",
+            )
+    return FileTable(read_frame(content, where, remedy, used), tuple(schema))
+
+
+def _read_tables(content: bytes, where: str) -> list[Table]:
+    """The table of a Parquet file; arguments as in `Reader`."""
+    schema = frame_schema(content, where, _REMEDY, rows=limits.RUN_SAMPLES, counted="samples")
+    runs = next((name for name, kind in schema.items() if names_runs(name) and kind == pl.String), None)
+    used = [name for name, kind in schema.items() if kind.is_numeric() or kind.is_temporal() or name == runs]
+    frame = read_frame(content, where, _REMEDY, used)
+    channels = []
+    for column in frame.get_columns():
+        if column.name == runs:
+            continue
+        name, unit = split_unit(column.name)
+        if column.dtype.is_temporal():
+            if column.dtype not in (pl.Datetime, pl.Duration):
+                continue
+            column, unit = column.dt.cast_time_unit("ns").to_physical(), "ns"
+            column = column - column.min()
+        values = column.cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        channels.append(Channel(name, values, unit))
+    said = f"Parquet file: {len(channels)} columns of {frame.height} samples"
+    table = Table(tuple(channels), said=(said,))
+    return [table] if runs is None else by_texts(table, runs, frame.get_column(runs))
+
+
+PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
+"""Parquet files."""
+
+
+_HEAD = 400
+
+
+def _read(content: bytes, where: str) -> list[Table]:
+    """The tables of a workbook, one for each sheet; arguments as in `Reader`."""
+    fastexcel = library("fastexcel", "Excel", "import", where)
+    tables = []
+    with faults("an Excel workbook", where):
+        _check_archive(content, where)
+        book = fastexcel.read_excel(content)
+        rows = {
+            name: _rows(book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD), where)
+            for name in book.sheet_names
+        }
+        described: dict[str, dict[str, Any]] = {}
+        for name in list(rows):
+            if found := _descriptions(book, name, rows[name]):
+                described |= found
+                del rows[name]
+        for name, sheet in rows.items():
+            tables += _tables(book, name, sheet, described.get(name, {}))
+    return tables
+
+
+def _rows(sheet: Any, where: str) -> list[list[str]]:
+    check_count(sheet.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
+    return [[cell or "" for cell in row] for row in sheet.to_polars().iter_rows()] if sheet.width else []
+
+
+def _descriptions(book: Any, name: str, rows: Sequence[Sequence[str]]) -> dict[str, dict[str, Any]]:
+    """What a sheet with a column ``sheet`` says about other sheets: cells by heading, by name of the sheet."""
+    heading = [cell.strip().lower() for cell in rows[0]] if rows else []
+    if "sheet" not in heading:
+        return {}
+    # As texts, numbers would lose digits.
+    kinds = {
+        i: "string" if key in ("sheet", "run", "drive_hold") else "float" for i, key in enumerate(heading)
+    }
+    body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
+    found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
+    return (
+        {row["sheet"]: row for row in found} if all(row["sheet"] in book.sheet_names for row in found) else {}
+    )
+
+
+def _tables(book: Any, name: str, rows: Sequence[Sequence[str]], described: Mapping[str, Any]) -> list[Table]:
+    """The tables of a sheet: one, or one for each run."""
+    width = len(rows[0]) if rows else 0
+    layout = find_layout(rows, ["\t".join(row) for row in rows], ".", width)
+    if layout is None:
+        return []
+    numeric = [any(is_number(row[i]) for row in rows[layout.first :]) for i in range(width)]
+    kinds = {i: "float" if number and i != layout.runs else "string" for i, number in enumerate(numeric)}
+    body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
+    heading = "names in the row above the numbers" if layout.headed else "no names of columns"
+    said = f"workbook: sheet '{name}', {width} columns, numbers from row {layout.first + 1}, {heading}"
+    facts = {key: cell for key, cell in described.items() if isinstance(cell, float)}
+    if hold := described.get("drive_hold"):
+        facts["drive_hold"] = hold_order(hold)
+    run = described.get("run") or ""
+    part = run or (name if len(book.sheet_names) > 1 else "")
+    labels = None if layout.runs is None else body.to_series(layout.runs)
+    table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
+    return tables_of(body, layout, ".", labels, table)
+
+
+def _check_archive(content: bytes, where: str) -> None:
+    """Refuse a workbook that unpacks to too much, or that brings programs or links along."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = archive.infolist()
+    size = sum(entry.file_size for entry in entries)
+    check_count(size, limits.DATA_BYTES, "bytes once unpacked", where, "save fewer sheets, or as text")
+    names = [entry.filename.lower() for entry in entries]
+    if "xl/workbook.xml" not in names:
+        raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
+    for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
+        if any(part in name for name in names):
+            raise TunnelError(
+                f"the workbook holds {what}",
+                where=where,
+                remedy="save a copy with values only, as .xlsx or as text",
+            )
+
+
+WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)
+"""Excel workbooks."""
+
 
 RUN_IDS = ("id", "run", "run_id")
 """Members and attributes whose text is the name of the run that a group holds."""
@@ -25,7 +169,7 @@ _HEADER = 128  # bytes before the first element of version 5
 _MOST_CHANNELS = 256  # rows of a matrix: it is turned so that they are fewer than its samples
 
 
-def tables_of(
+def tables_of_arrays(
     arrays: Mapping[str, NDArray[np.generic]],
     kind: str,
     units: Mapping[str, str] = MappingProxyType({}),
@@ -135,7 +279,7 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
         check_size(sum(int(np.prod(item.shape, dtype=float)) for item in datasets.values()), where)
         arrays = attributes | dict(_hdf5_columns(datasets))
         units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
-    return tables_of(arrays, "HDF5 file", units, runs)
+    return tables_of_arrays(arrays, "HDF5 file", units, runs)
 
 
 def _hdf5_columns(datasets: dict[str, Any]) -> list[tuple[str, NDArray[np.generic]]]:
@@ -179,7 +323,7 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
         path: text for path, text in leaves.items() if isinstance(text, str) and path.endswith("/drive_hold")
     }
     arrays |= {path: np.array(hold_order(text)) for path, text in holds.items()}
-    return tables_of(arrays, "MAT file", runs=runs)
+    return tables_of_arrays(arrays, "MAT file", runs=runs)
 
 
 def _unpacked_size(content: bytes) -> int:
