@@ -8,17 +8,16 @@ and 8) gives for run i
 linear in (g, n, d, m). If a campaign does not separate the columns of a block, that block is fitted run by run.
 
 The steps to an `Estimate` are common to all estimators. A method that identifies run
-by run calls `combined_estimate`; a joint method uses its parts.
+by run calls `combination.combined_estimate`; a joint method uses the parts here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
 
 from identification.campaign.springs import wind_off_line
 from identification.estimate import (
@@ -31,8 +30,7 @@ from identification.estimate import (
     Status,
     by_severity,
 )
-from identification.policy import LEAST_SPRING_SPREAD, MISFIT_RATE
-from identification.signal.free_decay import Decay
+from identification.policy import LEAST_SPRING_SPREAD
 from identification.statistics import determined, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -234,82 +232,6 @@ def _full_rank(block: Array) -> bool:
     )
 
 
-Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
-"""The design, the places of its runs, φ and its covariance to φ and its covariance."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunDecay:
-    """The result of a method for one run alone.
-
-    Args:
-        estimate: the run's result, or the status of its failure.
-        decay: decay rate and stiffness; None where the run could not be identified.
-        covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None where decay is.
-    """
-
-    estimate: RunEstimate
-    decay: Decay | None = None
-    covariance: Array | None = None
-
-    @classmethod
-    def failed(cls, run: Run, status: Status) -> RunDecay:
-        """A run without a result, and the reason."""
-        return cls(RunEstimate(run.id, (status,)))
-
-
-def combined_estimate(
-    campaign: Campaign, name: str, found: Sequence[RunDecay], *, together: Combination | None = None
-) -> Estimate:
-    """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k).
-
-    Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio
-    of Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207.
-
-    Args:
-        found: one per run, in the campaign's order.
-        together: a method's own combination of the runs, which starts from that of least squares.
-
-    Returns:
-        The estimate. A run that could not be identified is left out; one without spring stiffness is identified
-        by itself only.
-
-    Raises:
-        TunnelError: when a wind-on run states no air density.
-    """
-    estimate = Estimate(campaign.name, name, tuple(item.estimate for item in found))
-    statuses = statuses_of_runs(campaign, estimate.runs)
-    pairs = [
-        (place, run, item.decay, item.covariance)
-        for place, (run, item) in enumerate(zip(campaign.runs, found, strict=True))
-        if item.decay is not None
-        and item.covariance is not None
-        and item.estimate.identified
-        and run.spring_stiffness is not None
-    ]
-    statuses |= noise_statuses([run.noise for run in estimate.runs])
-    if not pairs:
-        return replace(estimate, statuses=by_severity(statuses))
-    runs = [run for _, run, _, _ in pairs]
-    design = build_design(runs, campaign.rig)
-    decays = np.array([[decay.rate, decay.stiffness] for _, _, decay, _ in pairs])
-    informations = [inverse(covariance) for _, _, _, covariance in pairs]
-    combined = combine(design, decays, informations)
-    if combined is None:
-        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-    parameters, covariance = combined
-    ratio = _birge_ratio(design, parameters, decays, informations)
-    if together is not None:
-        parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
-    values = derivatives(design, parameters)
-    own = values.jacobian @ (covariance * ratio) @ values.jacobian.T
-    if values.names and not determined(own):
-        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-    return filled_estimate(
-        campaign, estimate, runs, design, values, own, statuses | design_statuses(design, parameters)
-    )
-
-
 def filled_estimate(
     campaign: Campaign,
     estimate: Estimate,
@@ -333,15 +255,6 @@ def filled_estimate(
         **wind_off(estimate.runs, campaign.runs),
         **parameter_quantities(found, covariance, has_size=design.has_size),
     )
-
-
-def _birge_ratio(design: Design, parameters: Array, decays: Array, informations: Sequence[Array]) -> float:
-    freedom = decays.size - design.size
-    if freedom < 1:
-        return 1.0
-    away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
-    scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-    return scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
 
 
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:

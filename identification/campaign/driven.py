@@ -24,12 +24,12 @@ from identification.campaign.derivatives import (
 from identification.estimate import Estimate, Status, by_severity
 from identification.printing import with_std
 from identification.signal.decay_fit import RunFit
-from identification.signal.driven_fit import DrivenRun, fit_with_inputs
+from identification.signal.driven_fit import DrivenRun, Gained, fit_with_inputs
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import FittedRun, residuals_of
 from identification.statistics import determined, eliminate, fisher_covariance
 from identification.status import Outcome, Remark
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.record import Array
 
 _Pairs = Sequence[tuple[Run, FittedRun]]
@@ -49,16 +49,12 @@ def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statu
     """
     statuses = statuses | noise_statuses([item.noise for _, item in pairs])
     fitted = [(run, item) for run, item in pairs if item.fit is not None]
-    linked = [(run, item) for run, item in fitted if run.spring_stiffness is not None]
-    if linked and "g" not in build_design([run for run, _ in linked], campaign.rig).columns:
-        # without a known moment a body without a spring says nothing on the inertia
-        linked = [(run, item) for run, item in linked if run.spring_stiffness]
-    joined = {run.id for run, _ in linked}
+    joined = joined_runs([run for run, _ in fitted], campaign.rig)
+    linked = [(run, item) for run, item in fitted if run.id in joined]
     remarks = tuple(
-        _run_remark(run, item)
+        run_remark(run, item.gained)
         for run, item in fitted
-        if isinstance(item, DrivenRun)
-        and (run.unrestrained or (run.id not in joined and run.drive is not None and run.drive.on_body))
+        if isinstance(item, DrivenRun) and is_remarked(run, joined)
     )
     estimate = replace(estimate, remarks=remarks)
     return (
@@ -100,7 +96,7 @@ def _joint(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[
         campaign, estimate, runs, design, values, values.jacobian @ inner @ values.jacobian.T, statuses
     )
     gained = linked.size > design.size
-    gain = (_gain_remark(runs, found.parameters, covariance, values.get("yaw_inertia")),) if gained else ()
+    gain = (gain_remark(runs, found.parameters, covariance, values.get("yaw_inertia")),) if gained else ()
     return replace(filled, noise=noise, remarks=(*gain, *estimate.remarks))
 
 
@@ -114,12 +110,13 @@ def _own_coefficients(pairs: _Pairs) -> tuple[Array, list[Array]]:
     coefficients, weights = np.zeros((len(pairs), 3)), []
     for i, (_, item) in enumerate(pairs):
         if isinstance(item, DrivenRun):
-            coefficients[i] = item.coefficients
-            weights.append(item.weight)
+            coefficients[i] = item.gained.coefficients
+            weights.append(item.gained.weight)
             continue
         fit, weight = _fit_of(item), np.zeros((3, 3))
+        assert item.noise is not None
         coefficients[i, :2] = fit.decay.rate, fit.decay.stiffness
-        weight[:2, :2] = fit.reduced(2)[0]
+        weight[:2, :2] = fit.reduced(2)[0] / (item.noise.std**2 * item.noise.slow_ratio)
         weights.append(weight)
     return coefficients, weights
 
@@ -149,13 +146,30 @@ def with_gains(design: Design, runs: Sequence[Run]) -> Design:
     return replace(design, links=tuple(links))
 
 
-def _run_remark(run: Run, item: DrivenRun) -> Remark:
+def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
+    """Ids of the runs that are fitted together: those of stated stiffness.
+
+    Without a known moment or a spring in any of them, a body without a spring says nothing on the inertia.
+    """
+    stated = [run for run in runs if run.spring_stiffness is not None]
+    if stated and "g" not in build_design(stated, rig).columns:
+        stated = [run for run in stated if run.spring_stiffness]
+    return {run.id for run in stated}
+
+
+def is_remarked(run: Run, joined: set[str]) -> bool:
+    """Whether a note says what a driven run shows by itself: without a spring, or where it gives no coefficient."""
+    apart = run.id not in joined and run.drive is not None and run.drive.on_body
+    return run.unrestrained or apart
+
+
+def run_remark(run: Run, gained: Gained) -> Remark:
     """What a driven run shows by itself, per unit inertia, and what it does not show."""
-    (rate, _, gain), (rate_std, _, gain_std) = item.coefficients, item.deviations
+    (rate, _, gain), (rate_std, _, gain_std) = gained.coefficients, gained.deviations
     said = f"the gain of the input is {with_std(gain, gain_std)} rad/s² per unit"
-    if item.offset is None:
+    if gained.offset is None:
         return Remark(Outcome.NOTED, (run.id,), said, "state spring_stiffness for a gain in N m per unit")
-    known, offset = run.input_gain is not None, item.offset
+    known, offset = run.input_gain is not None, gained.offset
     return Remark(
         Outcome.NOTED,
         (run.id,),
@@ -171,7 +185,14 @@ def _run_remark(run: Run, item: DrivenRun) -> Remark:
     )
 
 
-def _gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inertia: float | None) -> Remark:
+def gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inertia: float | None) -> Remark:
+    """The gain that is common to the inputs of unknown gain.
+
+    Args:
+        parameters: φ with the gain last, per unit inertia, shape (p + 1,).
+        covariance: of them, shape (p + 1, p + 1).
+        inertia: kg m²; None where it was not found.
+    """
     value, std = float(parameters[-1]), float(np.sqrt(covariance[-1, -1]))
     absolute = "" if inertia is None else f", {value * inertia:.5g} N m per unit"
     return Remark(

@@ -4,7 +4,8 @@ This is for runs in a turbulent stream. There the motion departs randomly from t
 output error is not white and its intervals are too narrow or, after widening, too wide. Here a Kalman filter
 predicts every sample from the previous ones, and decay rate, stiffness and intensity of the moment maximise the
 likelihood of the prediction errors; the initial state and the sensor's zero are fitted by least squares. For a
-run without a random moment the result is that of output error. Sources: Maine & Iliff, SIAM J. Appl. Math. 41
+run without a random moment the result is that of output error. The input of a driven run is exact between its
+samples; for a body without a spring no random moment is sought. Sources: Maine & Iliff, SIAM J. Appl. Math. 41
 (1981) 558–579, doi 10.1137/0141046; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
 10.2514/4.102790.
 """
@@ -15,11 +16,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.campaign.derivatives import RunDecay
+from identification.campaign.combination import RunDecay
 from identification.estimate import NoiseLevel, Quantity, Status
 from identification.estimators.run_by_run import Found, RunByRun
-from identification.signal.decay_fit import block_means, even_reading, project_run
-from identification.signal.filter import DrivenFit, fit_driven
+from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
+from identification.signal.driven import driven_rows
+from identification.signal.driven_fit import DrivenRun, Gained, driven_run
+from identification.signal.filter import DrivenFit, KnownInput, fit_driven
+from identification.signal.free_decay import Decay
 from identification.signal.noise import Residual, noise_level, white_noise
 from identification.signal.run_fit import (
     NO_WINDOWS,
@@ -28,7 +32,10 @@ from identification.signal.run_fit import (
     describe_run,
     identify_run,
 )
+from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.record import Array
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
 _INNOVATIONS_BLOCK = 3  # of them in an eighth of a cycle
@@ -50,16 +57,21 @@ class FilterError(RunByRun):
     blocks_per_cycle: int = 24
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
-        bare = identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
+        bare = (
+            identify_run(run, sensor, cycles_per_window=NO_WINDOWS)
+            if run.drive is None
+            else driven_run(run, sensor)
+        )
         if bare.fit is None or bare.noise is None:
             return RunDecay(bare.estimate)
-        driven = self._driven(bare, sensor)
+        driven = self._driven(run, bare, sensor)
         if driven is not None:
             return _with_moment(run, bare, bare.noise, *driven)
         variance = bare.noise.std**2 * bare.noise.slow_ratio
-        return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance)
+        gained = bare.gained if isinstance(bare, DrivenRun) else None
+        return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, gained)
 
-    def _driven(self, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
+    def _driven(self, run: Run, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
         # The fit, and the sensor noise of one sample that it assumes.
         fit, noise = bare.fit, bare.noise
         if fit is None or noise is None or fit.decay.omega_d == 0.0:
@@ -72,13 +84,34 @@ class FilterError(RunByRun):
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
         deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
-        found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor)
+        known = None if run.drive is None else _known_input(run.drive, bare.reading, factor)
+        found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
+
+
+def _known_input(drive: Drive, reading: Reading, factor: int) -> KnownInput:
+    """The response to the input, in the means of the blocks."""
+
+    def response(decay: Decay) -> Array:
+        motion = Reading(reading.time, _driven_part(reading, drive, decay))
+        return mean_of_blocks(even_reading(motion).yaw, factor)
+
+    return KnownInput(response, by_root=not drive.on_body)
+
+
+def _driven_part(reading: Reading, drive: Drive, decay: Decay) -> Array:
+    """The response to the input of unit gain, exact between the samples."""
+    held = drive.hold == "zero"
+    return np.asarray(driven_rows(reading.time, drive.values, decay.rate, decay.stiffness, held=held)[0])
 
 
 def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float) -> Found:
     decay = found.model.decay
-    projected = project_run(bare.reading, decay)
+    reading, drive = bare.reading, run.drive
+    gain = decay.stiffness if drive is not None and not drive.on_body else found.innovations.gain
+    if drive is not None:
+        reading = Reading(reading.time, reading.yaw - gain * _driven_part(reading, drive, decay))
+    projected = project_run(reading, decay)
     if projected is None:
         return Status.NOT_CONVERGED
     fitted, zero = projected
@@ -86,10 +119,16 @@ def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit
     covariance = found.covariance * noise.slow_ratio
     # The initial state is that of least squares; the part of it due to the moment is of the power of the residual.
     variance = max(noise_std, noise.residual_std) ** 2
-    estimate = describe_run(run, bare.reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
+    estimate = describe_run(run, reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
     q = found.model.intensity_at_resonance
     process_noise = Quantity(q, q * float(np.sqrt(covariance[2, 2])), INTENSITY_UNIT)
-    return RunDecay(replace(estimate, process_noise=process_noise), decay, covariance[:2, :2])
+    estimate = replace(estimate, process_noise=process_noise)
+    if drive is None:
+        return RunDecay(estimate, decay, covariance[:2, :2])
+    size, weight = 3 if drive.on_body else 2, np.zeros((3, 3))
+    weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
+    gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
+    return RunDecay(estimate, decay, covariance[:2, :2], gained)
 
 
 def _judged(before: NoiseLevel, found: DrivenFit, noise_std: float) -> NoiseLevel:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.derivatives import RunDecay
+from identification.campaign.combination import RunDecay
 from identification.estimate import Status
 from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, even_reading, project_run

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar, TypeAlias
 
-from identification.campaign.derivatives import Combination, RunDecay, combined_estimate, loads
+from identification.campaign.combination import Combination, RunDecay, combined_estimate
+from identification.campaign.derivatives import loads
 from identification.campaign.pairing import PairedRun, paired_estimate
 from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate
 from identification.signal.decay_fit import Reading, project_run

@@ -24,6 +24,8 @@ from tunnel_sim.vocabulary.record import Array
 
 _MOST_STEPS = 60
 _SETTLED = 1e-10  # share of the sum of squares by which a last step may lower it
+_POOR = 0.5  # share of the expected fall of the sum of squares, below which a step was too long
+_SHORTER = 0.3  # damping after such a step
 _OWN = 3  # numbers of each run: zero or constant acceleration, initial angle, initial rate
 _GROWTH = 5.0  # logarithm of the growth over the record, beyond which a start overflows
 
@@ -37,8 +39,8 @@ class InputFit:
         own: zero (rad; without a spring the constant acceleration, rad/s²), initial angle (rad) and rate (rad/s) of
             each run, shape (r, 3).
         residuals: reading less model, by run, rad.
-        normal: information of φ, of the common zero where there is one, and then of the runs' own numbers,
-            shape (m, m).
+        normal: information of φ, of the common zero where there is one, and then of the runs' own numbers, shape
+            (m, m).
         converged: whether a last step no longer paid.
     """
 
@@ -50,13 +52,13 @@ class InputFit:
 
 
 @dataclass(frozen=True, eq=False)
-class DrivenRun(FittedRun):
-    """A driven run and its fit.
+class Gained:
+    """Decay rate, stiffness and gain of a driven run.
 
     Args:
         coefficients: a (1/s), k (1/s²) and g (rad/s² per unit of the input), shape (3,).
-        weight: their information times the noise variance in rad², all else unknown, shape (3, 3); rows of zeros
-            for a k that is known to be 0, and for a g that is k.
+        weight: their information, all else unknown, shape (3, 3); rows of zeros for a k that is known to be 0, and
+            for a g that is k.
         offset: of a body without a spring, the constant moment beside the input, in the unit of the input.
     """
 
@@ -67,11 +69,21 @@ class DrivenRun(FittedRun):
     @property
     def deviations(self) -> Array:
         """Standard deviations of the coefficients, shape (3,), in their units; 0 where the weight has no row."""
-        assert self.noise is not None
         known = np.flatnonzero(self.weight.diagonal() > 0.0)
         found = np.zeros(3)
-        found[known] = np.sqrt(inverse(self.weight[np.ix_(known, known)]).diagonal() * self.noise.slow_ratio)
-        return found * self.noise.std
+        found[known] = np.sqrt(inverse(self.weight[np.ix_(known, known)]).diagonal())
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenRun(FittedRun):
+    """A driven run and its fit.
+
+    Args:
+        gained: what the fit says of decay rate, stiffness and gain.
+    """
+
+    gained: Gained
 
 
 def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
@@ -115,9 +127,8 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     weight = np.zeros((3, 3))
     weight[np.ix_(places, places)] = eliminate(found.normal, np.zeros(len(found.normal)), len(places))[0]
     offset = _offset(found, variance, drive.unit) if drifts else None
-    return DrivenRun(
-        reading, fit if estimate.identified else None, noise, estimate, coefficients, weight, offset
-    )
+    gained = Gained(coefficients, weight / variance, offset)
+    return DrivenRun(reading, fit if estimate.identified else None, noise, estimate, gained)
 
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
@@ -182,7 +193,10 @@ def fit_with_inputs(
         after = sum(float(r @ r) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
-            parameters, own, cost, damping = moved, moved_own, after, damping / 10.0
+            # of large residuals the step is too long, and without damping the fit would go to and fro
+            short = cost - after < _POOR * float(step @ (2.0 * gradient - normal @ step))
+            damping = max(3.0 * damping, _SHORTER) if short else damping / 10.0
+            parameters, own, cost = moved, moved_own, after
             residuals, normal, gradient = trial
         else:
             damping = max(10.0 * damping, 1e-6)

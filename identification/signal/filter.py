@@ -21,8 +21,8 @@ the innovations and of their variance, against the gradient of the likelihood (M
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import expm
@@ -152,20 +152,27 @@ class Innovations:
         values: shape (n,), rad.
         variance: their expected variance, rad².
         cost: −2 ln L up to a constant, dimensionless.
+        gain: of a known input, rad/s² per unit; 0 where there is none.
+        gain_variance: of the gain for the model as it is, in the square of its unit.
     """
 
     values: Array
     variance: float
     cost: float
+    gain: float = 0.0
+    gain_variance: float = 0.0
 
 
-def innovations(values: Array, interval: float, model: Driven, noise_variance: float) -> Innovations | None:
-    """One-step prediction errors, with the initial state and the zero at their best.
+def innovations(
+    values: Array, interval: float, model: Driven, noise_variance: float, response: Array | None = None
+) -> Innovations | None:
+    """One-step prediction errors, with the initial state, the zero and the gain of a known input at their best.
 
     Args:
         values: readings or block means, shape (n,), rad.
         interval: between them, s.
         noise_variance: R, of one value, rad².
+        response: to a known input of unit gain, shape (n,), rad per unit of gain; None where there is none.
 
     Returns:
         The innovations; None where the model is out of range.
@@ -173,7 +180,8 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
     time = interval * np.arange(values.size, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = response_rows(time, model.decay)[:2]
-    columns = np.vstack((values, motion, np.ones_like(time), *_started_by_moment(time, model)))
+    known = () if response is None else (response,)
+    columns = np.vstack((values, motion, np.ones_like(time), *_started_by_moment(time, model), *known))
     if not np.isfinite(columns).all():
         return None
     variance = noise_variance
@@ -195,7 +203,12 @@ def innovations(values: Array, interval: float, model: Driven, noise_variance: f
     except np.linalg.LinAlgError:
         return None
     left = columns[0] - solution @ regressors
-    return Innovations(left, variance, float(left.size * np.log(variance) + left @ left / variance))
+    cost = float(left.size * np.log(variance) + left @ left / variance)
+    if response is None:
+        return Innovations(left, variance, cost)
+    length = float(lengths[-1, 0])
+    gain_variance = float(np.linalg.inv(gram)[-1, -1]) * variance / length**2
+    return Innovations(left, variance, cost, float(solution[-1]) / length, gain_variance)
 
 
 def _started_by_moment(time: Array, model: Driven) -> tuple[Array, ...]:
@@ -255,16 +268,37 @@ class DrivenFit:
     Args:
         covariance: of (a, k, ln q), shape (3, 3).
         drop: of −2 ln L against no random moment at all, dimensionless.
+        gained: covariance of (a, k, g) with the gain g of a known input, shape (3, 3); zeros for g where there is
+            none, or where it is k.
     """
 
     model: Driven
     covariance: Array
     innovations: Innovations
     drop: float
+    gained: Array
+
+
+@dataclass(frozen=True, eq=False)
+class KnownInput:
+    """The input of a driven run.
+
+    Args:
+        response: to unit gain at the values of the fit, shape (n,), as a function of the decay.
+        by_root: whether it acts through the spring, so that its gain is k.
+    """
+
+    response: Callable[[Decay], Array]
+    by_root: bool = False
 
 
 def fit_driven(
-    values: Array, interval: float, start: Decay, deviations: Array, noise_variance: float
+    values: Array,
+    interval: float,
+    start: Decay,
+    deviations: Array,
+    noise_variance: float,
+    known: KnownInput | None = None,
 ) -> DrivenFit | None:
     """Fit a driven decay.
 
@@ -274,11 +308,12 @@ def fit_driven(
         start: output error's decay.
         deviations: its standard deviations of (a, k), shape (2,), in 1/s and 1/s².
         noise_variance: of one block mean, rad².
+        known: the input of a driven run; None of a free decay.
 
     Returns:
         The fit; None where no random moment is needed to explain the run.
     """
-    fit = _DrivenLikelihood(values, interval, noise_variance, deviations)
+    fit = _DrivenLikelihood(values, interval, noise_variance, deviations, known)
     bare = fit.at(Driven(start, 0.0))
     unit = noise_variance * start.omega_n**3
     best = fit.best(Driven(start, float(unit * 10.0**decade)) for decade in _DECADES)
@@ -289,18 +324,43 @@ def fit_driven(
         return None
     if bare.cost - found.innovations.cost > MOMENT_DROP_FOR_CORNER:
         found = fit.with_corner(found)
-    return DrivenFit(found.model, found.covariance, found.innovations, bare.cost - found.innovations.cost)
+    return replace(found, drop=bare.cost - found.innovations.cost, gained=fit.with_gain(found))
 
 
 class _DrivenLikelihood:
     """The likelihood of one run, and its maximisation."""
 
-    def __init__(self, values: Array, interval: float, noise_variance: float, deviations: Array) -> None:
-        self.values, self.interval, self.noise_variance = values, interval, noise_variance
+    def __init__(
+        self,
+        values: Array,
+        interval: float,
+        noise_variance: float,
+        deviations: Array,
+        known: KnownInput | None,
+    ) -> None:
+        self.values, self.interval, self.noise_variance, self.known = values, interval, noise_variance, known
         self.nudges = np.append(_NUDGE * deviations, _NUDGE)
 
     def at(self, model: Driven) -> Innovations | None:
-        return innovations(self.values, self.interval, model, self.noise_variance)
+        if self.known is None:
+            return innovations(self.values, self.interval, model, self.noise_variance)
+        with np.errstate(all="ignore"):  # a trial far off is refused by its columns
+            row = self.known.response(model.decay)
+        if self.known.by_root:
+            left = self.values - model.decay.stiffness * row
+            return innovations(left, self.interval, model, self.noise_variance)
+        return innovations(self.values, self.interval, model, self.noise_variance, row)
+
+    def with_gain(self, found: DrivenFit) -> Array:
+        """Covariance of (a, k, g), shape (3, 3): that of g for the model as it is, and by that of the model."""
+        jacobian = np.diag([1.0, 1.0, 0.0])
+        for i, nudge in enumerate(self.nudges):
+            away = nudge * np.eye(3)[i]
+            ahead, back = self.at(_moved(found.model, away)), self.at(_moved(found.model, -away))
+            if ahead is not None and back is not None:
+                jacobian[2, i] = (ahead.gain - back.gain) / (2.0 * nudge)
+        own = np.diag([0.0, 0.0, found.innovations.gain_variance])
+        return np.asarray(jacobian @ found.covariance @ jacobian.T + own)
 
     def best(self, models: Iterable[Driven]) -> Driven | None:
         costs = [(found.cost, model) for model in models if (found := self.at(model)) is not None]
@@ -337,7 +397,7 @@ class _DrivenLikelihood:
             if moved is not None:
                 model, here = moved
             if moved is None or size < _SETTLED:
-                return DrivenFit(model, covariance, here, 0.0)
+                return DrivenFit(model, covariance, here, 0.0, np.zeros((3, 3)))
         return None
 
     def _search(self, model: Driven, here: Innovations, step: Array) -> tuple[Driven, Innovations] | None:
