@@ -62,7 +62,7 @@ def square(time_s: Array, frequency_hz: float) -> Array:
 
 
 def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> Array:
-    """Which multiples of one over the record's length lie in a band.
+    """Which multiples of one over the record's length lie in a band, below half the sample rate.
 
     Args:
         size: number of samples n (a count).
@@ -75,7 +75,7 @@ def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> 
     """
     length = size * interval
     first, last = np.ceil(low_hz * length - 1e-9), np.floor(high_hz * length + 1e-9)
-    return np.arange(max(first, 1.0), last + 1.0)
+    return np.arange(max(first, 1.0), min(last, (size - 1) // 2) + 1.0)
 
 
 def multisine(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Generator | None = None) -> Array:

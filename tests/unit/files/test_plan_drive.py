@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
-from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.plan_drive import DriveTable
+from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, TruthTable, load_plan
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.excitation import square
 from tunnel_sim.vocabulary.plan import CampaignPlan
@@ -135,6 +138,14 @@ FILES = {
     "untimed": "t,moment_nm\n0,1\n10,2\n",
     "back": "time_s,moment_nm\n0,1\n10,2\n9,3\n",
 }
+
+
+def test_the_reference_page_has_every_key_and_kind() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "plan.md").read_text(encoding="utf-8")
+    kinds = get_args(DriveTable.model_fields["kind"].annotation)
+    known = {*PlanDocument.model_fields, *DriveTable.model_fields, *kinds, *SensorModelTable.model_fields}
+    shown = set(re.findall(r"`(?:\[+)?(\w+)(?:\]+)?`", page))
+    assert known | set(TruthTable.model_fields) <= shown
 
 
 @pytest.mark.parametrize("case", BAD)
