@@ -1,10 +1,18 @@
 #include "binding.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "expression.h"
 
 _Static_assert(sizeof(mjtNum) == sizeof(double), "the law and the state are in double precision");
+
+// Share of an interval by which the sum of the steps may fall short of a sample's time.
+static const mjtNum kReached = 1e-6;
+
+static int given(const mjModel* m, int numeric) {
+  return numeric >= 0 && m->numeric_data[m->numeric_adr[numeric]] != 0;
+}
 
 static mjtNum mass_diagonal(const mjModel* m, const mjData* d, int dof) {
   return d->M[m->M_rowadr[dof] + m->M_rownnz[dof] - 1];
@@ -92,9 +100,25 @@ static mjtNum mechanism_moment(const mjModel* m, const mjData* d, const vwt_ids*
   return built_in + vwt_program_value(&program, &in);
 }
 
+// The drive at a time within the step, N m. A held drive has the value at the step's start, so that the last stage of
+// a step does not see the next sample.
+static mjtNum drive_at(const mjModel* m, const vwt_ids* self, const vwt_state* state, mjtNum time) {
+  if (!given(m, self->drive_held)) {
+    return series_at(m, self->drive, self->drive_interval, time);
+  }
+  const mjtNum interval = m->numeric_data[m->numeric_adr[self->drive_interval]];
+  const mjtNum start = state->started == 0 ? time : state->time;
+  const mjtNum last = m->numeric_size[self->drive] - 1, at = floor(start / interval + kReached);
+  return m->numeric_data[m->numeric_adr[self->drive] + (int)mju_clip(at, 0, last)];
+}
+
 static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
                               const vwt_state* state, const vwt_motion* at) {
-  return (vwt_moments){air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at)};
+  vwt_moments law = {air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at)};
+  if (self->drive >= 0) {
+    *(given(m, self->drive_on_end) ? &law.mechanism : &law.air) += drive_at(m, self, state, at->time);
+  }
+  return law;
 }
 
 // All moments on the rod's upper end except friction, including those of MuJoCo's spring, damper and twisted rod.
@@ -179,10 +203,6 @@ void vwt_sense_moment(const mjModel* m, mjData* d, const vwt_ids* self, const vw
       d->sensordata[m->sensor_adr[i]] = moment;
     }
   }
-}
-
-static int given(const mjModel* m, int numeric) {
-  return numeric >= 0 && m->numeric_data[m->numeric_adr[numeric]] != 0;
 }
 
 void vwt_end_step(const mjModel* m, const mjData* d, const vwt_ids* self, vwt_state* state) {

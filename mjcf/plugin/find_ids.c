@@ -45,20 +45,36 @@ static void check_series(const mjModel* m, int values, int interval, const char*
 // A coefficient whose name is misspelt would silently stay zero.
 static void check_names(const mjModel* m) {
   static const char* const series[] = {"wind_speed", "wind_speed_interval", "forcing", "forcing_interval",
-                                      "moment_program"};
+                                      "drive", "drive_interval", "drive_held", "drive_on_end", "moment_program"};
+  const int count = sizeof(series) / sizeof(series[0]);
   for (int i = 0; i < m->nnumeric; i++) {
     const char* name = m->names + m->name_numericadr[i];
     int known = !strncmp(name, "user_", 5);
     for (int k = 0; k < VWT_PARAMETER_COUNT && !known; k++) {
       known = !strcmp(name, vwt_parameter_names[k]);
     }
-    for (int k = 0; k < 5 && !known; k++) {
+    for (int k = 0; k < count && !known; k++) {
       known = !strcmp(name, series[k]);
     }
     if (!known) {
       mju_error("vwt.yaw_moment: numeric %s is unknown; correct it by the table in the plugin's README, or begin "
                 "its name with user_ if it is not the plugin's", name);
     }
+  }
+}
+
+static void find_drive(const mjModel* m, vwt_ids* self) {
+  self->drive = find_numeric(m, "drive");
+  self->drive_interval = find_numeric(m, "drive_interval");
+  self->drive_held = find_numeric(m, "drive_held");
+  self->drive_on_end = find_numeric(m, "drive_on_end");
+  check_series(m, self->drive, self->drive_interval, "drive");
+  if (self->drive < 0 && (self->drive_held >= 0 || self->drive_on_end >= 0)) {
+    mju_error("vwt.yaw_moment: numeric %s is given without drive",
+              self->drive_held >= 0 ? "drive_held" : "drive_on_end");
+  }
+  if (self->drive >= 0 && self->drive_interval < 0) {
+    mju_error("vwt.yaw_moment: numeric drive is a series: give its drive_interval in s");
   }
 }
 
@@ -72,6 +88,7 @@ static void find_series(const mjModel* m, vwt_ids* self) {
   }
   check_series(m, self->wind_speed, self->wind_interval, "wind_speed");
   check_series(m, self->forcing, self->forcing_interval, "forcing");
+  find_drive(m, self);
   for (int i = 0; i < m->numeric_size[self->wind_speed]; i++) {
     if (m->numeric_data[m->numeric_adr[self->wind_speed] + i] < 0) {
       mju_error("vwt.yaw_moment: numeric wind_speed is negative at sample %d", i);

@@ -38,6 +38,7 @@ def printed(codes: list[str], folder: Path) -> list[str]:
         ("measured-records", 3),
         ("a-model-of-your-own", 4),
         ("the-papers-networks", 7),
+        ("a-driven-rig", 5),
     ],
 )
 def test_shown_output_is_real_output(name: str, count: int, tmp_path: Path) -> None:
@@ -52,6 +53,7 @@ def test_every_page_is_executed() -> None:
     assert {page.stem for page in PAGES.glob("*.md")} == {
         "the-papers-own-gap",
         "a-model-of-your-own",
+        "a-driven-rig",
         "measured-records",
         "the-papers-networks",
     }

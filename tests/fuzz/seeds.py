@@ -33,6 +33,7 @@ duration = 5.0
 air_density = 1.2
 truth = { cn_beta = 0.495, cn_r = -0.114, yaw_inertia = 0.1, mechanical_damping = 0.01 }
 sensor = { sample_rate = 500.0, noise_std = 0.001, resolution = 0.0, zero = 0.01 }
+drive = { kind = "multisine", from_hz = 0.5, to_hz = 5.0, amplitudes_nm = [0.1], hold = "zero", seed = 2 }
 
 [[effects]]
 name = "coulomb_friction"

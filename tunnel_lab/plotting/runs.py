@@ -30,6 +30,7 @@ from tunnel_lab.plotting.style import (
     with_breaks,
 )
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ MOST_PANELS = 24
 _COLUMNS = 3
 _POINTS = 2000  # least and greatest readings of as many stretches are drawn
 _GREY = "0.6"
+_INPUTS = {"moment_nm": "moment", "drive": "input", "base_rad": "root"}
 
 
 def run_label(run: Run) -> str:
@@ -73,7 +75,7 @@ def run_label(run: Run) -> str:
 
 @styled
 def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
-    """Angle against time, one panel for each run.
+    """Angle against time, one panel for each run; of a driven run its input is drawn behind it.
 
     Returns:
         Figures of up to twelve panels, in the campaign's order.
@@ -97,7 +99,18 @@ def _trace_page(runs: Sequence[Run]) -> Figure:
             axes.set_ylabel("angle β [rad]")
         if place > len(runs) - columns:
             axes.set_xlabel("time [s]")
+        if run.drive is not None:
+            _draw_input(axes, run.record.time_s, run.drive)
     return fig
+
+
+def _draw_input(axes: Axes, time: Array, drive: Drive) -> None:
+    """The input on an axis of its own at the right, behind the response."""
+    beside = axes.twinx()
+    beside.plot(*with_breaks(time, drive.values), color=_GREY, linewidth=0.5)
+    beside.set_ylabel(f"{_INPUTS[drive.column]} [{drive.unit}]", color="0.4")
+    axes.set_zorder(beside.get_zorder() + 1)
+    axes.patch.set_visible(False)
 
 
 @styled

@@ -97,15 +97,13 @@ def shown_run(request: Request) -> ShownRun:
 
     rig = load_rig()
     plan, condition = _plan_and_condition(request, rig)
-    stated = run_settings(plan.truth, condition)
+    stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
     effects = plan_effects(plan)
     chain = EffectChain.draw(stated, effects, np.random.default_rng([plan.seed, 0]))
     wind = f"{condition.wind_speed:g} m/s" if condition.wind_speed > 0.0 else "wind off"
     names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
-    title = (
-        f"{condition.spring_stiffness:g} N m/rad, {wind}, "
-        f"released at {degrees(condition.release_angle):.3g}°{names}"
-    )
+    start = "driven" if condition.drive else f"released at {degrees(condition.release_angle):.3g}°"
+    title = f"{condition.spring_stiffness:g} N m/rad, {wind}, {start}{names}"
     return ShownRun(rig, chain, plan.sensor, title, request)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import native_library, state_vector
-from tunnel_sim.physics.run_settings import RunSettings, spring_end_angle
+from tunnel_sim.physics.run_settings import DriveMoment, RunSettings, spring_end_angle
 from tunnel_sim.physics.steps import check_stable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
@@ -235,11 +235,6 @@ def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model
     Raises:
         TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
     """
-    if settings.drive is not None:
-        raise TunnelError(
-            "the MuJoCo model does not take the input of a driven run yet",
-            remedy="simulate a free decay, or integrate it with tunnel_sim.physics.forward",
-        )
     check_stable(rig, settings)
     key = (repr(rig), settings.layout(), drawn)
     compiled = _COMPILED.get(key)
@@ -354,7 +349,7 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         Values by name, without those that are attributes of joint and body.
 
     Raises:
-        TunnelError: when a series has an unknown name.
+        TunnelError: when a series has an unknown name, or the steps do not end at the samples of the drive.
     """
     law = settings.law(rig)
     values: dict[str, tuple[float, ...]] = {
@@ -368,7 +363,28 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         values[f"{name}_interval"] = (series.interval,)
     if settings.program:
         values["moment_program"] = settings.program
-    return values
+    return values if settings.drive is None else values | _drive_numerics(settings.drive, settings.timestep)
+
+
+def _drive_numerics(drive: DriveMoment, timestep: float) -> dict[str, tuple[float, ...]]:
+    """The moment of a drive, N m, at samples from time 0 on, and how it acts."""
+    times = drive.time_s + drive.delay
+    interval = float(times[-1]) / max(1, times.size - 1)
+    even = times.size > 1 and np.allclose(
+        times, interval * np.arange(times.size), rtol=0.0, atol=1e-6 * interval
+    )
+    steps = interval / timestep
+    if not even or abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
+        raise TunnelError(
+            "the samples of the drive are not at even times from 0 on, a whole number of steps apart",
+            remedy="give it at the times of the record without a delay, and a timestep that divides their interval",
+        )
+    return {
+        "drive": tuple((drive.scale * drive.values).tolist()),
+        "drive_interval": (interval,),
+        "drive_held": (float(drive.held),),
+        "drive_on_end": (float(not drive.on_body),),
+    }
 
 
 def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:

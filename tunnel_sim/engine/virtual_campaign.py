@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 from math import isclose
 from typing import Any
@@ -15,7 +16,7 @@ from tunnel_sim.effects.base import SPRING_TOLERANCE
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.run_settings import Motion, RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, Motion, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, EffectSetting, Truth
@@ -73,12 +74,20 @@ def simulate_campaigns(
             f"the plans have {len(rates)} different sample rates", remedy="simulate each rate separately"
         )
     drawn = [_draw(plan) for plan in plans]
-    true = [chain.physics() for runs in drawn for _, chain in runs]
+    true = [_true_run(chain) for runs in drawn for _, chain in runs]
     motions = iter(simulate_motions(rig, true, *rates, nthread=nthread, progress=progress))
     return [
         _campaign(plan, rig, list(islice(motions, len(runs))), runs)
         for plan, runs in zip(plans, drawn, strict=True)
     ]
+
+
+def _true_run(chain: EffectChain) -> RunSettings:
+    """The physics of a run with its effects; a spring whose root moves pulls with its true stiffness."""
+    run = chain.physics()
+    if run.drive is None or run.drive.on_body:
+        return run
+    return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
 
 
 _Drawn = list[tuple[np.random.Generator, EffectChain]]  # of every run, in the plan's order
@@ -87,7 +96,8 @@ _Drawn = list[tuple[np.random.Generator, EffectChain]]  # of every run, in the p
 def _draw(plan: CampaignPlan) -> _Drawn:
     """The random parts of the effects in every run, and the generator of its noise."""
     effects = plan_effects(plan)
-    stated = [run_settings(plan.truth, condition) for condition in plan.conditions]
+    rate = plan.sensor.sample_rate
+    stated = [run_settings(plan.truth, condition, sample_rate=rate) for condition in plan.conditions]
     rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(plan.seed).spawn(len(stated))]
     return [(rng, EffectChain.draw(run, effects, rng)) for run, rng in zip(stated, rngs, strict=True)]
 
@@ -100,7 +110,8 @@ def stated_run(condition: Condition, record: Record) -> Run:
         wind_speed=condition.wind_speed,
         spring_stiffness=condition.spring_stiffness,
         air_density=condition.air_density if condition.wind_speed > 0.0 else None,
-        release_angle=condition.release_angle,
+        release_angle=condition.release_angle if condition.drive is None else None,
+        drive=condition.drive,
     )
 
 
@@ -121,12 +132,25 @@ def _campaign(plan: CampaignPlan, rig: Rig, motions: Sequence[Motion], drawn: _D
     )
 
 
-def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) -> RunSettings:
+def run_settings(
+    truth: Truth, condition: Condition, *, timestep: float = 1e-3, sample_rate: float | None = None
+) -> RunSettings:
     """The stated physics of one run.
 
     Args:
         timestep: integration step, s.
+        sample_rate: of the input of a driven run, Hz; not used for a free decay.
     """
+    given, moment = condition.drive, None
+    if given is not None:
+        assert sample_rate is not None
+        moment = DriveMoment(
+            np.arange(given.values.size) / sample_rate,
+            given.values,
+            scale=1.0 if given.on_body else condition.spring_stiffness,
+            held=given.hold == "zero",
+            on_body=given.on_body,
+        )
     return RunSettings(
         spring_stiffness=condition.spring_stiffness,
         derivatives=AeroDerivatives(truth.cn_beta, truth.cn_r),
@@ -137,6 +161,7 @@ def run_settings(truth: Truth, condition: Condition, *, timestep: float = 1e-3) 
         release_angle=condition.release_angle,
         duration=condition.duration,
         timestep=timestep,
+        drive=moment,
     )
 
 
@@ -161,6 +186,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
                 remedy="give it once, with all its parameters",
             )
         _check_spring(effect, plan)
+        _check_driven(effect, plan)
     return tuple(
         sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, known_effects().index(type(effect))))
     )
@@ -191,6 +217,25 @@ def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
             f"no run has a spring_stiffness of {chosen:g} N m/rad",
             where=f"effect {effect.name}",
             remedy=f"give one of {', '.join(f'{spring:g}' for spring in springs)}",
+        )
+
+
+def _check_driven(effect: Effect, plan: CampaignPlan) -> None:
+    """Refuse effects whose meaning with an input is not defined."""
+    drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
+    if not drives or effect.is_null:
+        return
+    if effect.skips:
+        raise TunnelError(
+            "leaves samples out, which is not simulated for driven runs",
+            where=f"effect {effect.name}",
+            remedy="leave out the effect or [drive]",
+        )
+    if (effect.channel, effect.condition) == ("stiffness", "always") and not all(d.on_body for d in drives):
+        raise TunnelError(
+            "changes the spring, which is not simulated where its root moves",
+            where=f"effect {effect.name}",
+            remedy="leave out the effect, or drive the body by amplitudes_nm",
         )
 
 

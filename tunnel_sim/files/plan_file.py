@@ -5,18 +5,22 @@ The packaged ``data/paper-campaign.toml`` is an example with a comment on every 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from importlib import resources
+from itertools import count
 from math import radians
 from pathlib import Path
 from typing import Annotated, Protocol, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
+from tunnel_sim.files.plan_drive import DriveTable, check_drive, drive_of_file, drive_of_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, load_toml, shown, validate
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import (
     DEFAULT_SAMPLE_RATE,
@@ -53,6 +57,12 @@ WindSpeeds = Annotated[
 ReleaseAngles = Annotated[
     list[ReleaseAngle], Field(min_length=1, description="a list of angles in degrees, such as [20]")
 ]
+FreeDecays = Annotated[
+    list[ReleaseAngle],
+    Field(
+        description="a list of angles in degrees, such as [20]; it may be left out where a [drive] is given"
+    ),
+]
 Repeats = Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")]
 
 
@@ -84,7 +94,7 @@ class EffectTable(StrictModel):
 
 
 class PlanDocument(StrictModel):
-    """The whole of a campaign description: springs × speeds × release angles × repeats."""
+    """The whole of a campaign description: springs × speeds × (release angles and driven runs) × repeats."""
 
     name: OneLine = Field(description="a short name in quotes")
     description: str = Field(default="", description="text in quotes, or leave it out")
@@ -92,13 +102,24 @@ class PlanDocument(StrictModel):
     springs: Springs = Field(default=[])
     spring_stiffness: Stiffnesses = Field(default=[])
     wind_speeds: WindSpeeds
-    release_angles_deg: ReleaseAngles
+    release_angles_deg: FreeDecays = Field(default=[])
     repeats: Repeats = 1
     duration: Positive = Field(description="a positive number in s")
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
     truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")
     sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
+    drive: DriveTable | None = Field(default=None, description="a [drive] table with kind and amplitudes")
     effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
+
+    @property
+    def sample_rate(self) -> float:
+        """Hz."""
+        return DEFAULT_SAMPLE_RATE if self.sensor.sample_rate is None else self.sensor.sample_rate
+
+    @property
+    def samples(self) -> int:
+        """The number of samples in a run (a count)."""
+        return max(2, round(self.duration * self.sample_rate))
 
 
 def read_plan(path: Path) -> PlanDocument:
@@ -110,9 +131,21 @@ def read_plan(path: Path) -> PlanDocument:
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
     plan = validate(PlanDocument, document, path)
     check_conditions(plan, shown(path))
-    rate = DEFAULT_SAMPLE_RATE if plan.sensor.sample_rate is None else plan.sensor.sample_rate
-    check_size(run_count(plan), plan.duration, rate, shown(path))
+    driven = 0 if plan.drive is None else len(plan.drive.amplitudes)
+    if not plan.release_angles_deg and plan.drive is None:
+        raise TunnelError(
+            "'release_angles_deg' is empty or missing",
+            where=shown(path),
+            remedy="give release_angles_deg as a list of angles in degrees, such as [20], or a [drive]",
+        )
+    check_size(run_count(plan, driven), plan.duration, plan.sample_rate, shown(path))
+    if plan.drive is not None:
+        check_drive(plan.drive, plan.samples, plan.sample_rate, _drive_of(path))
     return plan
+
+
+def _drive_of(path: Path) -> str:
+    return f"{shown(path)}, [drive]"
 
 
 class ConditionKeys(Protocol):
@@ -139,14 +172,15 @@ class ConditionKeys(Protocol):
         """Number of runs of each combination."""
 
 
-def run_count(keys: ConditionKeys) -> int:
+def run_count(keys: ConditionKeys, driven: int = 0) -> int:
     """The number of runs, calculated from the lengths of the lists.
 
     Args:
         keys: a campaign description, or a table with the same keys.
+        driven: number of driven runs of each spring and speed, before repeats.
     """
     springs = len(keys.springs) + len(keys.spring_stiffness)
-    return springs * len(keys.wind_speeds) * len(keys.release_angles_deg) * keys.repeats
+    return springs * len(keys.wind_speeds) * (len(keys.release_angles_deg) + driven) * keys.repeats
 
 
 def check_size(runs: int, duration: float, sample_rate: float, where: str) -> None:
@@ -213,26 +247,29 @@ def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
             state; None uses the packaged rig.
 
     Returns:
-        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles and repeats.
+        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
+        and repeats.
 
     Raises:
         TunnelError: for the first fault, in one line that names file, key and remedy.
     """
     path = Path(path)
-    return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path))
+    return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path), path.parent)
 
 
-def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
+def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path()) -> CampaignPlan:
     """The plan defined by a validated campaign description.
 
     Args:
         rig: as in `load_plan`.
+        folder: in which the file of a drive is sought.
 
     Raises:
-        TunnelError: when the rig has no such spring.
+        TunnelError: when the rig has no such spring, or the file of a drive is refused.
     """
     stated = document.truth.model_dump(exclude_none=True)
     inertia, damping = rig.dynamics.yaw_inertia, rig.dynamics.mechanical_damping
+    given, numbers = _file_drive(document, folder, where), count()
     density = rig.air.density if document.air_density is None else document.air_density
     return CampaignPlan(
         name=document.name,
@@ -241,18 +278,17 @@ def plan_from(document: PlanDocument, rig: Rig, where: str) -> CampaignPlan:
         truth=Truth(**({"yaw_inertia": inertia, "mechanical_damping": damping} | stated)),
         conditions=tuple(
             Condition(
-                id=f"{label}-v{_short(speed)}-a{_short(angle)}"
-                + (f"-{repeat}" if document.repeats > 1 else ""),
+                id=f"{label}-v{_short(speed)}-{start}",
                 spring_stiffness=stiffness,
                 wind_speed=speed,
                 air_density=density,
-                release_angle=radians(angle),
+                release_angle=angle,
                 duration=document.duration,
+                drive=drive,
             )
             for label, stiffness in _stiffnesses(document, rig.springs, where)
             for speed in document.wind_speeds
-            for angle in document.release_angles_deg
-            for repeat in range(1, document.repeats + 1)
+            for start, angle, drive in _starts(document, given, numbers)
         ),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
@@ -276,6 +312,32 @@ def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: st
             )
     numbered = [(f"s{number}", springs[number]) for number in document.springs]
     return numbered + [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
+
+
+def _file_drive(document: PlanDocument, folder: Path, where: str) -> Drive | None:
+    table = document.drive
+    if table is None or table.file is None:
+        return None
+    time = np.arange(document.samples) / document.sample_rate
+    return drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
+
+
+def _starts(
+    document: PlanDocument, given: Drive | None, numbers: Iterator[int]
+) -> Iterator[tuple[str, float, Drive | None]]:
+    """End of the id, release angle (rad) and input of every run of a spring and a speed, free decays first."""
+    repeats = [f"-{number + 1}" if document.repeats > 1 else "" for number in range(document.repeats)]
+    for angle in document.release_angles_deg:
+        yield from ((f"a{_short(angle)}{repeat}", radians(angle), None) for repeat in repeats)
+    table = document.drive
+    time = np.arange(document.samples) / document.sample_rate
+    for amplitude in () if table is None else table.amplitudes:
+        for repeat in repeats:
+            if amplitude is None or table is None:
+                yield f"file{repeat}", 0.0, given
+            else:
+                drive = drive_of_run(table, amplitude, next(numbers), time)
+                yield f"d{_short(amplitude)}{repeat}", 0.0, drive
 
 
 def _short(value: float) -> str:

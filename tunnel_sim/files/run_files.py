@@ -74,6 +74,14 @@ def read_table(
         TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
             value that is missing or not a number.
     """
+    missing = "put the file there or correct 'file' in campaign.toml"
+    holds = f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given"
+    return _columns(_held(path, where, missing, most, holds), where, timed=timed, quantity=quantity)
+
+
+def _held(
+    path: Path, where: str, missing: str, most: int, holds: str = "give it a header line and samples"
+) -> FileTable:
     reader = load_reader(path.suffix.lower())
     if reader is None or reader.read_run is None:
         kinds = " or ".join(run_endings())
@@ -84,16 +92,38 @@ def read_table(
         path,
         reader.limit,
         where=where,
-        missing="put the file there or correct 'file' in campaign.toml",
+        missing=missing,
         readable=f"name a readable {' or '.join(RUN_ENDINGS)} file",
     )
     if not content.strip():
+        raise TunnelError("the file is empty", where=where, remedy=holds)
+    return reader.read_run(content, where, most)
+
+
+def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
+    """Read the input of a driven run from a file that need not hold a reading.
+
+    Args:
+        path: a file with one of the endings of run files.
+
+    Returns:
+        Times, shape (n,), s, increasing; the input's column; its values, shape (n,), in the unit of that column.
+
+    Raises:
+        TunnelError: as `read_table`, a missing column, or times that do not increase.
+    """
+    held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
+    column = _input_column(held.names, where)
+    if column is None or "time_s" not in held.names:
         raise TunnelError(
-            "the file is empty",
+            f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}",
             where=where,
-            remedy=f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given",
+            remedy="give it time_s in s and one input column",
         )
-    return _columns(reader.read_run(content, where, most), where, timed=timed, quantity=quantity)
+    time, values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
+    if time.size < 2 or not np.all(np.diff(time) > 0.0):
+        raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
+    return time, column, values
 
 
 def table_bytes(

@@ -183,7 +183,7 @@ class RunSettings:
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
         rod_twist: None for a rigid rod.
         program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
-        drive: the moment of a driven run, which the compiled integrator takes; None of a free decay.
+        drive: the moment of a driven run; None of a free decay.
     """
 
     spring_stiffness: float
@@ -252,10 +252,11 @@ class RunSettings:
         """What runs must have in common to share one compiled model.
 
         Returns:
-            Timestep, names and lengths of the series, length of the program, and whether the rod is rigid.
+            Timestep, names and lengths of the series, lengths of program and drive, and whether the rod is rigid.
         """
         series = tuple((name, len(series.values)) for name, series in self.series.items())
-        return (self.timestep, series, len(self.program), self.rod_twist is None)
+        driven = None if self.drive is None else self.drive.values.size
+        return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:
         """Every parameter of the moment law.

@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
 
+from tunnel_sim.vocabulary.drive import Drive
+
 
 @dataclass(frozen=True)
 class AeroDerivatives:
@@ -91,12 +93,13 @@ class Condition:
     """One run to simulate.
 
     Args:
-        id: unique in the campaign; made of spring, speed, angle and repeat.
+        id: unique in the campaign; made of spring, speed, angle (or amplitude of the drive) and repeat.
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         air_density: ρ, kg/m³.
-        release_angle: rad, nose-right positive.
+        release_angle: rad, nose-right positive; of a driven run 0, where it starts at rest.
         duration: of the record, s.
+        drive: the input of a driven run at the samples of the sensor; None of a free decay.
     """
 
     id: str
@@ -105,6 +108,7 @@ class Condition:
     air_density: float
     release_angle: float
     duration: float
+    drive: Drive | None = None
 
 
 @dataclass(frozen=True)

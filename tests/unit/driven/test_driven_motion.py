@@ -221,12 +221,7 @@ def test_other_estimators_refuse_driven_runs_in_one_line(name: str) -> None:
 
 
 def test_what_is_not_done_yet_is_refused() -> None:
-    from tunnel_sim.engine.model import build_model
-
     mixed = campaign(("moment_nm", None))
     rates = replace(mixed, sensor=SensorProperties(RATE, quantity="rate"))
     with pytest.raises(TunnelError, match="driven runs of rates are not identified yet"):
         identify(rates)
-    settings = RunSettings(16.0, AeroDerivatives(0.0, 0.0), INERTIA, DAMPING, drive=DriveMoment(TIME, TIME))
-    with pytest.raises(TunnelError, match="does not take the input of a driven run yet"):
-        build_model(load_rig(), settings)

@@ -95,6 +95,8 @@ def test_numeric_of_another_program() -> None:
         ({**SERIES, "wind_speed_interval": "-0.5"}, "wind_speed_interval must be one positive number"),
         ({**SERIES, "wind_speed_interval": "0.5 0.5"}, "wind_speed_interval must be one positive number"),
         ({"forcing_interval": "0.1"}, "forcing_interval is given without forcing"),
+        ({"drive": "0.1"}, "give its drive_interval"),
+        ({"drive_held": "1"}, "drive_held is given without drive"),
     ],
 )
 def test_series(numerics: dict[str, str], message: str) -> None:

@@ -1,0 +1,123 @@
+"""Driven runs from a plan to an answer. The truth is that of the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis import diagnose
+from identification import identify
+from tunnel_sim.effects import effect_class
+from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
+
+PLAN = """
+name = "driven"
+seed = 3
+springs = [5, 8]
+wind_speeds = [0.0, 15.0]
+duration = 12.0
+truth = { cn_beta = 0.495, cn_r = -0.114 }
+sensor.sample_rate = 100.0
+[drive]
+"""
+MOMENT, ROOT = "amplitudes_nm = [0.3]", "amplitudes_rad = [0.03]"
+BAND = "from_hz = 0.5\nto_hz = 5.0\n"
+MULTISINE = f'{PLAN}kind = "multisine"\n{BAND}amplitudes_nm = [0.2, 0.8]\n'
+KINDS = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "cubic_stiffness")]
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Callable[[str], CampaignPlan]:
+    def loaded(text: str) -> CampaignPlan:
+        (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+        return load_plan(tmp_path / "plan.toml")
+
+    return loaded
+
+
+def with_effect(plan: CampaignPlan, name: str, **parameters: float) -> CampaignPlan:
+    return replace(plan, effects=(EffectSetting(name, parameters),))
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        f'kind = "multisine"\n{BAND}{MOMENT}',
+        f'kind = "multisine"\nseed = 1\n{BAND}{ROOT}\nhold = "zero"',
+        f'kind = "random"\n{BAND}{MOMENT}\nhold = "zero"',
+        f'kind = "chirp"\n{BAND}{ROOT}',
+        f'kind = "stepped_sine"\nfrequencies_hz = [1.5, 2.0, 3.0]\n{MOMENT}',
+        f'kind = "sine"\nfrequency_hz = 2.2\n{ROOT}',
+        f'kind = "square"\nfrequency_hz = 0.7\nhold = "zero"\n{MOMENT}',
+    ],
+)
+def test_the_chosen_coefficients_are_found(load: Callable[[str], CampaignPlan], drive: str) -> None:
+    plan = load(PLAN + drive)
+    found = identify(simulate_campaign(plan))
+    for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping"):
+        quantity = getattr(found, name)
+        # 28 values, three of four independent: one beyond 4.5 in four thousand suites
+        assert abs(quantity.value - getattr(plan.truth, name)) < 4.5 * quantity.std, name
+
+
+def test_a_wrong_hold_is_seen(load: Callable[[str], CampaignPlan]) -> None:
+    campaign = simulate_campaign(load(f'{PLAN}kind = "random"\n{BAND}{MOMENT}\nhold = "zero"'))
+    linear = tuple(replace(r, drive=replace(r.drive, hold="linear")) for r in campaign.runs if r.drive)
+    found, wrong = identify(campaign), identify(replace(campaign, runs=linear))
+    assert found.noise is not None
+    assert wrong.noise is not None
+    assert (found.noise.departs, wrong.noise.departs) == (False, True)
+
+
+def test_no_cause_is_named_where_there_is_none(load: Callable[[str], CampaignPlan]) -> None:
+    assert diagnose(simulate_campaign(load(MULTISINE)), kinds=KINDS).causes == ()
+
+
+def test_dry_friction_is_named(load: Callable[[str], CampaignPlan]) -> None:
+    plan = with_effect(load(MULTISINE), "coulomb_friction", friction_moment=0.004)
+    found = diagnose(simulate_campaign(plan), kinds=KINDS)
+    assert found.causes == ("coulomb_friction",)
+    assert found.gap.closed > 0.99
+
+
+def test_the_bits_do_not_depend_on_threads_and_the_noise_only_on_the_seed(
+    load: Callable[[str], CampaignPlan],
+) -> None:
+    plan = load("release_angles_deg = [20.0]" + MULTISINE)
+    one, three, other = (
+        simulate_campaign(plan, nthread=1),
+        simulate_campaign(plan, nthread=3),
+        simulate_campaign(replace(plan, seed=4)),
+    )
+    for a, b, c in zip(one.runs, three.runs, other.runs, strict=True):
+        assert np.array_equal(a.record.yaw_rad, b.record.yaw_rad)
+        assert not np.array_equal(a.record.yaw_rad, c.record.yaw_rad)
+        assert (a.drive is None) == (a.release_angle is not None)
+        if a.drive is not None and c.drive is not None:
+            assert np.array_equal(a.drive.values, c.drive.values)
+
+
+def test_the_root_pulls_with_the_true_spring(load: Callable[[str], CampaignPlan]) -> None:
+    plan = load(f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
+    stated = replace(plan, conditions=plan.conditions[:1])
+    spring = stated.conditions[0].spring_stiffness
+    wrong = with_effect(stated, "spring_miscalibration", error=0.2, spring_stiffness=spring)
+    stiffer = replace(stated, conditions=(replace(stated.conditions[0], spring_stiffness=1.2 * spring),))
+    found, expected = (simulate_campaign(p).runs[0].record.yaw_rad for p in (wrong, stiffer))
+    assert np.max(np.abs(found - expected)) <= 1.01 * plan.sensor.resolution
+
+
+def test_effects_without_a_meaning_for_the_drive_are_refused(load: Callable[[str], CampaignPlan]) -> None:
+    rooted = load(f'{PLAN}kind = "chirp"\n{BAND}{ROOT}')
+    with pytest.raises(TunnelError, match=r"changes the spring.*drive the body by amplitudes_nm"):
+        plan_effects(with_effect(rooted, "cubic_stiffness", coefficient=0.1))
+    with pytest.raises(TunnelError, match=r"leaves samples out.*leave out the effect"):
+        plan_effects(with_effect(load(MULTISINE), "dropped_samples", lost_time=0.01))
+    assert plan_effects(with_effect(load(MULTISINE), "cubic_stiffness", coefficient=0.1))

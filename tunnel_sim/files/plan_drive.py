@@ -1,0 +1,196 @@
+"""``[drive]`` of a plan: what drives its runs, and the input of each driven run."""
+
+from __future__ import annotations
+
+from math import pi
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from tunnel_sim.files.run_files import read_input
+from tunnel_sim.files.toml_input import OneLine, StrictModel
+from tunnel_sim.vocabulary import excitation
+from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+Positive = Annotated[float, Field(gt=0.0)]
+Kind = Literal["sine", "stepped_sine", "chirp", "multisine", "random", "square", "file"]
+
+_NEEDS: dict[Kind, tuple[str, ...]] = {
+    "sine": ("frequency_hz",),
+    "stepped_sine": ("frequencies_hz",),
+    "chirp": ("from_hz", "to_hz"),
+    "multisine": ("from_hz", "to_hz"),
+    "random": ("from_hz", "to_hz"),
+    "square": ("frequency_hz",),
+    "file": ("file",),
+}
+_BANDS = ("multisine", "random")  # kinds of lines within a band, which may be drawn
+_AMPLITUDES = ("amplitudes_nm", "amplitudes_rad")
+_OPTIONAL = ("frequency_hz", "frequencies_hz", "from_hz", "to_hz", "file", "seed", *_AMPLITUDES)
+
+
+class DriveTable(StrictModel):
+    """``[drive]``."""
+
+    kind: Kind = Field(
+        description="'sine', 'stepped_sine', 'chirp', 'multisine', 'random', 'square' or 'file'"
+    )
+    amplitudes_nm: list[Positive] = Field(
+        default=[], description="a list of peak moments on the body in N m, such as [0.05, 0.2]"
+    )
+    amplitudes_rad: list[Annotated[float, Field(gt=0.0, le=pi)]] = Field(
+        default=[], description="a list of peak angles of the spring's root in rad, such as [0.02, 0.05]"
+    )
+    hold: Hold = Field(default="linear", description="'zero' or 'linear', between the samples")
+    frequency_hz: Positive | None = Field(default=None, description="a positive number in Hz")
+    frequencies_hz: list[Positive] = Field(default=[], description="a list of positive numbers in Hz")
+    from_hz: Positive | None = Field(default=None, description="a positive number in Hz")
+    to_hz: Positive | None = Field(default=None, description="a positive number in Hz")
+    seed: int | None = Field(default=None, ge=0, description="a whole number, zero or more")
+    file: OneLine | None = Field(
+        default=None, description="a CSV or Parquet file with time_s, and moment_nm or base_rad"
+    )
+
+    @property
+    def amplitudes(self) -> tuple[float | None, ...]:
+        """Peak of each driven run of a spring and a speed, N m or rad; one None for a file, which has its own."""
+        return (None,) if self.kind == "file" else (*self.amplitudes_nm, *self.amplitudes_rad)
+
+
+def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
+    """Refuse a drive that misses a key, has one that its kind does not take, or cannot be sampled.
+
+    Args:
+        samples: of a run (a count).
+        sample_rate: Hz.
+        where: file and table, for messages.
+
+    Raises:
+        TunnelError: for the first fault.
+    """
+    given = [name for name in _OPTIONAL if getattr(table, name) not in (None, [])]
+    needed = _NEEDS[table.kind]
+    for name in needed:
+        if name not in given:
+            remedy = f"give {name} as {DriveTable.model_fields[name].description}"
+            raise TunnelError(f"kind = '{table.kind}' needs {name}", where=where, remedy=remedy)
+    taken = (
+        *needed,
+        *(("seed",) if table.kind in _BANDS else ()),
+        *(_AMPLITUDES if table.kind != "file" else ()),
+    )
+    for name in given:
+        if name not in taken:
+            raise TunnelError(
+                f"kind = '{table.kind}' does not take {name}", where=where, remedy="leave it out"
+            )
+    if table.kind != "file" and bool(table.amplitudes_nm) == bool(table.amplitudes_rad):
+        raise TunnelError(
+            "both amplitudes_nm and amplitudes_rad" if table.amplitudes_nm else "no amplitudes",
+            where=where,
+            remedy="give amplitudes_nm (moments on the body) or amplitudes_rad (angles of the spring's root)",
+        )
+    if len(set(table.amplitudes)) < len(table.amplitudes):
+        raise TunnelError(
+            "the amplitudes hold a value twice",
+            where=where,
+            remedy="leave one out, and use repeats for more runs",
+        )
+    for name in ("frequency_hz", "from_hz", "to_hz"):
+        _check_sampled(name, getattr(table, name), sample_rate, where)
+    for frequency in table.frequencies_hz:
+        _check_sampled("frequencies_hz", frequency, sample_rate, where)
+    _check_band(table, samples, sample_rate, where)
+
+
+def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
+    if frequency is not None and not frequency < 0.5 * sample_rate:
+        raise TunnelError(
+            f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz",
+            where=where,
+            remedy="lower it, or raise sample_rate under [sensor]",
+        )
+
+
+def _check_band(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
+    low, high = table.from_hz, table.to_hz
+    if table.kind not in _BANDS or low is None or high is None:
+        return
+    if low > high or not excitation.lines_in_band(samples, 1.0 / sample_rate, low, high).size:
+        raise TunnelError(
+            f"no multiple of {sample_rate / samples:.4g} Hz, one over the duration, lies between from_hz = {low:g} "
+            f"and to_hz = {high:g}",
+            where=where,
+            remedy="widen the band, or give a longer duration",
+        )
+
+
+def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array) -> Drive:
+    """The input of one driven run that is not that of a file.
+
+    Args:
+        table: checked by `check_drive`.
+        amplitude: peak, N m or rad.
+        number: of the driven run in the plan from 0 on: drawn phases differ from run to run.
+        time_s: of the samples from 0 on, shape (n,), s.
+    """
+    column: InputColumn = "moment_nm" if table.amplitudes_nm else "base_rad"
+    return Drive(column, amplitude * _waveform(table, time_s, number), table.hold)
+
+
+def _waveform(table: DriveTable, time: Array, number: int) -> Array:
+    low, high = table.from_hz or 0.0, table.to_hz or 0.0
+    rng = np.random.default_rng([table.seed or 0, number])
+    match table.kind:
+        case "square":
+            return excitation.square(time, table.frequency_hz or 0.0)
+        case "chirp":
+            return excitation.chirp(time, low, high)
+        case "multisine":
+            return excitation.multisine(time, low, high, None if table.seed is None else rng)
+        case "random":
+            return excitation.band_noise(time, low, high, rng)
+        case _:
+            return excitation.stepped_sine(time, table.frequencies_hz or [table.frequency_hz or 0.0])
+
+
+def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:
+    """The input of a file at the times of the samples, its first value at time 0.
+
+    Args:
+        path: a table with time_s and one of moment_nm (N m) and base_rad (rad).
+        time_s: of the samples from 0 on, shape (n,), s.
+        hold: between the file's values.
+        where: plan and file, for messages.
+
+    Raises:
+        TunnelError: a file that is not an input of known unit, is constant, or is shorter than the run.
+    """
+    given, column, values = read_input(path, where)
+    if column == "drive":
+        raise TunnelError(
+            "the column drive has no known unit",
+            where=where,
+            remedy="name it moment_nm (N m on the body) or base_rad (rad of the spring's root)",
+        )
+    given = given - given[0]
+    slack = 1e-6 * (time_s[1] - time_s[0])
+    if given[-1] < time_s[-1] - slack:
+        raise TunnelError(
+            f"ends after {given[-1]:.6g} s, before the last sample of a run at {time_s[-1]:.6g} s",
+            where=where,
+            remedy="give a longer file or a shorter duration",
+        )
+    if hold == "zero":
+        sampled = values[np.searchsorted(given, time_s + slack, side="right") - 1]
+    else:
+        sampled = np.interp(time_s, given, values)
+    if np.ptp(sampled) == 0.0:
+        raise TunnelError(
+            f"the column {column} is constant", where=where, remedy="give an input that changes"
+        )
+    return Drive(column, sampled, hold)
