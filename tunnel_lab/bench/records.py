@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import events, ui
 
 from tunnel_lab.bench import preview
+from tunnel_lab.bench.columns import ColumnsPart, columns_of
 from tunnel_lab.bench.parts import Chart, Fault, Frame, address, button, drop_zone, keep, show_parts
 from tunnel_lab.bench.preview import ChoicesPart
 from tunnel_lab.bench.workspace import Session
@@ -53,6 +54,8 @@ class _Records:
         self._reading = 0
         self._charts: list[Chart] = []
         self._rests: list[ui.number] = []
+        self._names: list[str] = []
+        self._units = ui.expansion("Columns of the files, and their units").classes("choices")
         self._drawn = ui.element("div")
         self._table = ui.element("div").props("role=status aria-live=polite")
         with self._table:
@@ -60,17 +63,28 @@ class _Records:
         ui.timer(0.0, self._first, once=True)
 
     async def _first(self) -> None:
-        columns = await asyncio.to_thread(preview.column_names, self._session)
-        with self._form_place:
-            ChoicesPart(self._session, columns, self._changed)
+        self._names = await asyncio.to_thread(preview.column_names, self._session)
+        self._show_choices()
         self._show_files()
         await self._read()
         if self._imported is None:
             self._form_place.open()
 
+    def _show_choices(self) -> None:
+        self._form_place.clear()
+        with self._form_place:
+            ChoicesPart(self._session, self._names, self._changed)
+
     async def _changed(self, key: str, value: Any) -> None:
         with self._fault.around():
             preview.state(self._session, {key: value})
+            await self._read()
+
+    async def _stated(self, changes: dict[str, Any]) -> None:
+        """Keep the unit of a column; the fields of the choices show it too."""
+        with self._fault.around():
+            preview.state(self._session, changes)
+            self._show_choices()
             await self._read()
 
     async def _moved(self, mark: preview.Mark, kind: str, at: float | None) -> None:
@@ -111,6 +125,9 @@ class _Records:
         self._table.clear()
         if redraw:
             self._drawn.clear()
+            await self._show_units(opened=imported is None)
+            if mine != self._reading or self._drawn.is_deleted:
+                return True
         if imported is None:
             await self._draw_columns()
             return False
@@ -125,6 +142,17 @@ class _Records:
                     with ui.element("li"):
                         ui.label(line)
         return True
+
+    async def _show_units(self, *, opened: bool) -> None:
+        columns = await asyncio.to_thread(columns_of, self._session)
+        if self._units.is_deleted:
+            return
+        self._units.clear()
+        self._units.set_visibility(bool(columns))
+        with self._units:
+            ColumnsPart(columns, self._stated)
+        if opened:
+            self._units.open()
 
     async def _draw_columns(self) -> None:
         """The columns as they are in the file, to choose from."""

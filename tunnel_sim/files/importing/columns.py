@@ -99,7 +99,7 @@ def _run_name(reading: Channel, count: int) -> str:
 def _blocks(channels: Sequence[Channel], choices: ImportChoices) -> list[list[Channel]]:
     """Groups of columns side by side, each of which begins with its own times."""
     starts = [
-        i for i, channel in enumerate(channels) if _matches(channel, choices.time or "") or _is_time(channel)
+        i for i, channel in enumerate(channels) if _matches(channel, choices.time or "") or is_time(channel)
     ]
     stems = {stem(channels[i].name) for i in starts}
     repeated = len(starts) > 1 and (len(stems) == 1 or all("#" in channels[i].name for i in starts))
@@ -109,7 +109,8 @@ def _blocks(channels: Sequence[Channel], choices: ImportChoices) -> list[list[Ch
     return [list(channels[start:end]) for start, end in zip(starts, ends, strict=True)]
 
 
-def _is_time(channel: Channel) -> bool:
+def is_time(channel: Channel) -> bool:
+    """Whether a column holds times, by its unit or its name."""
     kind = kind_of(channel.unit)
     if condition_of(channel.name, channel.unit) is not None:
         return False
@@ -146,7 +147,7 @@ def _time(
     """The column of times; None where the samples follow at a stated rate."""
     if choices.time is not None:
         return _chosen(block, choices.time, "--time", where)[0]
-    named = [channel for channel in block if _is_time(channel)]
+    named = [channel for channel in block if is_time(channel)]
     if named:
         if len(named) > 1:
             said.append(f"times from '{named[0].name}', the first of {len(named)} columns of times")
@@ -305,6 +306,33 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
     return None, ""
 
 
+def guessed_time_unit(values: Array) -> tuple[str, float]:
+    """The unit that times without one are taken to have.
+
+    Args:
+        values: the column, shape (n,).
+
+    Returns:
+        The unit, and the usual step in it.
+    """
+    steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
+    step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
+
+
+def guessed_angle_unit(values: Array) -> tuple[str, float]:
+    """The unit that angles without one are taken to have.
+
+    Args:
+        values: the column, shape (n,); at least one number.
+
+    Returns:
+        The unit, and half the range of the readings in it.
+    """
+    swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
+    return "deg" if swing > _HALF_TURN else "rad", swing
+
+
 def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: str) -> Array:
     """Times in s.
 
@@ -326,9 +354,7 @@ def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: st
             remedy="give --time-unit, or --time with the name of another column",
         )
     if not unit:
-        steps = np.diff(np.sort(time.values[np.isfinite(time.values)]))  # rows may be out of order
-        step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
-        unit = "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us"
+        unit, step = guessed_time_unit(time.values)
         said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
     return time.values * UNITS["time"][unit] if unit != "s" else time.values
 
@@ -371,8 +397,7 @@ def in_radians(
         option = "--counts-per-turn N" if kind_of(unit) == "counts" else '--calibration "a + b*V"'
         raise TunnelError(f"'{reading.name}' is in {unit}", where=where, remedy=f"give {option}")
     if not unit:
-        swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
-        unit = "deg" if swing > _HALF_TURN else "rad"
+        unit, swing = guessed_angle_unit(values)
         said.append(
             f"no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit says otherwise"
         )
