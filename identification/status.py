@@ -49,8 +49,8 @@ class Status(Enum):
     FEW_CYCLES = "fewer than three cycles: lengthen the record for windows and a reliable damping"
     NO_STIFFNESS = "no spring_stiffness, so only omega_n and zeta are given: state it in campaign.toml"
     INERTIA_NOT_POSITIVE = (
-        "the frequencies contradict the stated springs, so no inertia is given: check the spring and wind speed "
-        "of each run"
+        "the motion contradicts the stated springs or moments, so no inertia is given: check the spring and wind "
+        "speed of each run, and the sign of its input"
     )
     NO_WIND_ON = "no wind-on runs, so cn_beta and cn_r are not given: add runs with the wind on"
     NO_WIND_OFF_PAIR = (

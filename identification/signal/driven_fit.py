@@ -23,6 +23,7 @@ from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 _MOST_STEPS = 60
+_LEAST_SAMPLES = 4  # per unknown; of fewer the residual does not show the noise
 _SETTLED = 1e-10  # share of the sum of squares by which a last step may lower it
 _POOR = 0.5  # share of the expected fall of the sum of squares, below which a step was too long
 _SHORTER = 0.3  # damping after such a step
@@ -98,11 +99,13 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     reading = Reading.from_record(run.record)
     drive, drifts = run.drive, run.unrestrained
     assert drive is not None
+    # the root's motion acts through the spring: its gain is k
+    places = [0, 2] if drifts else [0, 1] if not drive.on_body else [0, 1, 2]
+    if reading.time.size < _LEAST_SAMPLES * (len(places) + _OWN):
+        return _failed(run, reading, Status.NOT_DETERMINED)
     start = driven_start(reading.time, reading.yaw, drive.values, sprung=not drifts)
     if start is None or not (drifts or start[1] > 0.0):
         return _failed(run, reading, Status.NO_OSCILLATION)
-    # the root's motion acts through the spring: its gain is k
-    places = [0, 2] if drifts else [0, 1] if not drive.on_body else [0, 1, 2]
     link = np.eye(3)[:, places]
     link[2, 1] = 1.0 if len(places) == 2 else 0.0
     steps = np.diff(reading.time)

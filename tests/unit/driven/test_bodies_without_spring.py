@@ -127,6 +127,17 @@ def test_the_start_without_a_stiffness_is_near_the_truth() -> None:
     assert start[2] == pytest.approx(10.0, rel=0.05)
 
 
+@pytest.mark.parametrize("size", [3, 5, 6, 12, 19])
+def test_too_few_samples_are_no_estimate(size: int) -> None:
+    run = loose(1)
+    assert run.drive is not None
+    short = Record(run.record.time_s[:size], run.record.yaw_rad[:size])
+    cut = replace(run, record=short, drive=replace(run.drive, values=run.drive.values[:size]))
+    found = identify(campaign(cut), throw=False)
+    assert found.status.failed
+    assert found.runs[0].status is Status.NOT_DETERMINED
+
+
 @pytest.mark.parametrize("what", ["noise", "step", "growth"])
 def test_a_record_that_the_input_does_not_explain_is_a_status(what: str) -> None:
     reading = {
