@@ -51,7 +51,7 @@ class _Diagnose:
         self._log = session.log(WORK)
         self._shown: object = None
         self._tried = ""
-        self._before = _duration(read_result(session.diagnosis))
+        self._before = ""
         show_command(" ".join(("tunnel", *_words(session))))
         self._fault = Fault()
         self._buttons = ui.element("p").classes("buttons")
@@ -67,6 +67,8 @@ class _Diagnose:
         result = self._session.diagnosis
         written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
         stages, self._tried = stages_of(state.lines)
+        if not state.running and (seconds := work.seconds_taken(self._log)) is not None:
+            self._before = f"; the last diagnosis took {seconds:.0f} s"
         now = (replace(state, lines=()), stages, written)
         if now == self._shown:
             self._show_clock(state)
@@ -157,12 +159,6 @@ def stages_of(lines: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], str]:
         elif stages and stage == stages[-1][1]:
             tried = plain(effects)
     return tuple(stages), tried
-
-
-def _duration(document: dict[str, Any] | None) -> str:
-    """How long a diagnosis took, in words; empty where that is not known."""
-    seconds = sum((document or {}).get("seconds", {}).values())
-    return f"; the last diagnosis took {seconds:.0f} s" if seconds else ""
 
 
 def _elapsed(state: work.Work) -> float:

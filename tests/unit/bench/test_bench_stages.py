@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -84,13 +86,12 @@ def texts(build: Any, given: Session) -> list[str]:
 
 def test_the_page_shows_what_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = session(tmp_path)
-    given.diagnosis.write_text(json.dumps({"seconds": {"effects": 30.0, "where": 4.0}}))
     lines = ("2.5 s: fitting sets of effects", "3.0 s: fitting sets of effects: free_play + mains_hum")
     state = work.Work("tunnel diagnose rig", 1, "2026-01-01T00:00:00+00:00", lines, running=True)
     monkeypatch.setattr(work, "work_of", lambda _: state)
     shown = texts(diagnosis.build_diagnose, given)
     (clock,) = [text for text in shown if "so far" in text]
-    assert "the last diagnosis took 34 s, now with free play + mains hum." in clock
+    assert "s so far, now with free play + mains hum." in clock
     assert "fitting sets of effects … since 2.5 s" in shown
 
 
@@ -123,6 +124,18 @@ def test_only_a_run_that_can_be_planned_and_tells_is_proposed(
     proposed = "81.5 N m/rad" in " ".join(shown)
     assert proposed is (not changes)
     assert ("Download the plan" in shown) is proposed
+
+
+@pytest.mark.parametrize(
+    ("body", "seconds"),
+    [("exit status 0", 34.0), ("paused\ngoes on\nexit status 0", None), ("exit status 1", None), ("", None)],
+)
+def test_the_time_of_a_diagnosis_is_that_of_its_log(tmp_path: Path, body: str, seconds: float | None) -> None:
+    log = tmp_path / "rig.diagnosis.log"
+    log.write_text(f"$ tunnel diagnose rig (process 1, started 2026-01-01T00:00:00+00:00)\n{body}\n")
+    ended = datetime(2026, 1, 1, 0, 0, 34, tzinfo=UTC).timestamp()
+    os.utime(log, (ended, ended))
+    assert work.seconds_taken(log) == seconds
 
 
 def test_effects_of_the_wind_are_offered_where_it_blew(tmp_path: Path) -> None:
