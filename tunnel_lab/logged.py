@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
+_SETS_EVERY_S = 0.5
+
 
 def run_logged(log: Path, words: Sequence[str]) -> int:
     """Run a command: the command and the process in the first line of its log, its exit status in the last.
@@ -32,7 +34,9 @@ def run_logged(log: Path, words: Sequence[str]) -> int:
     now = datetime.now().astimezone().isoformat(timespec="seconds")
     print(f"$ {shlex.join(['tunnel', *words])} (process {os.getpid()}, started {now})", flush=True)
     from tunnel_lab.cli import main  # after the first line: the bench waits for it
+    from tunnel_lab.terminal.progress import print_sets
 
+    print_sets(_SETS_EVERY_S)
     status = main(words)
     sys.stdout.flush()
     print(f"exit status {status}", flush=True)

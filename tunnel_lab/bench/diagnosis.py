@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from diagnosis.names import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
 from tunnel_lab.bench.workspace import Session, is_current, read_result
@@ -47,6 +50,8 @@ class _Diagnose:
         self._session, self._frame = session, frame
         self._log = session.log(WORK)
         self._shown: object = None
+        self._tried = ""
+        self._before = ""
         show_command(" ".join(("tunnel", *_words(session))))
         self._fault = Fault()
         self._buttons = ui.element("p").classes("buttons")
@@ -61,13 +66,17 @@ class _Diagnose:
         state = work.work_of(self._log)
         result = self._session.diagnosis
         written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
-        if (state, written) == self._shown:
+        stages, self._tried = stages_of(state.lines)
+        if not state.running and (seconds := work.seconds_taken(self._log)) is not None:
+            self._before = f"; the last diagnosis took {seconds:.0f} s"
+        now = (replace(state, lines=()), stages, written)
+        if now == self._shown:
             self._show_clock(state)
             return
-        self._shown = (state, written)
+        self._shown = now
         self._show_buttons(state)
         self._show_clock(state)
-        self._show_progress(state)
+        self._show_progress(state, stages)
         if state.error:
             self._fault.show(f"{state.error}{_AFTER_STOP if state.status == STOPPED else ''}")
         self._show_result(state)
@@ -89,7 +98,11 @@ class _Diagnose:
             button("Stop", self._stop)
 
     def _show_clock(self, state: work.Work) -> None:
-        since = f"{_elapsed(state):.0f} s so far. It runs in a process of its own: this page may be closed."
+        tried = f", now with {self._tried}" if self._tried else ""
+        since = (
+            f"{_elapsed(state):.0f} s so far{self._before}{tried}. "
+            "It runs in a process of its own: this page may be closed."
+        )
         words = "Paused; it goes on where it was." if state.paused else since
         self._clock.set_text(f"{words} {_STOP}" if state.running else "")
 
@@ -100,14 +113,13 @@ class _Diagnose:
     async def _stop(self) -> None:
         await asyncio.to_thread(work.stop, self._log)
 
-    def _show_progress(self, state: work.Work) -> None:
+    def _show_progress(self, state: work.Work, stages: tuple[tuple[str, str], ...]) -> None:
         self._progress.clear()
         if not state.running:
             return
-        done = [line.partition(" s: ") for line in state.lines if line.partition(" s: ")[2] in STEPS.values()]
         with self._progress:
-            for place, (seconds, _, words) in enumerate(done):
-                last = place == len(done) - 1
+            for place, (seconds, words) in enumerate(stages):
+                last = place == len(stages) - 1
                 with ui.element("li").classes("now" if last else "done"):
                     ui.label(f"{words} … since {seconds} s" if last else f"{words}, from {seconds} s on")
 
@@ -127,6 +139,26 @@ class _Diagnose:
         self._frame.refresh()
         with self._on:
             self._frame.way_on()
+
+
+def stages_of(lines: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], str]:
+    """How far a diagnosis has come, by what it has printed.
+
+    Returns:
+        The stages begun, each with the time of its begin (s, as printed) and its name; and the set of effects that
+        the last one tries, in words, empty where there is none.
+    """
+    stages: list[tuple[str, str]] = []
+    tried = ""
+    for line in lines:
+        seconds, _, words = line.partition(" s: ")
+        stage, _, effects = words.partition(": ")
+        if words in STEPS.values():
+            stages.append((seconds, words))
+            tried = ""
+        elif stages and stage == stages[-1][1]:
+            tried = plain(effects)
+    return tuple(stages), tried
 
 
 def _elapsed(state: work.Work) -> float:
@@ -302,7 +334,7 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
     from diagnosis.printing import rival_lines
-    from tunnel_lab.report.advice import next_steps
+    from tunnel_lab.report.advice import next_steps, run_to_make, unplannable
 
     document = read_result(session.diagnosis)
     assert document is not None  # else the stage is closed
@@ -311,10 +343,16 @@ def build_next_run(session: Session, frame: Frame) -> None:
         for step in next_steps(document):
             with ui.element("li"):
                 ui.label(step)
-    show_parts(rival_lines(document))
-    if document["next_run"] is not None:
-        show_run(document["next_run"])
-    _Rivals(session, document)
+    lines, run = rival_lines(document), run_to_make(document)
+    if run is None and document["next_run"] is not None:
+        lines[-1] = _too_close(document["next_run"])
+    show_parts(lines)
+    if run is not None:
+        show_run(run)
+    if why := unplannable(document):
+        ui.label(why).classes("soft")
+    else:
+        _Rivals(session, document)
     with ui.element("p").classes("buttons"):
         frame.way_on()
 
@@ -323,10 +361,16 @@ class _Rivals:
     """Two answers to choose, and the run that would distinguish them."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
+        from tunnel_lab.report.view import windy
         from tunnel_sim.effects import known_effects
 
         self._session = session
-        fitted = {kind.name: kind.name.replace("_", " ") for kind in known_effects() if kind.fitted}
+        blown = windy(document)  # an effect of the wind cannot be fitted where none blew
+        fitted = {
+            kind.name: plain(kind.name)
+            for kind in known_effects()
+            if kind.fitted and (blown or kind.condition == "always")
+        }
         answers = [
             [name for name in candidate["effect"].split(" + ") if name in fitted]
             for candidate in document["candidates"]
@@ -347,6 +391,8 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
+        from tunnel_lab.report.advice import LEAST_SEPARATION
+
         self._place.clear()
         with self._fault.around():
             first, second = sorted(self._first.value), sorted(self._second.value)
@@ -364,10 +410,21 @@ class _Rivals:
             if run is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
-                show_run(run)
+                if run["separation"] < LEAST_SEPARATION:
+                    ui.label(_too_close(run))
+                else:
+                    show_run(run)
 
 
-def show_run(run: dict[str, float]) -> None:
+def _too_close(run: Mapping[str, float]) -> str:
+    """That no run distinguishes two answers, in a sentence."""
+    return (
+        "No run that can be set distinguishes these answers: with the best one they differ by "
+        f"{run['separation']:.1f} standard deviations of the noise."
+    )
+
+
+def show_run(run: Mapping[str, float]) -> None:
     """A run to make.
 
     Args:
@@ -389,7 +446,7 @@ def show_run(run: dict[str, float]) -> None:
         button("Download the plan", lambda: ui.download(run_table(run).encode(), "next-run.toml"))
 
 
-def run_table(run: dict[str, float]) -> str:
+def run_table(run: Mapping[str, float]) -> str:
     """A run to make, as the table that ``campaign.toml`` takes once its record is there."""
     import tomli_w
 

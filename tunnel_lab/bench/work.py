@@ -17,6 +17,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -93,6 +94,18 @@ def work_of(log: Path) -> Work:
     status = int(last["status"]) if last and not running else None
     paused = running and bool(marks) and marks[-1] == _PAUSED
     return Work(first["command"], int(first["process"]), first["started"], shown, running, paused, status)
+
+
+def seconds_taken(log: Path) -> float | None:
+    """Wall time of a command that has succeeded, s; None where it has not, or was paused.
+
+    Args:
+        log: of the command.
+    """
+    work = work_of(log)
+    if work.status != 0 or _PAUSED in log.read_text("utf-8", "replace").splitlines():
+        return None
+    return max(log.stat().st_mtime - datetime.fromisoformat(work.started).timestamp(), 0.0)
 
 
 def start(words: Sequence[str], log: Path) -> None:

@@ -8,6 +8,32 @@ from identification.printing import significant
 from tunnel_lab.report.view import Document, windy
 from tunnel_sim.effects import known_effects
 
+LEAST_SEPARATION = 3.0
+"""Standard deviations between two answers below which a run does not distinguish them: odds of about 100:1."""
+
+
+def run_to_make(document: Document) -> Document | None:
+    """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
+    run: Document | None = document["next_run"]
+    return run if run is not None and run["separation"] >= LEAST_SEPARATION else None
+
+
+def unplannable(document: Document) -> str:
+    """Why no run can be planned from these runs, in a sentence; empty where one can."""
+    known = document["coefficients"]["before"]
+    if not known:
+        return "No run can be planned: the nominal model was not fitted to any run."
+    if "omega_n" in known:
+        return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
+    return ""
+
+
+def _other_runs(document: Document) -> str:
+    """What further runs can differ in: a spring only where springs are stated and can be chosen."""
+    springs = not unplannable(document) and document.get("model") is None
+    kinds = ["springs"] * springs + ["wind speeds"] * windy(document) + ["release angles"]
+    return plain(*kinds)
+
 
 def next_steps(document: Document) -> list[str]:
     """What to do next, in the order in which to do it."""
@@ -17,17 +43,17 @@ def next_steps(document: Document) -> list[str]:
         for remark in document.get("remarks", ())
         if remark["outcome"] != "noted"
     ]
-    if document["next_run"] is not None and document["ambiguous_with"]:
+    if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
         steps.append(
-            f"Make the run that distinguishes the answers: {run_words(document['next_run'])}. "
+            f"Make the run that distinguishes the answers: {run_words(run)}. "
             "Add it to the campaign and diagnose again."
         )
     if not causes:
         return [*steps, "Use the coefficients of the nominal model, within their intervals."]
     if not document.get("decided", True):
         steps.append(
-            f"Add runs with other springs{', wind speeds' if windy(document) else ''} and release angles, and "
-            "diagnose again: no answer has a probability of one half."
+            f"Add runs with other {_other_runs(document)}, and diagnose again: no answer has a probability of "
+            "one half."
         )
         steps.append(
             "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause."

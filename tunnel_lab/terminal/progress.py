@@ -60,6 +60,19 @@ STEPS = {
 """Steps of the study in words; any other progress message is a set of effects."""
 
 
+_sets_every: float | None = None
+
+
+def print_sets(every: float) -> None:
+    """From now on, print the sets of effects that are tried too where no terminal shows them.
+
+    Args:
+        every: least time between two of them, s.
+    """
+    global _sets_every
+    _sets_every = every
+
+
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
     """A spinner with the step, the effect tried and the time; one line per step where no terminal shows it.
@@ -73,16 +86,20 @@ def step_display() -> Iterator[Callable[[str], None]]:
     columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
         task = progress.add_task("starting", total=None)
-        step, begun = "", time.perf_counter()
+        step, begun, printed = "", time.perf_counter(), 0.0
 
         def show_step(text: str) -> None:
-            nonlocal step
+            nonlocal step, printed
+            now = time.perf_counter() - begun
             if text in STEPS:
                 step = STEPS[text]
                 progress.update(task, description=step)
                 if not terminal.is_terminal:
-                    terminal.print(f"{time.perf_counter() - begun:.1f} s: {step}", markup=False)
+                    terminal.print(f"{now:.1f} s: {step}", markup=False)
             else:
                 progress.update(task, description=f"{step}: {text}")
+                if not terminal.is_terminal and _sets_every is not None and now - printed >= _sets_every:
+                    printed = now
+                    terminal.print(f"{now:.1f} s: {step}: {text}", markup=False, soft_wrap=True)
 
         yield show_step

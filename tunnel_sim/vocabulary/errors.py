@@ -67,7 +67,7 @@ EXTRAS = {
     "film": ("imageio", "imageio_ffmpeg"),
     "cluster": ("dask", "distributed"),
     "bench": ("nicegui",),
-    "docs": ("sphinx", "furo", "myst_nb"),
+    "docs": ("sphinx", "furo", "myst_nb", "latex2mathml"),
     "train": ("stable_baselines3",),
 }
 """The modules of each extra of ``pyproject.toml`` that a command needs."""

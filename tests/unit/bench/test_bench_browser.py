@@ -22,6 +22,7 @@ from tunnel_lab.terminal.inputs import file_hashes
 from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.conditions import read_recipe
+from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
@@ -130,6 +131,48 @@ def test_which_of_two_channels_is_the_angle_is_asked_for(browser: Any, served: B
         page.wait_for_url("**/conditions")
     (run,) = read_campaign(served.folder / "Measured_data2").runs
     assert run.record.sample_rate == pytest.approx(5000.0)
+
+
+def test_the_unit_of_a_column_is_guessed_shown_and_changed(
+    browser: Any, served: Bench, tmp_path: Path
+) -> None:
+    rows = [f"{1e3 * t:.1f},{y:.6f}" for t, y in zip(*decay(), strict=True)]
+    (tmp_path / "bare.csv").write_text("clock,yaw\n" + "\n".join(rows))
+    with tab(browser, served) as one:
+        page = one.page
+        page.set_input_files("input[type=file]", [str(tmp_path / "bare.csv")])
+        page.wait_for_url("**/bare/records")
+        page.wait_for_selector(".mark.rest")
+        page.get_by_text("Columns of the files, and their units").click()
+        field = page.get_by_label("Unit of yaw")
+        field.wait_for()
+        page.wait_for_selector("text=guessed from steps of 5; read as the times")
+        page.wait_for_selector("text=guessed from a swing of ±0.3")
+        field.click()
+        page.get_by_role("option", name="mrad", exact=True).click()
+        page.wait_for_selector("text=stated here; read as the angle")
+        page.wait_for_selector(".mark.rest")
+        one.click("Write the campaign")
+        page.wait_for_url("**/conditions")
+    (run,) = read_campaign(served.folder / "bare").runs
+    assert run.record.sample_rate == pytest.approx(200.0)
+    assert abs(run.record.yaw_rad).max() == pytest.approx(abs(decay()[1]).max() / 1000.0, rel=0.01)
+
+
+def test_the_next_run_is_proposed_and_can_be_kept(browser: Any, served: Bench) -> None:
+    shutil.copytree(served.folder / "two", served.folder / "next")
+    session = Session(served.folder, "next")
+    _diagnosed(session)
+    with tab(browser, served) as one:
+        one.open("/next/next-run")
+        one.page.wait_for_selector("text=81.5 N m/rad")
+        with one.page.expect_download() as found:
+            one.click("Download the plan")
+        assert "spring_stiffness = 81.5" in Path(found.value.path()).read_text()
+        write_json(session.diagnosis, read_json(session.diagnosis, remedy="") | {"next_run": NEAR})
+        one.open("/next/next-run")
+        one.page.wait_for_selector("text=No run that can be set distinguishes these answers")
+        assert one.page.locator("button:has-text('Download the plan')").count() == 0
 
 
 def test_a_wrong_file_is_refused_in_the_words_of_the_command(
@@ -294,6 +337,7 @@ def _diagnosed(session: Session) -> None:
     assert campaign().runs
 
 
+NEAR = document()["next_run"] | {"separation": 0.4}
 ESTIMATE = {
     "estimator": "output_error", "cn_beta": None, "cn_r": None, "yaw_inertia": None, "mechanical_damping": None,
     "statuses": ["ok"], "remarks": [], "runs": [],
