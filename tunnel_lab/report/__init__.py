@@ -21,8 +21,7 @@ else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
-            ".page": "Byline draw render_fit render_report write_report",
-            ".summary": "find_browser write_summary",
+            ".page": "Byline draw render_fit render_report write_report find_browser write_summary",
         },
     )
 
