@@ -125,7 +125,7 @@ def _skips(runs: list[_Skipping], count: int) -> PerRunParameters:
 
 
 @dataclass(frozen=True)
-class _Step:
+class _Skip:
     """A skip in one run: its block, the time lost (s) and the weight of that (1/s²)."""
 
     block: int
@@ -153,7 +153,7 @@ class _Skipping:
         power -= np.sum(absorbed**2, axis=1)
         self.weight = np.maximum(power, 1e-9 * float(self.slope @ self.slope))
 
-    def steps(self, count: int, found: list[_Step] | None = None, time: float | None = None) -> list[_Step]:
+    def steps(self, count: int, found: list[_Skip] | None = None, time: float | None = None) -> list[_Skip]:
         """The skips that leave least, each sought again beside the others.
 
         Args:
@@ -168,25 +168,25 @@ class _Skipping:
                 found[place : place + 1] = [self._best(self.left - change, time)]
         return found
 
-    def _best(self, left: Array, time: float | None) -> _Step:
+    def _best(self, left: Array, time: float | None) -> _Skip:
         inside = slice(_EDGE, left.size - _EDGE)
         weight = self.weight[inside]
         seen = _after(self.slope * correlate(left, self.run.taps))[inside]
         own = seen / weight
         tried = np.maximum(own, 0.0) if time is None else time
         best = int(np.argmax(tried * (2.0 * seen - tried * weight)))
-        return _Step(best + _EDGE, float(own[best]), float(weight[best]))
+        return _Skip(best + _EDGE, float(own[best]), float(weight[best]))
 
-    def drop(self, steps: list[_Step], time: float) -> float:
+    def drop(self, steps: list[_Skip], time: float) -> float:
         """Of χ² by skips of one time (s)."""
         left = self.left - self._change([(step, time) for step in steps])
         return float(self.left @ self.left - left @ left)
 
-    def share(self, step: _Step) -> float:
+    def share(self, step: _Skip) -> float:
         """Instant of a skip, as a share of the run."""
         return float(step.block * self.run.interval / self.run.duration)
 
-    def _change(self, steps: list[tuple[_Step, float]]) -> Array:
+    def _change(self, steps: list[tuple[_Skip, float]]) -> Array:
         ahead = np.zeros(self.rate.size)
         for step, time in steps:
             ahead[step.block :] += time

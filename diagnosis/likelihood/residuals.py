@@ -27,7 +27,7 @@ _BEYOND_MOTION = 4.0  # times the motion's frequency: beyond its third harmonic
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum:
+class ResidualSpectrum:
     """A run's residual spectrum.
 
     Args:
@@ -54,14 +54,14 @@ class Spectrum:
         return value
 
 
-def residual_spectra(fit: Fit) -> list[Spectrum]:
+def residual_spectra(fit: Fit) -> list[ResidualSpectrum]:
     """The spectrum of every run's scaled residuals."""
     spectra = []
     for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
         size = _PADDING * residual.size
         transform = np.fft.rfft(residual, size) * 2.0 / residual.size
         spectra.append(
-            Spectrum(
+            ResidualSpectrum(
                 np.asarray(np.fft.rfftfreq(size, run.interval), np.float64),
                 transform,
                 run.duration,
@@ -133,18 +133,18 @@ def mains_line(fit: Fit) -> Line | None:
     return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases, len(spectra))
 
 
-def smooth_spectra(fit: Fit) -> list[Spectrum]:
+def smooth_spectra(fit: Fit) -> list[ResidualSpectrum]:
     """`residual_spectra` with a Hann window, whose leakage from the motion does not reach the mains."""
     return [_smooth(spectrum) for spectrum in residual_spectra(fit)]
 
 
-def _smooth(spectrum: Spectrum) -> Spectrum:
+def _smooth(spectrum: ResidualSpectrum) -> ResidualSpectrum:
     """The spectrum with less leakage of strong lines: a Hann window, applied in the frequency domain."""
     step = _PADDING
     values = spectrum.transform
     hann = 0.5 * values.copy()
     hann[step:-step] -= 0.25 * (values[: -2 * step] + values[2 * step :])
-    return Spectrum(spectrum.frequency, hann * np.sqrt(8.0 / 3.0), spectrum.duration, spectrum.count)
+    return ResidualSpectrum(spectrum.frequency, hann * np.sqrt(8.0 / 3.0), spectrum.duration, spectrum.count)
 
 
 def block_gain(frequency: float, run: RunData) -> float:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
 from diagnosis.closure import Ceiling, Curve
-from diagnosis.likelihood.residuals import Spectrum, block_gain, resonance, smooth_spectra
+from diagnosis.likelihood.residuals import ResidualSpectrum, block_gain, resonance, smooth_spectra
 from diagnosis.policy import LINE_CONTRAST, LINE_STEADY, PLACE_FALSE_ALARM_RATE
 from diagnosis.remainder import bases
 from diagnosis.remainder.ceiling import GAPS, Evidence, Unexplained, Unit, gaps
@@ -216,7 +216,7 @@ def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
     return float(grid[best]), float(floors[best] / count[best])
 
 
-def _floor(spectrum: Spectrum) -> tuple[Array, Array]:
+def _floor(spectrum: ResidualSpectrum) -> tuple[Array, Array]:
     """Frequencies, and the median power around each over that of white noise, at least 1."""
     from scipy.ndimage import median_filter  # only here: slow to load
 

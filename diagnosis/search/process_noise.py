@@ -32,7 +32,7 @@ _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class MomentSpectrum:
     """A random moment's spectrum: first order about a centre.
 
     Args:
@@ -63,7 +63,7 @@ class ProcessNoise:
         interval: between innovations, s.
     """
 
-    spectrum: Spectrum
+    spectrum: MomentSpectrum
     drop: float
     by_run: Array
     cost: float
@@ -115,10 +115,10 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
     if not centred:
         grid = [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)]
         bounds = ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH))
-        return _fit(fit, lambda x: Spectrum(x[0], x[1]), grid, bounds)
+        return _fit(fit, lambda x: MomentSpectrum(x[0], x[1]), grid, bounds)
     about = [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)]
     limits = ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0))
-    return _fit(fit, lambda x: Spectrum(x[0], x[1], x[2]), about, limits)
+    return _fit(fit, lambda x: MomentSpectrum(x[0], x[1], x[2]), about, limits)
 
 
 def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
@@ -139,12 +139,12 @@ def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
     numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
     grid = [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers]
     bounds = ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0))
-    return _fit(fit, lambda x: Spectrum(x[0], x[1], strouhal_number=x[2]), grid, bounds)
+    return _fit(fit, lambda x: MomentSpectrum(x[0], x[1], strouhal_number=x[2]), grid, bounds)
 
 
 def _fit(
     fit: Fit,
-    spectrum: Callable[[Sequence[float]], Spectrum],
+    spectrum: Callable[[Sequence[float]], MomentSpectrum],
     grid: Sequence[tuple[float, ...]],
     bounds: Sequence[tuple[float, float]],
 ) -> ProcessNoise | None:
@@ -179,7 +179,7 @@ def _fit(
     return ProcessNoise(
         best,
         float(drops.sum()),
-        np.maximum(drops, 0.0) / _predicted(channels, Spectrum(1.0, LONGEST_BANDWIDTH)),
+        np.maximum(drops, 0.0) / _predicted(channels, MomentSpectrum(1.0, LONGEST_BANDWIDTH)),
         float(found.fun),
         sum(float(i @ i) for i in innovations) / count - 1.0,
         list(innovations),
@@ -187,7 +187,7 @@ def _fit(
     )
 
 
-def _predicted(channels: Sequence[_Channel], spectrum: Spectrum) -> Array:
+def _predicted(channels: Sequence[_Channel], spectrum: MomentSpectrum) -> Array:
     """Power of the response at the end of each run that began at rest, in units of the noise's, shape (runs,)."""
     transition, disturbance = _discrete(channels, [spectrum] * len(channels))
     power = []
@@ -206,7 +206,7 @@ def _simplex(start: Array, bounds: Array) -> Array:
     return np.clip(corners, bounds[:, 0], bounds[:, 1])
 
 
-def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
+def with_response(fit: Fit, spectrum: MomentSpectrum) -> Data | None:
     """The runs of a fit, the noise of those in the wind being the sensor's and the response to a random moment.
 
     Args:
@@ -260,7 +260,7 @@ def _skip(channel: _Channel) -> int:
 
 
 def _filtered(
-    channels: Sequence[_Channel], spectra: Spectrum | Sequence[Spectrum]
+    channels: Sequence[_Channel], spectra: MomentSpectrum | Sequence[MomentSpectrum]
 ) -> list[tuple[float, Array]]:
     """−2 ln L (without constants) and scaled innovations of the steady filter, by run.
 
@@ -281,16 +281,16 @@ def _filtered(
 
 
 def _filters(
-    channels: Sequence[_Channel], spectra: Spectrum | Sequence[Spectrum]
+    channels: Sequence[_Channel], spectra: MomentSpectrum | Sequence[MomentSpectrum]
 ) -> list[tuple[Array, Array, float]]:
     """The filter from residuals to innovations, numerator and denominator, and their variance, rad², by run."""
-    each = [spectra] * len(channels) if isinstance(spectra, Spectrum) else spectra
+    each = [spectra] * len(channels) if isinstance(spectra, MomentSpectrum) else spectra
     transition, disturbance = _discrete(channels, each)
     variance = np.array([c.variance for c in channels])
     return steady_filters(transition, disturbance, variance)
 
 
-def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
+def _discrete(channels: Sequence[_Channel], spectra: Sequence[MomentSpectrum]) -> tuple[Array, Array]:
     """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra have a centre, or none.
 
     States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too.

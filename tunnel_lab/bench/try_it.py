@@ -54,7 +54,7 @@ class _TryIt:
     """The page."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._trial, self._busy = folder, Trial(), False
+        self._folder, self._trial, self._busy = folder, RigTrial(), False
         ui.label(
             "The rig by the fast integrator, without noise. Grey: the nominal model; blue: with the effect."
         ).classes("lede")
@@ -170,7 +170,7 @@ class _TryIt:
 
 
 @dataclass(frozen=True)
-class Trial:
+class RigTrial:
     """What is chosen.
 
     Args:
@@ -194,7 +194,7 @@ class Trial:
     severity: float = 0.0
 
 
-def chosen_effect(trial: Trial) -> Effect | None:
+def chosen_effect(trial: RigTrial) -> Effect | None:
     """The effect of a trial with the values of its example, except the severity; None where it does nothing."""
     if not trial.effect or trial.severity == 0.0:
         return None
@@ -206,7 +206,7 @@ def chosen_effect(trial: Trial) -> Effect | None:
     return kind(**values)
 
 
-def simulate(trial: Trial) -> tuple[Array, Array, Array]:
+def simulate(trial: RigTrial) -> tuple[Array, Array, Array]:
     """Simulate a run without and with the effect.
 
     Returns:
@@ -247,7 +247,7 @@ def _read(stated: RunSettings, effects: tuple[Effect, ...]) -> tuple[Array, Arra
     return record.time_s, record.yaw_rad
 
 
-def plan_text(trial: Trial, name: str) -> str:
+def plan_text(trial: RigTrial, name: str) -> str:
     """The plan of a small campaign with the trial's physics, for ``tunnel simulate``: two springs, wind off and on.
 
     Args:
@@ -268,7 +268,7 @@ def plan_text(trial: Trial, name: str) -> str:
     )
 
 
-def effect_words(trial: Trial) -> list[str]:
+def effect_words(trial: RigTrial) -> list[str]:
     """The effect as an option of ``tunnel simulate``; empty where there is none."""
     effect = chosen_effect(trial)
     if effect is None:
@@ -277,7 +277,7 @@ def effect_words(trial: Trial) -> list[str]:
     return ["--effect", f"{effect.name}:{values}"]
 
 
-def said(trial: Trial, time: Array, nominal: Array, seen: Array) -> str:
+def said(trial: RigTrial, time: Array, nominal: Array, seen: Array) -> str:
     """What the trial shows, in a sentence.
 
     Args:

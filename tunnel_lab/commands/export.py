@@ -11,7 +11,7 @@ import typer
 NAME = "export"
 
 
-class Format(StrEnum):
+class ExportFormat(StrEnum):
     """What the file is."""
 
     MAT = "mat"
@@ -22,7 +22,7 @@ class Format(StrEnum):
 
 def run(
     campaign: Annotated[Path, typer.Argument(help="Folder of the campaign: campaign.toml and its runs.")],
-    format: Annotated[Format, typer.Option("--format", help="Format of the file.")],
+    format: Annotated[ExportFormat, typer.Option("--format", help="Format of the file.")],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -49,7 +49,7 @@ def run(
     from tunnel_sim.files.exporting import export_campaign
     from tunnel_sim.files.writing import refuse_unwritable
 
-    path = out or Path(f"{campaign.resolve().name}.{'h5' if format is Format.HDF5 else format.value}")
+    path = out or Path(f"{campaign.resolve().name}.{'h5' if format is ExportFormat.HDF5 else format.value}")
     refuse_unwritable(path)
     data = read_campaign(campaign)
     export_campaign(data, path, format.value)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NAME = "simulate"
 
 
-class Format(StrEnum):
+class RunFormat(StrEnum):
     """How the runs are written."""
 
     PARQUET = "parquet"
@@ -27,7 +27,9 @@ class Format(StrEnum):
 def run(
     plan: Annotated[Path, typer.Argument(help="Plan of the campaign, a TOML file.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
-    format: Annotated[Format, typer.Option("--format", help="Format of the run files.")] = Format.PARQUET,
+    format: Annotated[
+        RunFormat, typer.Option("--format", help="Format of the run files.")
+    ] = RunFormat.PARQUET,
     seed: Annotated[
         int | None, typer.Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,

@@ -17,9 +17,9 @@ from identification.printing import SYMBOLS
 from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor
 from tunnel_lab.envs.session import (
     LARGE,
+    CampaignSession,
     Conditions,
     Knowledge,
-    Session,
     answers,
     diagnostic_information,
     draw_truth,
@@ -127,7 +127,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         self.action_space = spaces.MultiDiscrete(list(self.conditions.menu.shape))
         self.observation_space = _observation_space(self.conditions, self.max_runs)
         self.known: Knowledge = first_knowledge(self.conditions)
-        self._session: Session | None = None
+        self._session: CampaignSession | None = None
         self._total_gain = 0.0
 
     @property
@@ -153,7 +153,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         if self.conditions.linear and truth.effects:
             remedy = "make the environment with simulation='full'"
             raise TunnelError("effects are not part of linear theory", where="option effects", remedy=remedy)
-        self._session = Session(self.conditions, truth, self.np_random.spawn(1)[0])
+        self._session = CampaignSession(self.conditions, truth, self.np_random.spawn(1)[0])
         self.known = first_knowledge(self.conditions)
         if self.render_mode == "human":
             self.render()

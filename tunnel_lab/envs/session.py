@@ -1,6 +1,6 @@
 """A campaign in progress: the rig with its hidden truth, and the results of the runs so far.
 
-`Session` holds the truth and makes runs; `Knowledge` is what the operator, a policy or an observation may use.
+`CampaignSession` holds the truth and makes runs; `Knowledge` is what the operator, a policy or an observation may use.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def first_knowledge(conditions: Conditions) -> Knowledge:
     return Knowledge(conditions, (prior_belief(MEAN, STD),))
 
 
-class Session:
+class CampaignSession:
     """The rig in one episode.
 
     Args:

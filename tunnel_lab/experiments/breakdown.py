@@ -68,7 +68,7 @@ _DARK = 1.2  # decades from which white text is legible
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class BiasCase:
     """A campaign under one effect, or none.
 
     Args:
@@ -118,7 +118,7 @@ def make_cases(
     severities: Sequence[float] = SEVERITIES,
     duration: float = 10.0,
     show_steps: bool = False,
-) -> list[Case]:
+) -> list[BiasCase]:
     """Size the effects and simulate their campaigns.
 
     Realisations differ in the noise, and in the forcing where it is random. Effects that have a sign are
@@ -182,14 +182,14 @@ def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
     return replace(draw, effects=effects, seed=noise)
 
 
-def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> Case:
+def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> BiasCase:
     from identification.uncertainty.cramer_rao import campaign_bound
 
     campaign = as_campaign(simulated, "breakdown")
     starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
     noise = float(np.sqrt(draw.conditions.noise_power))
     bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts)
-    return Case(
+    return BiasCase(
         effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
         severity=draw.effects[0].target if draw.effects else 0.0,
         reached=simulated.excess,
@@ -200,7 +200,7 @@ def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> Case:
 
 
 def break_down(
-    cases: Sequence[Case],
+    cases: Sequence[BiasCase],
     estimators: Sequence[str],
     seed: int,
     *,
@@ -222,7 +222,7 @@ def break_down(
     return [row for case in cases for row in rows[case.name]]
 
 
-def _estimate_case(estimators: Sequence[str], case: Case) -> list[Row]:
+def _estimate_case(estimators: Sequence[str], case: BiasCase) -> list[Row]:
     about = {
         "effect": case.effect,
         "severity": case.severity,

@@ -21,7 +21,7 @@ import numpy as np
 
 from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
-from tunnel_lab.experiments.sweep_cases import Case, Sweep, SweepDocument, check_sweep_size
+from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase, SweepDocument, check_sweep_size
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.plan_file import check_conditions, first_twice
@@ -160,7 +160,7 @@ def _check_cases(sweep: Sweep, where: str) -> None:
             plan_effects(case.plan)
 
 
-def _cases(sweep: Sweep, axis: str, where: str) -> Iterable[Case]:
+def _cases(sweep: Sweep, axis: str, where: str) -> Iterable[SweepCase]:
     """Cases that combine every value of an axis with every rig and conditions."""
     lengths = tuple(map(len, sweep.axes))
     wanted = (*_AXES[:2], axis)

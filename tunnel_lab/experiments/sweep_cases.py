@@ -147,7 +147,7 @@ class SweepDocument(StrictModel):
 
 
 @dataclass(frozen=True)
-class Case:
+class SweepCase:
     """One campaign of a sweep.
 
     Args:
@@ -235,7 +235,7 @@ class Sweep:
         """Number of shards."""
         return -(-self.size // self.cases_per_shard)
 
-    def shard(self, index: int) -> Iterator[Case]:
+    def shard(self, index: int) -> Iterator[SweepCase]:
         """The cases of a shard.
 
         Args:
@@ -245,7 +245,7 @@ class Sweep:
         for place in range(start, min(start + self.cases_per_shard, self.size)):
             yield self.case(place)
 
-    def case(self, index: int) -> Case:
+    def case(self, index: int) -> SweepCase:
         """A case.
 
         Args:
@@ -268,7 +268,7 @@ class Sweep:
         seed = case_seed(self.document.seed, {"rig": self.rigs[rig], **physics}, replicate)
         document = {"name": f"{self.document.name}-{index}", "seed": seed, **physics}
         plan = plan_from(PlanDocument.model_validate(document), self._parsed[rig], self.document.name)
-        return Case(
+        return SweepCase(
             index=index,
             replicate=replicate,
             rig_name=self.document.rig[rig].name,

@@ -21,7 +21,7 @@ import polars as pl
 from identification import identify
 from identification.estimate import PARAMETERS, UNITS
 from identification.estimators import Estimator, make_estimator
-from tunnel_lab.experiments.sweep_cases import Case, Sweep
+from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.toml_input import one_line
@@ -126,7 +126,7 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     cases = list(plan.shard(index))
     campaigns = simulate_cases(cases, nthread=nthread)
     clock.lap("simulate")
-    answers: list[tuple[Case, str | None, Estimate | Failure | None]] = []
+    answers: list[tuple[SweepCase, str | None, Estimate | Failure | None]] = []
     for name in plan.document.estimators:
         answers += [
             (case, name, _estimate(campaign, name)) for case, campaign in zip(cases, campaigns, strict=True)
@@ -155,7 +155,7 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     )
 
 
-def simulate_cases(cases: Sequence[Case], *, nthread: int = 1) -> list[Campaign | Failure]:
+def simulate_cases(cases: Sequence[SweepCase], *, nthread: int = 1) -> list[Campaign | Failure]:
     """Simulate cases; those of the same rig and sample rate are done together.
 
     Args:
@@ -170,7 +170,7 @@ def simulate_cases(cases: Sequence[Case], *, nthread: int = 1) -> list[Campaign 
     return [done[place] for place in range(len(cases))]
 
 
-def _simulate(cases: Sequence[Case], nthread: int) -> Sequence[Campaign | Failure]:
+def _simulate(cases: Sequence[SweepCase], nthread: int) -> Sequence[Campaign | Failure]:
     from tunnel_sim.engine.virtual_campaign import simulate_campaigns
 
     try:
@@ -194,7 +194,9 @@ def _estimate(campaign: Campaign | Failure, name: str) -> Estimate | Failure:
         return Failure(RAISED, one_line(f"{type(error).__name__}: {error}"))
 
 
-def _record_rows(cases: Iterable[Case], campaigns: Iterable[Campaign | Failure]) -> list[tuple[Any, ...]]:
+def _record_rows(
+    cases: Iterable[SweepCase], campaigns: Iterable[Campaign | Failure]
+) -> list[tuple[Any, ...]]:
     return [
         (
             case.index,
@@ -245,7 +247,7 @@ class _Clock:
         self._last = now
 
 
-def case_values(case: Case) -> tuple[Any, ...]:
+def case_values(case: SweepCase) -> tuple[Any, ...]:
     """The first columns of a case's rows.
 
     Returns:
@@ -287,7 +289,7 @@ class Failure:
 
 
 def estimate_rows(
-    case: Case, estimator: str | None, outcome: Estimate | Failure | None
+    case: SweepCase, estimator: str | None, outcome: Estimate | Failure | None
 ) -> Iterator[tuple[Any, ...]]:
     """The rows of one estimator's answer to one case.
 
@@ -341,7 +343,7 @@ def _common(conditions: tuple[Condition, ...]) -> tuple[float | None, float | No
     return spring, speed, angle
 
 
-def _run_truths(case: Case, condition: Condition) -> dict[str, float | None]:
+def _run_truths(case: SweepCase, condition: Condition) -> dict[str, float | None]:
     """ωn (rad/s) and ζ of the nominal model, small angles; None where its stiffness is not positive."""
     truth, air = case.plan.truth, case.rig.body.flow(condition.air_density, condition.wind_speed)
     stiffness = condition.spring_stiffness - aerodynamic_stiffness(truth.cn_beta, **air)

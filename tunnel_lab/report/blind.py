@@ -44,7 +44,7 @@ _DARK = 0.55  # share of the colour from which white text is legible
 
 
 @dataclass(frozen=True)
-class Section(TextTable):
+class ScoreSection(TextTable):
     """A table with a line below it.
 
     Args:
@@ -56,11 +56,11 @@ class Section(TextTable):
 
 def _section(
     title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]], note: str = ""
-) -> Section:
-    return Section(title, headings, tuple(rows), headings[1:-1], note)
+) -> ScoreSection:
+    return ScoreSection(title, headings, tuple(rows), headings[1:-1], note)
 
 
-def sections(score: Score) -> list[Section]:
+def sections(score: Score) -> list[ScoreSection]:
     """The sections of a score, in order.
 
     Returns:
@@ -143,12 +143,12 @@ def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(cells)} |" for cells in (headings, aligned, *rows)]
 
 
-def _exact(score: Score) -> Section:
+def _exact(score: Score) -> ScoreSection:
     rows = tuple((KINDS[name], *_share(share)) for name, share in score.exact().items())
     return _section("Causes exactly right", ("campaigns where", "right", "of", "share", "95 %"), rows)
 
 
-def _alarms(score: Score) -> Section:
+def _alarms(score: Score) -> ScoreSection:
     entries = {
         "a cause named where none acts": score.false_alarms(),
         "no cause named where one acts": score.missed(),
@@ -158,7 +158,7 @@ def _alarms(score: Score) -> Section:
     return _section("Alarms", ("", "number", "of", "share", "95 %"), rows)
 
 
-def _found(score: Score) -> Section:
+def _found(score: Score) -> ScoreSection:
     rows = tuple(
         (group.group, *(_brief(counted) for counted in (group.exact, group.found, group.false)), "")
         for group in score.found()
@@ -171,7 +171,7 @@ def _found(score: Score) -> Section:
     return _section("Causes found and false", headings, rows, note)
 
 
-def _decisions(score: Score) -> Section:
+def _decisions(score: Score) -> ScoreSection:
     rows = tuple(
         (group.group, _brief(group.stated_wrongly), _brief(group.covered), f"{group.credible_size:.2f}")
         for group in score.found()
@@ -184,7 +184,7 @@ def _decisions(score: Score) -> Section:
     return _section("Decisions", headings, rows, note)
 
 
-def _inclusion(score: Score) -> Section:
+def _inclusion(score: Score) -> ScoreSection:
     calibration = score.inclusion()
     if calibration is None:
         return _section(INCLUSION, (), ())
@@ -203,7 +203,7 @@ def _inclusion(score: Score) -> Section:
     return _section(INCLUSION, headings, (row,), note)
 
 
-def _calibration(score: Score) -> Section:
+def _calibration(score: Score) -> ScoreSection:
     error, bins = score.calibration()
     rows = tuple((f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", *_share(b.right)) for b in bins)
     headings = ("probability stated", "mean", "right", "of", "share", "95 %")
@@ -211,7 +211,7 @@ def _calibration(score: Score) -> Section:
     return _section(CALIBRATION, headings, rows, note)
 
 
-def _closure(score: Score) -> Section:
+def _closure(score: Score) -> ScoreSection:
     share, median, low = score.closure()
     rows = (("at least 0.95 of the gap closed", *_share(share)),) if share.total else ()
     note = f"Closed: median {median:.4f}, 5th percentile {low:.4f}"
@@ -223,7 +223,7 @@ def _closure(score: Score) -> Section:
     )
 
 
-def _coefficients(score: Score) -> Section:
+def _coefficients(score: Score) -> ScoreSection:
     errors = {(e.group, e.name, e.when): e for e in score.coefficients()}
     rows = []
     for (group, name, when), after in errors.items():
@@ -249,13 +249,13 @@ def _coefficients(score: Score) -> Section:
     return _section("Coefficients before and after the causes are added", headings, rows, note)
 
 
-def _pairs(score: Score) -> Section:
+def _pairs(score: Score) -> ScoreSection:
     counts = score.pairs()
     rows = tuple((name, str(number), "") for name, number in counts.items()) if sum(counts.values()) else ()
     return _section("Answers to two effects", ("answered", "number", ""), rows)
 
 
-def _answers(score: Score) -> Section:
+def _answers(score: Score) -> ScoreSection:
     rows = []
     right = score.right_by_truth()
     for truth, answers in sorted(score.confusion().items(), key=lambda item: _order(item[0])):
@@ -266,7 +266,7 @@ def _answers(score: Score) -> Section:
     return _section("Answers by truth", ("truth", "number", "right", "answered otherwise"), rows)
 
 
-def _time(score: Score) -> Section:
+def _time(score: Score) -> ScoreSection:
     median, high, largest = score.seconds()
     rows = ((f"{median:.1f}", f"{high:.1f}", f"{largest:.1f}"),) if largest > 0.0 else ()
     return _section("Seconds for each campaign", ("median", "90th percentile", "largest"), rows)

@@ -14,7 +14,7 @@ from diagnosis.search import random_moments
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import (
-    Spectrum,
+    MomentSpectrum,
     bursts,
     departure_from_white,
     fit_turbulence,
@@ -220,7 +220,7 @@ def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy
 
 
 def test_turbulence_that_is_slowly_forgotten_can_be_noise(windy):
-    assert with_response(windy, Spectrum(intensity=1e-3, bandwidth=0.03)) is not None
+    assert with_response(windy, MomentSpectrum(intensity=1e-3, bandwidth=0.03)) is not None
 
 
 def test_one_gust_is_no_buffeting():

@@ -17,7 +17,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import Candidate
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.process_noise import ProcessNoise, Spectrum
+from diagnosis.search.process_noise import MomentSpectrum, ProcessNoise
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.weigh import FittedSet, Weighed
 from tests.unit.gap_campaigns import NOISE, nominal, studied
@@ -145,7 +145,7 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     """Where the wind is off the runs' own residuals are left, and nothing beside the moment is taken out."""
     kind = effect_class("buffeting")
     best = added(base, IDLE)
-    process = ProcessNoise(Spectrum(0.01, 5.0), 10.0, np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012)
+    process = ProcessNoise(MomentSpectrum(0.01, 5.0), 10.0, np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012)
     random = RandomAnswer(
         kind, process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
     )
