@@ -51,8 +51,8 @@ on     12.340 ± 0.056  0.01230 ± 0.00045  ok
 
 Note: run on: it starts late; cut it
 Note: no wind-on runs, so cn_beta and cn_r are not given: add runs with the wind on
-Note: no decaying motion above the noise: check the sensor, or start the record at the
-release (<off>)"""
+Note: no decaying motion above the noise: check the sensor, start a free record at its
+release, or check the input of a driven one (<off>)"""
 
 
 def test_an_estimate_prints_as_tables(estimate: Estimate) -> None:

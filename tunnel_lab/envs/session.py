@@ -1,6 +1,6 @@
 """A campaign in progress: the rig with its hidden truth, and the results of the runs so far.
 
-`CampaignSession` holds the truth and makes runs; `Knowledge` is what the operator, a policy or an observation may use.
+`CampaignSession` holds the truth and makes runs; `Knowledge` is what operators, policies and observations may use.
 """
 
 from __future__ import annotations

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from diagnosis_document import campaign, document
 
 from diagnosis.answer.reported import held_out_totals
 from diagnosis.answer.verdict import verdict
@@ -13,6 +12,7 @@ from diagnosis.closure import Misfit, Remainder, Step, Waterfall
 from diagnosis.decision import decision
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
+from tests.unit.diagnosis_document import campaign, document
 from tunnel_lab.report import advice, view
 from tunnel_lab.report.page import render_report
 

@@ -16,7 +16,7 @@ from diagnosis.answer.small_swings import (
     coefficient_value,
     wind_on_runs,
 )
-from diagnosis.answer.what_remains import rest
+from diagnosis.answer.what_remains import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.starting_points import nominal_start
@@ -77,7 +77,7 @@ def cut(base, part):
 
 def judged(study, moved, std, excess=0.4):
     stated = {"cn_beta": ParameterEstimate(0.5, std, "1/rad")}
-    return rest(study, stated, {"cn_beta": moved}, excess)
+    return remainder(study, stated, {"cn_beta": moved}, excess)
 
 
 def unknown(data, base):
