@@ -139,10 +139,14 @@ class ColumnsPart:
             await self._stated(column.stating(event.value))
 
         reads = {"time": "read as the times", "angle": "read as the angle"}.get(column.role, "")
-        use = reads if column.used else "not read; a unit stated here makes it the angle"
-        hint = "; ".join(filter(None, (column.source, use)))
+        source = column.source
+        if not column.used and column.unit:  # the field is empty, so that this unit can be chosen too
+            source = f"{column.unit}, {source}"
+        use = reads if column.used else "not read; a unit chosen here makes it the angle"
+        hint = "; ".join(filter(None, (source, use)))
+        value = column.unit if column.used and column.unit else None
         field = ui.select(
-            units, label=f"Unit of {column.name}", value=column.unit or None, clearable=True, on_change=change
+            units, label=f"Unit of {column.name}", value=value, clearable=True, on_change=change
         ).props("dense")
         field.props["hint"] = hint
         if not column.units:

@@ -159,6 +159,24 @@ def test_the_unit_of_a_column_is_guessed_shown_and_changed(
     assert abs(run.record.yaw_rad).max() == pytest.approx(abs(decay()[1]).max() / 1000.0, rel=0.01)
 
 
+def test_a_unit_chooses_one_of_two_columns_also_where_it_was_guessed(
+    browser: Any, served: Bench, tmp_path: Path
+) -> None:
+    shutil.copy(TWO_CHANNELS, tmp_path / "again.mat")
+    with tab(browser, served) as one:
+        page = one.page
+        page.set_input_files("input[type=file]", [str(tmp_path / "again.mat")])
+        page.wait_for_url("**/again/records")
+        page.wait_for_selector("text=rad, guessed from a swing of ±0.1468; not read")
+        page.get_by_label("Unit of data[1]").click()
+        page.get_by_role("option", name="rad", exact=True).click()
+        page.wait_for_selector("text=stated here; read as the angle")
+        page.wait_for_selector(".mark.rest")
+        assert page.locator(".fault").count() == 0
+    choices = read_recipe(Session(served.folder, "again").choices)
+    assert (choices.angle, choices.unit) == (("data[1]",), "rad")
+
+
 def test_the_next_run_is_proposed_and_can_be_kept(browser: Any, served: Bench) -> None:
     shutil.copytree(served.folder / "two", served.folder / "next")
     session = Session(served.folder, "next")
