@@ -11,14 +11,13 @@ from statistics import median
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import free_frequency, frequency
+from diagnosis.likelihood.nondimensional import free_frequency, frequency, response_to_input
 from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
 from identification.examination.clock import with_clocks
 from identification.examination.examine import examine
 from identification.examination.self_excited import in_limit_cycle
-from identification.signal.driven import driven_start
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect, the_effect
@@ -249,6 +248,7 @@ def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
 
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
+_NO_SPRING = "Without a spring these effects have no moment, and are not tried: {}."
 _NOT_BY_MUJOCO = (
     "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
     "take their input."
@@ -275,8 +275,8 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
         why = ""
         if not run.drive.on_body:
             why = "is driven by the motion of the spring's root"
-        elif run.spring_stiffness == 0.0:
-            why = "is driven and has no spring"
+        elif run.spring_stiffness == 0.0 and run.wind_on:
+            why = "is driven and has no spring, and the wind blows"
         elif own_model:
             why = "is driven, and a model of your own is given"
         elif campaign.sensor.derivative:
@@ -296,6 +296,19 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
                 where=f"{campaign.name}, run '{run.id}'",
                 remedy="leave the run out",
             )
+    loose = [run for run in campaign.runs if run.unrestrained]
+    if loose and not campaign.unrestrained:
+        raise TunnelError(
+            f"runs with a spring and without one ({_ids(loose)}) cannot be diagnosed together yet",
+            where=campaign.name,
+            remedy="diagnose the two kinds of runs separately",
+        )
+    if any(run.input_gain is None for run in loose):
+        raise TunnelError(
+            "without a spring, an input of unknown gain shows no inertia, and no moment in N m",
+            where=campaign.name,
+            remedy="state drive_gain, or record the moment as moment_nm",
+        )
     mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
     if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
         raise TunnelError(
@@ -306,20 +319,27 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
 
 
 def refuse_without_resonance(campaign: Campaign) -> None:
-    """Refuse a driven run whose motion does not follow from its input as an oscillation.
+    """Refuse a driven run whose motion does not follow from its input, as an oscillation where there is a spring.
 
     Raises:
         TunnelError: for the first such run.
     """
     for run in campaign.runs:
-        if run.drive is not None:
-            found = driven_start(run.record.time_s, run.record.yaw_rad, run.drive.values)
-            if found is None or not found[1] > 0.0:
-                raise TunnelError(
-                    "no resonance between input and motion",
-                    where=f"run {run.id}",
-                    remedy="drive it over a band that includes the natural frequency; or leave the run out",
-                )
+        if run.drive is None:
+            continue
+        found = response_to_input(run)
+        if run.unrestrained and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+            raise TunnelError(
+                "the motion does not follow the moment of the input",
+                where=f"run {run.id}",
+                remedy="check its sign, and that all moments on the body are in it; or leave the run out",
+            )
+        if not run.unrestrained and (found is None or not found[1] > 0.0):
+            raise TunnelError(
+                "no resonance between input and motion",
+                where=f"run {run.id}",
+                remedy="drive it over a band that includes the natural frequency; or leave the run out",
+            )
 
 
 def kinds_for(
@@ -338,7 +358,12 @@ def kinds_for(
         return tuple(kinds), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
     gone = [kind.name for kind in kinds if kind not in kept]
-    return kept, (*((_NOT_TRIED.format(", ".join(gone)),) if gone else ()), _NOT_BY_MUJOCO)
+    vain = [kind.name for kind in kept if kind.on_spring and campaign.unrestrained]
+    kept = tuple(kind for kind in kept if kind.name not in vain)
+    said = [
+        sentence.format(", ".join(names)) for sentence, names in ((_NOT_TRIED, gone), (_NO_SPRING, vain)) if names
+    ]
+    return kept, (*said, _NOT_BY_MUJOCO)
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:

@@ -421,6 +421,7 @@ def difference_steps(problem: Problem, common: Array) -> Array:
         "cn_beta": _AIR_STIFFNESS / stiffness_load,
         "cn_r": _AIR_DAMPING / damping_load,
         "zero": 1.0,
+        "moment_offset": REFERENCE_STIFFNESS * data.swing,
         "drive_gain": _gain_scale(data),
     }
     for kind in problem.effects:

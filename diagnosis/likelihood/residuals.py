@@ -219,8 +219,10 @@ def resonance(fit: Fit, run_index: int) -> float:
         fit: parameter values.
 
     Returns:
-        Hz.
+        Hz; of a body that nothing holds, the frequency of its motion in the similar campaign.
     """
+    if fit.problem.data.unrestrained:
+        return REFERENCE_FREQUENCY
     inertia, _, stiffness = linear_coefficients(fit, run_index)
     return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
 
