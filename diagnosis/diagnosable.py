@@ -254,6 +254,12 @@ _NOT_BY_MUJOCO = (
     "take their input."
 )
 
+#: Said where causes of a gap are sought and nothing holds the body.
+BY_RATE = (
+    "Nothing holds the body, so that small errors of the moment add up in its angle. Effects are therefore compared "
+    "by the rate of what they leave; the share closed is that of the angle."
+)
+
 #: Said of a campaign with driven runs.
 NOT_SOUGHT = (
     "What could be closed of what remains, and by which formula, is not sought where a run is driven."

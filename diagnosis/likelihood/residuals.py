@@ -10,6 +10,7 @@ the damping, nor the other way round.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -91,6 +92,21 @@ class Line:
     amplitude: float
     phases: Array
     runs: int
+
+
+def by_rate(fit: Fit) -> Data:
+    """The runs of a fit with residuals in which what adds up over a run counts by its growth.
+
+    White noise with a random walk beside it is white after the filter (1 − B)/(1 − θ B) of the backward shift B
+    (Box and Jenkins, Time Series Analysis, on IMA(1, 1)). The walk is what the fit leaves: θ is near 1 where that is
+    noise, and 0 where it is much more. The filter's greatest gain is 1, so that white noise is nowhere amplified.
+    """
+    steps = np.concatenate([np.diff(residual) for residual in fit.residuals])
+    walk = max(float(np.mean(steps**2)) - 2.0, 0.0)
+    theta = 1.0 / (1.0 + 0.5 * walk + float(np.sqrt(walk + 0.25 * walk**2)))
+    filters = 0.5 * (1.0 + theta) * np.array([1.0, -1.0]), np.array([1.0, -theta])
+    data = fit.problem.data
+    return data.with_runs(tuple(dataclasses.replace(run, innovations=filters) for run in data.runs))
 
 
 def mains_interval(similarity: Similarity) -> float:

@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residu
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, mains_interval, misfit
+from diagnosis.likelihood.residuals import CHANNELS, by_rate, mains_interval, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import decays_start, misses_motion, nominal_start
 from diagnosis.noise.gap import GapTest, gap_or_colour
@@ -265,6 +265,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     # an input holds the phase of the motion, so that no stretches are needed
     if fitted and first is None and misses_motion(found.nominal) and not found.campaign.driven:
         return _weigh_in_stretches(found, fitted, clock)
+    if found.campaign.unrestrained:
+        return _weigh_by_rate(found, fitted, clock)
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima
         with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
@@ -280,6 +282,11 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
+    return _unless_noise(found, weighed)
+
+
+def _unless_noise(found: Study, weighed: Sequence[Weighed]) -> Study:
+    """The study with its answers; the noise is what explains the gap where it may be all of it."""
     if _noise_explains(found, weighed):
         answer = Weighed((), 1.0, 1.0) if found.read_off else Weighed(UNKNOWN, 1.0, 1.0)
         others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
@@ -294,17 +301,41 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
     found = replace(found, hypotheses=grown.hypotheses)
     found = _pruned(found, grown.nominal, clock)
     with clock.step("polishing"):
-        return _with_whole_runs(found, grown)
+        data = found.nominal.problem.data
+        return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
 
 
-def _with_whole_runs(found: Study, grown: InStretches) -> Study:
-    """The study with the answer and its parts fitted to the whole runs; a set that cannot be is no answer."""
+def _weigh_by_rate(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study of a body that nothing holds: sets are weighed by the rate of what they leave.
+
+    Every small error of the moment moves the body for good, so that its angle departs further and further.
+    """
     data = found.nominal.problem.data
+    base = fit(Problem(by_rate(found.nominal)), found.nominal.point)
+
+    def whole(hypothesis: Hypothesis) -> Hypothesis | None:
+        with suppress(FitError, np.linalg.LinAlgError):
+            of_set = hypothesis.fit
+            return replace(hypothesis, fit=fit(replace(of_set.problem, data=data), of_set.point))
+        return None
+
+    with clock.step("effects"):
+        found = replace(found, hypotheses=tuple(grow(base, kinds, clock.progress)))
+    found = _pruned(found, base, clock)
+    with clock.step("polishing"):
+        found = _with_whole_runs(found, base, whole)
+    return _unless_noise(found, found.weighed)
+
+
+def _with_whole_runs(
+    found: Study, nominal: Fit, whole_runs: Callable[[Hypothesis], Hypothesis | None]
+) -> Study:
+    """The study with the answer and its parts fitted to the whole runs; a set that cannot be is no answer."""
     while True:
-        weighed = _weighed(found, grown.nominal)
+        weighed = _weighed(found, nominal)
         answer = set(weighed[0].effects)
         polished = _polished(found.hypotheses, weighed[0], ())
-        whole = [grown.whole(h, data) if answer.issuperset(h.names) else h for h in polished]
+        whole = [whole_runs(h) if answer.issuperset(h.names) else h for h in polished]
         kept = replace(found, hypotheses=tuple(h for h in whole if h is not None), weighed=tuple(weighed))
         if weighed[0].effects == UNKNOWN or kept.hypothesis(weighed[0].effects) is not None:
             return kept
