@@ -248,16 +248,19 @@ def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
 
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
-_NO_SPRING = "Without a spring these effects have no moment, and are not tried: {}."
+_NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
+_NO_ZERO = (
+    "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
+)
 _NOT_BY_MUJOCO = (
     "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
     "take their input."
 )
 
 #: Said where causes of a gap are sought and nothing holds the body.
-BY_RATE = (
+BY_MOMENT = (
     "Nothing holds the body, so that small errors of the moment add up in its angle. Effects are therefore compared "
-    "by the rate of what they leave; the share closed is that of the angle."
+    "by the moment that they leave, as the shares of the answers are; other shares are those of the angle."
 )
 
 #: Said of a campaign with driven runs.
@@ -363,12 +366,12 @@ def kinds_for(
     if not campaign.driven:
         return tuple(kinds), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
-    gone = [kind.name for kind in kinds if kind not in kept]
-    vain = [kind.name for kind in kept if kind.on_spring and campaign.unrestrained]
-    kept = tuple(kind for kind in kept if kind.name not in vain)
-    said = [
-        sentence.format(", ".join(names)) for sentence, names in ((_NOT_TRIED, gone), (_NO_SPRING, vain)) if names
-    ]
+    gone = {_NOT_TRIED: [kind for kind in kinds if kind not in kept]}
+    if campaign.unrestrained:
+        gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
+        gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]
+        kept = tuple(kind for kind in kept if kind not in (*gone[_NO_MOMENT], *gone[_NO_ZERO]))
+    said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]
     return kept, (*said, _NOT_BY_MUJOCO)
 
 

@@ -152,12 +152,13 @@ def free_frequency(run: Run) -> float:
 
     Returns:
         That of its decay, Hz; of a driven run, whose motion may follow its input, that of the resonance between
-        them, or of the peak of the motion where they show none; of a body that nothing holds, the mean frequency of
-        the power of its rate.
+        them, or of the peak of the motion where they show none. A body that nothing holds does not swing: the mean
+        frequency of the power of its rate, or the one from which on inertia exceeds damping if that is higher.
     """
-    if run.unrestrained:
-        return _rate_frequency(run.record)
     found = response_to_input(run)
+    if run.unrestrained:
+        moved, corner = _rate_frequency(run.record), 0.0 if found is None else found[0] / np.pi
+        return float(np.clip(corner, moved, _MOST_CORNER * moved))
     return (
         frequency(run.record)
         if found is None or found[1] <= 0.0
@@ -177,6 +178,7 @@ def response_to_input(run: Run) -> tuple[float, float, float] | None:
     return driven_start(record.time_s, record.yaw_rad, run.drive.values, sprung=not run.unrestrained)
 
 
+_MOST_CORNER = 8.0  # times the motion: of a body that is mostly damping the inertia hardly shows
 _MOTION = 0.999  # share of the swing's power that the lines of the motion hold: beyond them is noise
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.rod_modes import slow_motion
@@ -119,7 +119,9 @@ class Problem:
 
     def _is_free(self, kind: type[Effect], info: ParameterInfo) -> bool:
         freed = not info.form or kind.name in self.free_forms
-        return freed and not (info.beside_spring and self.data.normalised)
+        # in small swings the rest angle of a body that nothing else holds is one with a constant moment
+        loose = self.data.normalised or (self.data.unrestrained and self.data.swing < SWING)
+        return freed and not (info.beside_spring and loose)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

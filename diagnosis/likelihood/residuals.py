@@ -94,19 +94,25 @@ class Line:
     runs: int
 
 
-def by_rate(fit: Fit) -> Data:
-    """The runs of a fit with residuals in which what adds up over a run counts by its growth.
+def by_moment(fit: Fit) -> Data:
+    """The runs of a fit with residuals that count by the moment which would make them, beside white noise.
 
-    White noise with a random walk beside it is white after the filter (1 − B)/(1 − θ B) of the backward shift B
-    (Box and Jenkins, Time Series Analysis, on IMA(1, 1)). The walk is what the fit leaves: θ is near 1 where that is
-    noise, and 0 where it is much more. The filter's greatest gain is 1, so that white noise is nowhere amplified.
+    Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) of it, with the backward
+    shift B and φ = exp(−C h/Izz). White noise beside it makes (1 − B)(1 − φ B) of the reading a moving average of
+    order two, whose inverse whitens it (Box and Jenkins, Time Series Analysis). The power of the moment is that in
+    the fit's residuals. Where it is 0 nothing is filtered. No gain is above 1, so that noise is nowhere amplified.
     """
-    steps = np.concatenate([np.diff(residual) for residual in fit.residuals])
-    walk = max(float(np.mean(steps**2)) - 2.0, 0.0)
-    theta = 1.0 / (1.0 + 0.5 * walk + float(np.sqrt(walk + 0.25 * walk**2)))
-    filters = 0.5 * (1.0 + theta) * np.array([1.0, -1.0]), np.array([1.0, -theta])
-    data = fit.problem.data
-    return data.with_runs(tuple(dataclasses.replace(run, innovations=filters) for run in data.runs))
+    inertia, damping, _ = linear_coefficients(fit, 0)
+    runs = []
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        shape = np.polymul([1.0, -1.0], [1.0, -np.exp(-damping * run.interval / inertia)])
+        left = np.convolve(residual, shape, "valid")
+        power = max(float(np.mean(left**2)) - float(shape @ shape), 0.0)
+        roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
+        average = np.real(np.poly(roots[np.argsort(np.abs(roots))][:2]))
+        gain = np.polyval(average, -1.0) / np.polyval(shape, -1.0)  # at the highest frequency, where it is greatest
+        runs.append(dataclasses.replace(run, innovations=(gain * shape, average)))
+    return fit.problem.data.with_runs(tuple(runs))
 
 
 def mains_interval(similarity: Similarity) -> float:
@@ -235,7 +241,7 @@ def resonance(fit: Fit, run_index: int) -> float:
         fit: parameter values.
 
     Returns:
-        Hz; of a body that nothing holds, the frequency of its motion in the similar campaign.
+        Hz; of a body that nothing holds, that of `free_frequency` in the similar campaign.
     """
     if fit.problem.data.unrestrained:
         return REFERENCE_FREQUENCY

@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residu
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, by_rate, mains_interval, misfit
+from diagnosis.likelihood.residuals import CHANNELS, by_moment, mains_interval, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import decays_start, misses_motion, nominal_start
 from diagnosis.noise.gap import GapTest, gap_or_colour
@@ -266,7 +266,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     if fitted and first is None and misses_motion(found.nominal) and not found.campaign.driven:
         return _weigh_in_stretches(found, fitted, clock)
     if found.campaign.unrestrained:
-        return _weigh_by_rate(found, fitted, clock)
+        return _weigh_by_moment(found, fitted, clock)
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima
         with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
@@ -305,13 +305,13 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
         return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
 
 
-def _weigh_by_rate(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    """The study of a body that nothing holds: sets are weighed by the rate of what they leave.
+def _weigh_by_moment(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study of a body that nothing holds: sets are weighed by the moment that they leave.
 
     Every small error of the moment moves the body for good, so that its angle departs further and further.
     """
     data = found.nominal.problem.data
-    base = fit(Problem(by_rate(found.nominal)), found.nominal.point)
+    base = fit(Problem(by_moment(found.nominal)), found.nominal.point)
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
         with suppress(FitError, np.linalg.LinAlgError):
