@@ -131,7 +131,7 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
     """The answer in the units of the measured campaign, without what no effect explains."""
     where, maps = localise(study)
     patched, unpatched = (None, ()) if model is None else _patched(study, model)
-    by_moment = (BY_MOMENT,) if chosen.campaign.unrestrained and study.weighed else ()
+    by_moment = (BY_MOMENT,) if study.by_moment else ()
     left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
     assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
     sized = replace(

@@ -257,10 +257,11 @@ _NOT_BY_MUJOCO = (
     "take their input."
 )
 
-#: Said where causes of a gap are sought and nothing holds the body.
+#: Said where effects are compared in this way.
 BY_MOMENT = (
-    "Nothing holds the body, so that small errors of the moment add up in its angle. Effects are therefore compared "
-    "by the moment that they leave, as the shares of the answers are; other shares are those of the angle."
+    "Nothing holds the body, and small errors of the moment add up in its angle, which no effect explains within the noise. "
+    "Effects are therefore compared by the moment that they leave, as the shares of the answers are; other shares "
+    "are those of the angle."
 )
 
 #: Said of a campaign with driven runs.

@@ -61,6 +61,7 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
+        by_moment: whether sets are weighed by the moment that they leave, and not by the angle.
         rested: runs that end with a long rest, which the fits of effects leave out.
         place: where the gap is, from the residuals alone; None where it is not located yet.
         hypotheses: fitted sets of effects.
@@ -80,6 +81,7 @@ class Study:
     nominal: Fit
     test: GapTest
     cut: bool = False
+    by_moment: bool = False
     rested: tuple[str, ...] = ()
     place: Place | None = None
     hypotheses: tuple[Hypothesis, ...] = ()
@@ -265,8 +267,6 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     # an input holds the phase of the motion, so that no stretches are needed
     if fitted and first is None and misses_motion(found.nominal) and not found.campaign.driven:
         return _weigh_in_stretches(found, fitted, clock)
-    if found.campaign.unrestrained:
-        return _weigh_by_moment(found, fitted, clock)
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima
         with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
@@ -279,14 +279,14 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
+    best = found.hypothesis(weighed[1].effects) if found.campaign.unrestrained else None
+    if weighed[0].effects == UNKNOWN and best is not None:
+        again = _weigh_by_moment(found, best, fitted, clock)
+        if again.fitted != UNKNOWN:
+            return again
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
-    return _unless_noise(found, weighed)
-
-
-def _unless_noise(found: Study, weighed: Sequence[Weighed]) -> Study:
-    """The study with its answers; the noise is what explains the gap where it may be all of it."""
     if _noise_explains(found, weighed):
         answer = Weighed((), 1.0, 1.0) if found.read_off else Weighed(UNKNOWN, 1.0, 1.0)
         others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
@@ -305,13 +305,13 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
         return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
 
 
-def _weigh_by_moment(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    """The study of a body that nothing holds: sets are weighed by the moment that they leave.
+def _weigh_by_moment(found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+    """The study of a body that nothing holds, whose sets are weighed by the moment that they leave.
 
     Every small error of the moment moves the body for good, so that its angle departs further and further.
     """
     data = found.nominal.problem.data
-    base = fit(Problem(by_moment(found.nominal)), found.nominal.point)
+    base = fit(Problem(by_moment(best.fit)), found.nominal.point)
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
         with suppress(FitError, np.linalg.LinAlgError):
@@ -320,11 +320,10 @@ def _weigh_by_moment(found: Study, kinds: Sequence[type[Effect]], clock: _Clock)
         return None
 
     with clock.step("effects"):
-        found = replace(found, hypotheses=tuple(grow(base, kinds, clock.progress)))
+        found = replace(found, by_moment=True, hypotheses=tuple(grow(base, kinds, clock.progress)))
     found = _pruned(found, base, clock)
     with clock.step("polishing"):
-        found = _with_whole_runs(found, base, whole)
-    return _unless_noise(found, found.weighed)
+        return _with_whole_runs(found, base, whole)
 
 
 def _with_whole_runs(
