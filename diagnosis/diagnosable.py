@@ -259,9 +259,10 @@ _NOT_BY_MUJOCO = (
 
 #: Said where effects are compared in this way.
 BY_MOMENT = (
-    "Nothing holds the body, and small errors of the moment add up in its angle, which no effect explains within the noise. "
-    "Effects are therefore compared by the moment that they leave, as the shares of the answers are; other shares "
-    "are those of the angle."
+    "Nothing holds the body, and small errors of the moment add up in its angle, which no effect explains. "
+    "Effects are therefore compared by the moment that they leave, which counts as random noise beside the answer: "
+    "its parameters, the coefficients and the shares in the table of answers are so found; all other sizes and "
+    "shares are those of the angle."
 )
 
 #: Said of a campaign with driven runs.
@@ -306,6 +307,18 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
                 where=f"{campaign.name}, run '{run.id}'",
                 remedy="leave the run out",
             )
+    _refuse_beside_springs(campaign)
+    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
+    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
+        raise TunnelError(
+            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
+            where=campaign.name,
+            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+        )
+
+
+def _refuse_beside_springs(campaign: Campaign) -> None:
+    """Refuse runs without a spring beside others, or with an input that shows no inertia."""
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -318,13 +331,6 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             "without a spring, an input of unknown gain shows no inertia, and no moment in N m",
             where=campaign.name,
             remedy="state drive_gain, or record the moment as moment_nm",
-        )
-    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
-    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
-        raise TunnelError(
-            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
-            where=campaign.name,
-            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
         )
 
 

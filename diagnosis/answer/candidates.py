@@ -166,7 +166,7 @@ def _block(study: Study) -> int:
 
 def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
     random = study.random_answer(answer.effects)
-    hypothesis = study.hypothesis(answer.effects) if random is None else random.beside
+    hypothesis = study.stated(answer.effects) if random is None else random.beside
     found: dict[str, ParameterEstimate] = {}
     if hypothesis is not None:
         problem = hypothesis.fit.problem

@@ -208,7 +208,9 @@ def blind_spots(
     if normalised:
         found.append("an error of a single spring: the runs state no stiffness")
     elif springs == 0:
-        found.append("the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring")
+        found.append(
+            "the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring"
+        )
     elif springs < 2:
         found.append(
             "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"

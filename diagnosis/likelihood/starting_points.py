@@ -124,7 +124,9 @@ def _unrestrained_start(data: Data, driven: Sequence[tuple[float, float, float] 
         if response is not None and run.drive is not None
     ]
     inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
-    release = [[np.mean(run.reading[:3]), (run.reading[1] - run.reading[0]) / run.interval] for run in data.runs]
+    release = [
+        [np.mean(run.reading[:3]), (run.reading[1] - run.reading[0]) / run.interval] for run in data.runs
+    ]
     return Point(np.array([inertia, inertia * max(loss, _SLOW), 0.0]), np.array(release))
 
 

@@ -29,8 +29,15 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
-from diagnosis.policy import COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, NOISE_LEAVES, RIVAL_PROBABILITY
-from diagnosis.search.grow import InStretches, exchange, grow, grow_in_stretches, prune, second_mode_alone
+from diagnosis.policy import (
+    COARSER_STEP,
+    HUM_LEFT,
+    MOMENT_LEFT,
+    NOISE_EXPLAINS_UP_TO,
+    NOISE_LEAVES,
+    RIVAL_PROBABILITY,
+)
+from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.search.random_moments import RandomAnswer, weigh_random_moments, without_the_random_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
@@ -61,7 +68,8 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
-        by_moment: whether sets are weighed by the moment that they leave, and not by the angle.
+        by_moment: the sets fitted with a random moment beside them, where sets are weighed by the moment that they
+            leave and not by the angle.
         rested: runs that end with a long rest, which the fits of effects leave out.
         place: where the gap is, from the residuals alone; None where it is not located yet.
         hypotheses: fitted sets of effects.
@@ -81,7 +89,7 @@ class Study:
     nominal: Fit
     test: GapTest
     cut: bool = False
-    by_moment: bool = False
+    by_moment: tuple[Hypothesis, ...] = ()
     rested: tuple[str, ...] = ()
     place: Place | None = None
     hypotheses: tuple[Hypothesis, ...] = ()
@@ -121,6 +129,11 @@ class Study:
             return self.nominal if random.beside is None else random.beside.fit
         hypothesis = self.hypothesis(names) if names else None
         return self.nominal if hypothesis is None else hypothesis.fit
+
+    def stated(self, names: Sequence[str]) -> Hypothesis | None:
+        """As `hypothesis`, with a random moment beside the effects where they were weighed so."""
+        key = tuple(sorted(names))
+        return next((h for h in self.by_moment if h.names == key), self.hypothesis(key))
 
     def hypothesis(self, names: Sequence[str]) -> Hypothesis | None:
         """The fitted hypothesis of these effects; None where they were not fitted together."""
@@ -282,7 +295,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     best = found.hypothesis(weighed[1].effects) if found.campaign.unrestrained else None
     if weighed[0].effects == UNKNOWN and best is not None:
         again = _weigh_by_moment(found, best, fitted, clock)
-        if again.fitted != UNKNOWN:
+        if again is not None and again.fitted != UNKNOWN:
             return again
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
@@ -305,13 +318,23 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
         return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
 
 
-def _weigh_by_moment(found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+def _weigh_by_moment(
+    found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock
+) -> Study | None:
     """The study of a body that nothing holds, whose sets are weighed by the moment that they leave.
 
     Every small error of the moment moves the body for good, so that its angle departs further and further.
+
+    Args:
+        best: the set that leaves the random moment, which from then on is noise.
+
+    Returns:
+        None where that moment is not small beside the one that the nominal model misses.
     """
     data = found.nominal.problem.data
     base = fit(Problem(by_moment(best.fit)), found.nominal.point)
+    if MOMENT_LEFT * (1.0 + base.excess) < 1.0:
+        return None
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
         with suppress(FitError, np.linalg.LinAlgError):
@@ -320,8 +343,9 @@ def _weigh_by_moment(found: Study, best: Hypothesis, kinds: Sequence[type[Effect
         return None
 
     with clock.step("effects"):
-        found = replace(found, by_moment=True, hypotheses=tuple(grow(base, kinds, clock.progress)))
+        found = replace(found, hypotheses=tuple(grow(base, kinds, clock.progress)))
     found = _pruned(found, base, clock)
+    found = replace(found, by_moment=found.hypotheses)
     with clock.step("polishing"):
         return _with_whole_runs(found, base, whole)
 
