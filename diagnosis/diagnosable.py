@@ -259,7 +259,7 @@ _NOT_BY_MUJOCO = (
 
 #: Said where effects are compared in this way.
 BY_MOMENT = (
-    "Nothing holds the body, and small errors of the moment add up in its angle, which no effect explains. "
+    "Nothing holds the body, and small errors of the moment add up in its angle: it departs from every model. "
     "Effects are therefore compared by the moment that they leave, which counts as random noise beside the answer: "
     "its parameters, the coefficients and the shares in the table of answers are so found; all other sizes and "
     "shares are those of the angle."

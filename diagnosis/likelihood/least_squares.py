@@ -427,10 +427,8 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     for kind in problem.effects:
         for info in kind.parameters():
             scales[f"{kind.name}.{info.name}"] = info.scale
-    sizes = np.array(
-        [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
-    )
-    steps = 1e-5 * sizes
+    sizes = [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
+    steps = 1e-5 * np.array(sizes)
     _, upper = problem.bounds
     steps[common + steps > upper] *= -1.0
     return steps

@@ -292,10 +292,11 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
-    best = found.hypothesis(weighed[1].effects) if found.campaign.unrestrained else None
-    if weighed[0].effects == UNKNOWN and best is not None:
-        again = _weigh_by_moment(found, best, fitted, clock)
-        if again is not None and again.fitted != UNKNOWN:
+    sets = (found.hypothesis(w.effects) for w in weighed)
+    best = next((h for h in sets if h is not None), None) if found.campaign.unrestrained else None
+    if best is not None and best.fit.chance < 1.0:
+        again = _weigh_by_moment(found, best, fitted, clock, explained=weighed[0].effects != UNKNOWN)
+        if again is not None:
             return again
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
@@ -319,7 +320,7 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
 
 
 def _weigh_by_moment(
-    found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock
+    found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock, *, explained: bool
 ) -> Study | None:
     """The study of a body that nothing holds, whose sets are weighed by the moment that they leave.
 
@@ -328,12 +329,14 @@ def _weigh_by_moment(
     Args:
         best: the set that leaves the random moment, which from then on is noise.
 
+        explained: whether it also explains the angle.
+
     Returns:
-        None where that moment is not small beside the one that the nominal model misses.
+        None where it does not, and that moment is not small beside the one that the nominal model misses.
     """
     data = found.nominal.problem.data
     base = fit(Problem(by_moment(best.fit)), found.nominal.point)
-    if MOMENT_LEFT * (1.0 + base.excess) < 1.0:
+    if not explained and MOMENT_LEFT * (1.0 + base.excess) < 1.0:
         return None
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
