@@ -292,8 +292,8 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
-    sets = (found.hypothesis(w.effects) for w in weighed)
-    best = next((h for h in sets if h is not None), None) if found.campaign.unrestrained else None
+    named = (found.hypothesis(w.effects) for w in weighed)
+    best = next((h for h in named if h is not None), None) if found.campaign.unrestrained else None
     if best is not None and best.fit.chance < 1.0:
         again = _weigh_by_moment(found, best, fitted, clock, explained=weighed[0].effects != UNKNOWN)
         if again is not None:
@@ -335,7 +335,10 @@ def _weigh_by_moment(
         None where it does not, and that moment is not small beside the one that the nominal model misses.
     """
     data = found.nominal.problem.data
-    base = fit(Problem(by_moment(best.fit)), found.nominal.point)
+    try:
+        base = fit(Problem(by_moment(best.fit)), found.nominal.point)
+    except (FitError, np.linalg.LinAlgError):
+        return None
     if not explained and MOMENT_LEFT * (1.0 + base.excess) < 1.0:
         return None
 
