@@ -37,7 +37,8 @@ class InputFit:
         own: zero (rad; without a spring the constant acceleration, rad/s²), initial angle (rad) and rate (rad/s) of
             each run, shape (r, 3).
         residuals: reading less model, by run, rad.
-        normal: information of φ, of the common zero where there is one, and then of the runs' own numbers, shape (m, m).
+        normal: information of φ, of the common zero where there is one, and then of the runs' own numbers, shape
+            (m, m).
         converged: whether a last step no longer paid.
     """
 
