@@ -14,6 +14,7 @@ from diagnosis.answer.candidates import cause_sizes
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
 from diagnosis.diagnosable import (
+    BY_MOMENT,
     NOT_SOUGHT,
     Chosen,
     choose,
@@ -130,7 +131,8 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
     """The answer in the units of the measured campaign, without what no effect explains."""
     where, maps = localise(study)
     patched, unpatched = (None, ()) if model is None else _patched(study, model)
-    left_out = (*chosen.left_out, *gain_words(chosen.campaign, study.chosen), *unpatched)
+    by_moment = (BY_MOMENT,) if study.by_moment else ()
+    left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
     assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
     sized = replace(
         assembled,

@@ -11,14 +11,13 @@ from statistics import median
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import free_frequency, frequency
+from diagnosis.likelihood.nondimensional import free_frequency, frequency, response_to_input
 from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
 from identification.examination.clock import with_clocks
 from identification.examination.examine import examine
 from identification.examination.self_excited import in_limit_cycle
-from identification.signal.driven import driven_start
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect, the_effect
@@ -249,9 +248,21 @@ def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
 
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
+_NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
+_NO_ZERO = (
+    "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
+)
 _NOT_BY_MUJOCO = (
     "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
     "take their input."
+)
+
+#: Said where effects are compared in this way.
+BY_MOMENT = (
+    "Nothing holds the body, and small errors of the moment add up in its angle: it departs from every model. "
+    "Effects are therefore compared by the moment that they leave, which counts as random noise beside the answer: "
+    "its parameters, the coefficients and the shares in the table of answers are so found; all other sizes and "
+    "shares are those of the angle."
 )
 
 #: Said of a campaign with driven runs.
@@ -275,8 +286,8 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
         why = ""
         if not run.drive.on_body:
             why = "is driven by the motion of the spring's root"
-        elif run.spring_stiffness == 0.0:
-            why = "is driven and has no spring"
+        elif run.spring_stiffness == 0.0 and run.wind_on:
+            why = "is driven and has no spring, and the wind blows"
         elif own_model:
             why = "is driven, and a model of your own is given"
         elif campaign.sensor.derivative:
@@ -296,6 +307,7 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
                 where=f"{campaign.name}, run '{run.id}'",
                 remedy="leave the run out",
             )
+    _refuse_beside_springs(campaign)
     mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
     if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
         raise TunnelError(
@@ -305,21 +317,45 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
         )
 
 
+def _refuse_beside_springs(campaign: Campaign) -> None:
+    """Refuse runs without a spring beside others, or with an input that shows no inertia."""
+    loose = [run for run in campaign.runs if run.unrestrained]
+    if loose and not campaign.unrestrained:
+        raise TunnelError(
+            f"runs with a spring and without one ({_ids(loose)}) cannot be diagnosed together yet",
+            where=campaign.name,
+            remedy="diagnose the two kinds of runs separately",
+        )
+    if any(run.input_gain is None for run in loose):
+        raise TunnelError(
+            "without a spring, an input of unknown gain shows no inertia, and no moment in N m",
+            where=campaign.name,
+            remedy="state drive_gain, or record the moment as moment_nm",
+        )
+
+
 def refuse_without_resonance(campaign: Campaign) -> None:
-    """Refuse a driven run whose motion does not follow from its input as an oscillation.
+    """Refuse a driven run whose motion does not follow from its input, as an oscillation where there is a spring.
 
     Raises:
         TunnelError: for the first such run.
     """
     for run in campaign.runs:
-        if run.drive is not None:
-            found = driven_start(run.record.time_s, run.record.yaw_rad, run.drive.values)
-            if found is None or not found[1] > 0.0:
-                raise TunnelError(
-                    "no resonance between input and motion",
-                    where=f"run {run.id}",
-                    remedy="drive it over a band that includes the natural frequency; or leave the run out",
-                )
+        if run.drive is None:
+            continue
+        found = response_to_input(run)
+        if run.unrestrained and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+            raise TunnelError(
+                "the motion does not follow the moment of the input",
+                where=f"run {run.id}",
+                remedy="check its sign, and that all moments on the body are in it; or leave the run out",
+            )
+        if not run.unrestrained and (found is None or not found[1] > 0.0):
+            raise TunnelError(
+                "no resonance between input and motion",
+                where=f"run {run.id}",
+                remedy="drive it over a band that includes the natural frequency; or leave the run out",
+            )
 
 
 def kinds_for(
@@ -337,8 +373,13 @@ def kinds_for(
     if not campaign.driven:
         return tuple(kinds), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
-    gone = [kind.name for kind in kinds if kind not in kept]
-    return kept, (*((_NOT_TRIED.format(", ".join(gone)),) if gone else ()), _NOT_BY_MUJOCO)
+    gone = {_NOT_TRIED: [kind for kind in kinds if kind not in kept]}
+    if campaign.unrestrained:
+        gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
+        gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]
+        kept = tuple(kind for kind in kept if kind not in (*gone[_NO_MOMENT], *gone[_NO_ZERO]))
+    said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]
+    return kept, (*said, _NOT_BY_MUJOCO)
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:

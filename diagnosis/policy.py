@@ -129,6 +129,10 @@ EVEN_SHARE = 0.03
 #: Of several forms those are freed without which χ² would rise by more than this share of the excess. Tuned.
 FORM_SHARE = 0.2
 
+#: Share of the power of the missing moment that a set may leave as a random one, on a body that nothing holds.
+#: Judgement: half its size. A cause is the greater part of the gap, and any moment moves such a body for good.
+MOMENT_LEFT = 0.25
+
 # ---- Random moments (0009) ------------------------------------------------------------------------------------
 
 #: Largest departure of the innovations' power from white, by band and by quarter of a record, in standard

@@ -205,7 +205,8 @@ class Coefficients:
 
     Args:
         before: by name: ``cn_beta`` and ``cn_r``; these times the rig's sizes that are not stated
-            (``cn_beta_area_length``, ``cn_r_area_length2``); or ``omega_n`` and ``zeta`` in normalised form.
+            (``cn_beta_area_length``, ``cn_r_area_length2``); ``omega_n`` and ``zeta`` in normalised form; or
+            ``yaw_inertia``, ``mechanical_damping`` and ``moment_offset`` of a body that nothing holds.
         after: likewise.
         note: how to read them, where a cause changes their meaning (a lag changes what Cnr means).
     """

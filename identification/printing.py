@@ -39,6 +39,7 @@ COEFFICIENTS: Mapping[str, str] = {
     "yaw_inertia": "inertia",
     "mechanical_damping": "damping",
     "added_stiffness": "added stiffness",
+    "moment_offset": "constant moment",
 }
 """Symbols of the coefficients of a diagnosis, also of those multiplied by sizes that are not stated."""
 

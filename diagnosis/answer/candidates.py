@@ -166,7 +166,7 @@ def _block(study: Study) -> int:
 
 def _parameters(study: Study, answer: Weighed) -> dict[str, ParameterEstimate]:
     random = study.random_answer(answer.effects)
-    hypothesis = study.hypothesis(answer.effects) if random is None else random.beside
+    hypothesis = study.stated(answer.effects) if random is None else random.beside
     found: dict[str, ParameterEstimate] = {}
     if hypothesis is not None:
         problem = hypothesis.fit.problem
@@ -246,8 +246,11 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
 
     Returns:
         The size of every fitted cause, in the measured campaign's units. A cause that was read off the records or
-        is random has none, and neither has one that stops the motion at once.
+        is random has none, and neither has one that stops the motion at once, or that acts on a body that nothing
+        holds: it does not swing by itself.
     """
+    if study.nominal.problem.data.unrestrained:
+        return ()
     fit = study.chosen
     found = (_size(study, fit, kind) for kind in fit.problem.effects)
     return tuple(size for size in found if size is not None)

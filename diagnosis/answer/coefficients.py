@@ -125,7 +125,8 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
         kinds: the effects that may act unnamed. They are considered beside the chosen answer and every answer of
             `RIVAL_PROBABILITY`, and only where there is a gap.
     """
-    chosen = study.chosen
+    with_moment = study.stated(study.fitted) if study.by_moment else None
+    chosen = study.chosen if with_moment is None else with_moment.fit
     even = EVEN_SHARE / max(len(study.weighed), 1)
     textbook = {id(h.fit): h.textbook for h in study.hypotheses}
     others, own, unknown = [], 1.0, 0.0

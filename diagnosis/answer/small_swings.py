@@ -41,6 +41,7 @@ JOINT_UNITS = {
     "yaw_inertia": "kg m2",
     "mechanical_damping": "N m s/rad",
     "added_stiffness": "N m/rad",
+    "moment_offset": "N m",
 }
 
 #: Parameters that add to the spring's stiffness at small amplitudes, as gravity does.
@@ -59,12 +60,14 @@ def coefficient_names(problem: Problem) -> tuple[str, ...]:
 
     Returns:
         ``omega_n`` and ``zeta`` in normalised form, else ``cn_beta`` and ``cn_r``; before these the free inertia,
-        damping and stiffness of a joint in a model of one's own.
+        damping and stiffness of a joint in a model of one's own. Inertia, damping and constant moment of a body
+        that nothing holds.
     """
     if problem.data.normalised:
         return "omega_n", "zeta"
-    own = () if problem.data.law is None else JOINT_UNITS
-    return *(name for name in own if name in problem.names), "cn_beta", "cn_r"
+    own = JOINT_UNITS if problem.data.law is not None or problem.data.unrestrained else ()
+    air = () if problem.data.unrestrained else ("cn_beta", "cn_r")
+    return *(name for name in own if name in problem.names), *air
 
 
 def stiffness_names(names: Sequence[str]) -> tuple[str, ...]:

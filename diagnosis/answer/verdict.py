@@ -185,13 +185,16 @@ BLIND_SPOTS = (
 )
 
 
+_OF_INPUT = "a common scale on the inertia and the moment of the input"
+
+
 def blind_spots(
     *, springs: int, speeds: int, wind_off: bool, wind_on: bool, normalised: bool, driven: bool = False
 ) -> tuple[str, ...]:
     """What these runs cannot show.
 
     Args:
-        springs: number of distinct stiffnesses.
+        springs: number of distinct stiffnesses; 0 where nothing holds the body.
         speeds: number of distinct wind speeds above zero.
         wind_off: whether there are runs with the wind off.
         wind_on: whether there are runs with the wind on.
@@ -204,6 +207,10 @@ def blind_spots(
     found = []
     if normalised:
         found.append("an error of a single spring: the runs state no stiffness")
+    elif springs == 0:
+        found.append(
+            "the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring"
+        )
     elif springs < 2:
         found.append(
             "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
@@ -218,5 +225,5 @@ def blind_spots(
         found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
     if driven:
         found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
-        return (*found, *BLIND_SPOTS[1:])
+        return *found, BLIND_SPOTS[1], BLIND_SPOTS[2] if springs or normalised else _OF_INPUT, BLIND_SPOTS[3]
     return (*found, *BLIND_SPOTS)

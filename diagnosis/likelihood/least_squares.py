@@ -421,15 +421,14 @@ def difference_steps(problem: Problem, common: Array) -> Array:
         "cn_beta": _AIR_STIFFNESS / stiffness_load,
         "cn_r": _AIR_DAMPING / damping_load,
         "zero": 1.0,
+        "moment_offset": REFERENCE_STIFFNESS * data.swing,
         "drive_gain": _gain_scale(data),
     }
     for kind in problem.effects:
         for info in kind.parameters():
             scales[f"{kind.name}.{info.name}"] = info.scale
-    sizes = np.array(
-        [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
-    )
-    steps = 1e-5 * sizes
+    sizes = [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
+    steps = 1e-5 * np.array(sizes)
     _, upper = problem.bounds
     steps[common + steps > upper] *= -1.0
     return steps

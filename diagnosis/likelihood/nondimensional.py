@@ -28,6 +28,9 @@ REFERENCE_FREQUENCY = 2.0
 REFERENCE_STIFFNESS = 16.0
 """Median stiffness of its springs, N m/rad."""
 
+REFERENCE_INERTIA = REFERENCE_STIFFNESS / (2.0 * np.pi * REFERENCE_FREQUENCY) ** 2
+"""Inertia of the similar rig, kg m², where it has no springs."""
+
 
 @functools.cache
 def _powers(unit: str) -> tuple[float, float]:
@@ -103,13 +106,17 @@ def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
     Returns:
         The similar campaign, and how it was made. Its wind-off runs have a median frequency of
         `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`; where no stiffness is
-        stated the inertia is 1 before and after.
+        stated the inertia is 1 before and after. Where nothing holds the body, its inertia is the one that swings
+        at that frequency on a spring of that stiffness.
     """
     still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
     time = float(np.median([free_frequency(run) for run in still])) / REFERENCE_FREQUENCY
     springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
     normalised = len(springs) < len(campaign.runs)
-    moment = time**-2 if normalised else REFERENCE_STIFFNESS / float(np.median(springs))
+    if campaign.unrestrained:
+        moment = REFERENCE_INERTIA / (_inertia(campaign) * time**2)
+    else:
+        moment = time**-2 if normalised else REFERENCE_STIFFNESS / float(np.median(springs))
     rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
     unit = ("rad", "rad/s", "rad/s2")[campaign.sensor.derivative]
     change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
@@ -145,16 +152,51 @@ def free_frequency(run: Run) -> float:
 
     Returns:
         That of its decay, Hz; of a driven run, whose motion may follow its input, that of the resonance between
-        them, or of the peak of the motion where they show none.
+        them, or of the peak of the motion where they show none. A body that nothing holds does not swing: the mean
+        frequency of the power of its rate, or the one from which on inertia exceeds damping if that is higher.
     """
-    found = (
-        None if run.drive is None else driven_start(run.record.time_s, run.record.yaw_rad, run.drive.values)
-    )
+    found = response_to_input(run)
+    if run.unrestrained:
+        moved, corner = _rate_frequency(run.record), 0.0 if found is None else found[0] / np.pi
+        return float(np.clip(corner, moved, _MOST_CORNER * moved))
     return (
         frequency(run.record)
         if found is None or found[1] <= 0.0
         else float(np.sqrt(found[1])) / (2.0 * np.pi)
     )
+
+
+def response_to_input(run: Run) -> tuple[float, float, float] | None:
+    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit) of a driven run by itself.
+
+    Returns:
+        As `driven_start`; None of a free decay too.
+    """
+    if run.drive is None:
+        return None
+    record = run.record
+    return driven_start(record.time_s, record.yaw_rad, run.drive.values, sprung=not run.unrestrained)
+
+
+_MOST_CORNER = 8.0  # times the motion: of a body that is mostly damping the inertia hardly shows
+_MOTION = 0.999  # share of the swing's power that the lines of the motion hold: beyond them is noise
+
+
+def _rate_frequency(record: Record) -> float:
+    """Mean frequency of the power of a rate, Hz, over the lines that hold most of the angle's power."""
+    power = np.abs(np.fft.rfft((record.yaw_rad - np.mean(record.yaw_rad)) * np.hanning(record.yaw_rad.size)))
+    power = power[1:] ** 2
+    lines = int(np.searchsorted(np.cumsum(power), _MOTION * power.sum())) + 1
+    at = np.arange(1, lines + 1) / (record.yaw_rad.size * record.sample_interval)
+    return float(np.sum(at**3 * power[:lines]) / np.sum(at**2 * power[:lines]))
+
+
+def _inertia(campaign: Campaign) -> float:
+    """Inertia of a body that nothing holds, kg m²: as stated, or by the response to the known moments."""
+    if campaign.rig.yaw_inertia:
+        return campaign.rig.yaw_inertia
+    found = [(run.input_gain or 1.0, response_to_input(run)) for run in campaign.runs]
+    return float(np.median([moment / response[2] for moment, response in found if response is not None]))
 
 
 def _rig(rig: RigProperties, change: Similarity) -> RigProperties:

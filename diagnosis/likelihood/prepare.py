@@ -65,7 +65,7 @@ def prepare(
         width=rig.width or 0.0,
         normalised=normalised,
         yaw_inertia=rig.yaw_inertia,
-        own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held,
+        own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held and not campaign.unrestrained,
         similarity=similarity,
         law=campaign.law,
     )

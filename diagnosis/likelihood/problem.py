@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate
 from tunnel_sim.physics.rod_modes import slow_motion
@@ -76,7 +76,7 @@ class Problem:
         spring = () if self.data.law is None else ("added_stiffness",)
         air = ("cn_beta", "cn_r") if self.data.wind_on else ()
         gain = ("drive_gain",) if self.data.gain_free else ()
-        zero = () if self.data.own_zeros else ("zero",)
+        zero = () if self.data.own_zeros else ("moment_offset",) if self.data.unrestrained else ("zero",)
         names = (first, "mechanical_damping", *spring, *air, *gain, *zero)
         return tuple(name for name in names if name not in self._held)
 
@@ -101,6 +101,8 @@ class Problem:
         """
         if self.data.own_zeros:
             return float(own[2])
+        if self.data.unrestrained:  # it cannot be told from the initial angle
+            return 0.0
         return self._held["zero"] if "zero" in self._held else float(common[self.nominal_names.index("zero")])
 
     @cached_property
@@ -117,7 +119,9 @@ class Problem:
 
     def _is_free(self, kind: type[Effect], info: ParameterInfo) -> bool:
         freed = not info.form or kind.name in self.free_forms
-        return freed and not (info.beside_spring and self.data.normalised)
+        # in small swings the rest angle of a body that nothing else holds is one with a constant moment
+        loose = self.data.normalised or (self.data.unrestrained and self.data.swing < SWING)
+        return freed and not (info.beside_spring and loose)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -194,7 +198,7 @@ class Problem:
             duration=run.duration,
             parameters={} if law is None else {"friction_moment": law.friction},
             program=self.data.program,
-            drive=run.moment(value.get("drive_gain", 1.0)),
+            drive=run.moment(value.get("drive_gain", 1.0), value.get("moment_offset", 0.0)),
         )
 
     def chain(

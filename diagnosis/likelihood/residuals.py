@@ -10,6 +10,7 @@ the damping, nor the other way round.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -91,6 +92,47 @@ class Line:
     amplitude: float
     phases: Array
     runs: int
+
+
+def by_moment(fit: Fit) -> Data:
+    """The runs of a fit, whose noise holds a random moment beside the white noise.
+
+    Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) of it, with the backward
+    shift B and φ = exp(−C h/Izz). White noise beside it makes (1 − B)(1 − φ B) of the reading a moving average of
+    order two, whose inverse whitens it (Box and Jenkins, Time Series Analysis). The power of the moment is the
+    likeliest one for the fit's residuals.
+    """
+    from scipy.signal import lfilter  # only here: slow to load
+
+    inertia, damping, _ = linear_coefficients(fit, 0)
+    runs = []
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        shape = np.polymul([1.0, -1.0], [1.0, -np.exp(-damping * run.interval / inertia)])
+        left = np.convolve(residual, shape, "valid")
+        likeliest, least = run, np.inf
+        for power in _POWERS:
+            average = _moving_average(shape, power)
+            variance = (
+                shape[2] / average[2]
+            )  # of the innovations: the last coefficients of both products are equal
+            cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
+            if cost < least:
+                noise = run.noise_variance * variance
+                likeliest = dataclasses.replace(run, innovations=(shape, average), noise_variance=noise)
+                least = cost
+        runs.append(likeliest)
+    return fit.problem.data.with_runs(tuple(runs))
+
+
+_POWERS = np.geomspace(
+    1e-12, 1e12, 49
+)  # of a random moment's response per interval, in variances of white noise
+
+
+def _moving_average(shape: Array, power: float) -> Array:
+    """The invertible factor of a spectrum: of the shape's, and a constant beside it."""
+    roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
+    return np.asarray(np.real(np.poly(roots[np.argsort(np.abs(roots))][:2])), np.float64)
 
 
 def mains_interval(similarity: Similarity) -> float:
@@ -219,8 +261,10 @@ def resonance(fit: Fit, run_index: int) -> float:
         fit: parameter values.
 
     Returns:
-        Hz.
+        Hz; of a body that nothing holds, that of `free_frequency` in the similar campaign.
     """
+    if fit.problem.data.unrestrained:
+        return REFERENCE_FREQUENCY
     inertia, _, stiffness = linear_coefficients(fit, run_index)
     return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
 

@@ -161,11 +161,12 @@ class RunData:
         free = self.spring_stiffness, self.wind_speed, self.air_density, self.interval, self.derivative
         return free if self.drive is None else (*free, id(self.drive), self.start)
 
-    def moment(self, gain: float) -> DriveMoment | None:
+    def moment(self, gain: float, offset: float = 0.0) -> DriveMoment | None:
         """The moment of the input from the first block on; None of a free decay.
 
         Args:
             gain: of an input whose gain is not known, N m per unit of the input; of others it does not matter.
+            offset: a constant moment beside the input, N m; 0 where that of the input is 0 throughout.
         """
         if self.drive is None:
             return None
@@ -175,7 +176,7 @@ class RunData:
         return dataclasses.replace(
             self.drive,
             time_s=self.drive.time_s[seen],
-            values=self.drive.values[seen],
+            values=self.drive.values[seen] + (offset / scale if scale and offset else 0.0),
             scale=scale,
             delay=self.drive.delay - self.start,
         )
@@ -391,6 +392,11 @@ class Data:
     law: JointLaw | None = None
     keeps_gain: bool = False
 
+    @cached_property
+    def unrestrained(self) -> bool:
+        """Whether nothing holds the body: a constant moment takes the place of the sensor's zero."""
+        return all(run.spring_stiffness == 0.0 and not run.wind_on for run in self.runs)
+
     @property
     def driven(self) -> bool:
         """Whether any of the runs has an input."""
@@ -422,8 +428,8 @@ class Data:
 
     @property
     def springs(self) -> tuple[float, ...]:
-        """Stated stiffnesses, ascending, N m/rad."""
-        return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness is not None}))
+        """Stated stiffnesses, ascending, N m/rad; none where nothing holds the body."""
+        return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness}))
 
     @property
     def wind_on(self) -> bool:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, normal_equations
+from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
 from diagnosis.likelihood.per_run_parameters import PerRunParameters, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, Line, mains_line, misfit, shedding_line
@@ -25,6 +26,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
 _PHASES = 64  # of a cycle, for its mean
 _NEARER = 0.02  # of the size that linear theory gives an effect
+_SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
@@ -62,6 +64,8 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
         the releases from the first samples.
     """
     driven = [None if run.drive is None else _driven_start(run) for run in data.runs]
+    if data.unrestrained:
+        return _unrestrained_start(data, driven)
     omega2 = np.array(
         [
             (2.0 * np.pi * _frequency(run)) ** 2 if response is None else response[1]
@@ -101,9 +105,29 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
 
 
 def _driven_start(run: RunData) -> tuple[float, float, float] | None:
-    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit); None where the run shows no resonance."""
-    found = driven_start(run.times, run.reading, run.input_means)
-    return None if found is None or found[1] <= 0.0 else found
+    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit); None where the run shows no resonance.
+
+    Of a body without a spring the gain must be positive, in N m of the input.
+    """
+    sprung = run.spring_stiffness != 0.0
+    found = driven_start(run.times, run.reading, run.input_means, sprung=sprung)
+    if found is None or run.drive is None or (found[1] if sprung else found[2] * run.drive.scale) <= 0.0:
+        return None
+    return found
+
+
+def _unrestrained_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> Point:
+    """Inertia and damping of a body that nothing holds by its response to known moments, and no other moment."""
+    found = [
+        (run.drive.scale / response[2], 2.0 * response[0])
+        for run, response in zip(data.runs, driven, strict=True)
+        if response is not None and run.drive is not None
+    ]
+    inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
+    release = [
+        [np.mean(run.reading[:3]), (run.reading[1] - run.reading[0]) / run.interval] for run in data.runs
+    ]
+    return Point(np.array([inertia, inertia * max(loss, _SLOW), 0.0]), np.array(release))
 
 
 def _gain_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> float:

@@ -247,9 +247,10 @@ def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatte
         scatter: standard deviation of the floor, a share of it.
 
     Returns:
-        The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own.
+        The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own
+        or nothing holds the body.
     """
-    if fit.problem.data.own_zeros:
+    if fit.problem.data.own_zeros or fit.problem.data.unrestrained:
         return 1.0
     lowest = np.array([1.0 / max(run.duration for run in fit.problem.data.runs)])
     relative = float(np.hypot(spread(lowest), scatter))

@@ -185,7 +185,7 @@ def _stated_or_estimated(campaign: Campaign, measured: Mapping[str, tuple[float,
     variances = np.array([value for value, _ in estimates.values()])
     relative = np.array([std for _, std in estimates.values()])
     pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
-    floors = {run.id: accuracy(run.record) ** 2 for run in campaign.runs}
+    floors = {run.id: accuracy(run.record, swings=not run.unrestrained) ** 2 for run in campaign.runs}
     if any(floors[run] > value for run, (value, _) in estimates.items()):
         return _floor(campaign, {run: value for run, (value, _) in estimates.items()}, floors)
     uniform = bool(np.all(np.abs(variances / pooled - 1.0) < NOISE_OF_ITS_OWN * relative))
@@ -228,8 +228,11 @@ def _floor(campaign: Campaign, estimates: dict[str, float], floors: dict[str, fl
     return Noise(used, _stated_variance(campaign.sensor, pooled), "floor", reason, pooled)
 
 
-def accuracy(record: Record) -> float:
+def accuracy(record: Record, *, swings: bool = True) -> float:
     """How small a sample's noise may be before the errors of the fits show.
+
+    Args:
+        swings: whether anything holds the body, so that its motion has a phase to lose.
 
     Returns:
         Standard deviation of a sample, rad: a share of the swing, plus three times the error of the reading from
@@ -242,7 +245,7 @@ def accuracy(record: Record) -> float:
     block = max(1, round(BLOCK_INTERVAL * record.sample_rate))
     lag = omega * (record.time_s - record.time_s[0]) * (omega * BLOCK_INTERVAL) ** 4 / 120.0
     lost = float(np.sqrt(np.mean((lag * swing) ** 2)))
-    return float(np.sqrt(block) * (_ACCURACY * np.max(np.abs(swing)) + 3.0 * lost))
+    return float(np.sqrt(block) * (_ACCURACY * np.max(np.abs(swing)) + (3.0 * lost if swings else 0.0)))
 
 
 def reading_step(campaign: Campaign) -> float:

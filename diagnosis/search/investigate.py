@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residu
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, mains_interval, misfit
+from diagnosis.likelihood.residuals import CHANNELS, by_moment, mains_interval, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import decays_start, misses_motion, nominal_start
 from diagnosis.noise.gap import GapTest, gap_or_colour
@@ -29,8 +29,15 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
-from diagnosis.policy import COARSER_STEP, HUM_LEFT, NOISE_EXPLAINS_UP_TO, NOISE_LEAVES, RIVAL_PROBABILITY
-from diagnosis.search.grow import InStretches, exchange, grow, grow_in_stretches, prune, second_mode_alone
+from diagnosis.policy import (
+    COARSER_STEP,
+    HUM_LEFT,
+    MOMENT_LEFT,
+    NOISE_EXPLAINS_UP_TO,
+    NOISE_LEAVES,
+    RIVAL_PROBABILITY,
+)
+from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.search.random_moments import RandomAnswer, weigh_random_moments, without_the_random_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
@@ -61,6 +68,8 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
+        by_moment: the sets fitted with a random moment beside them, where sets are weighed by the moment that they
+            leave and not by the angle.
         rested: runs that end with a long rest, which the fits of effects leave out.
         place: where the gap is, from the residuals alone; None where it is not located yet.
         hypotheses: fitted sets of effects.
@@ -80,6 +89,7 @@ class Study:
     nominal: Fit
     test: GapTest
     cut: bool = False
+    by_moment: tuple[Hypothesis, ...] = ()
     rested: tuple[str, ...] = ()
     place: Place | None = None
     hypotheses: tuple[Hypothesis, ...] = ()
@@ -119,6 +129,11 @@ class Study:
             return self.nominal if random.beside is None else random.beside.fit
         hypothesis = self.hypothesis(names) if names else None
         return self.nominal if hypothesis is None else hypothesis.fit
+
+    def stated(self, names: Sequence[str]) -> Hypothesis | None:
+        """As `hypothesis`, with a random moment beside the effects where they were weighed so."""
+        key = tuple(sorted(names))
+        return next((h for h in self.by_moment if h.names == key), self.hypothesis(key))
 
     def hypothesis(self, names: Sequence[str]) -> Hypothesis | None:
         """The fitted hypothesis of these effects; None where they were not fitted together."""
@@ -277,6 +292,12 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
+    named = (found.hypothesis(w.effects) for w in weighed)
+    best = next((h for h in named if h is not None), None) if found.campaign.unrestrained else None
+    if best is not None and best.fit.chance < 1.0:
+        again = _weigh_by_moment(found, best, fitted, clock, explained=weighed[0].effects != UNKNOWN)
+        if again is not None:
+            return again
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
@@ -294,17 +315,56 @@ def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clo
     found = replace(found, hypotheses=grown.hypotheses)
     found = _pruned(found, grown.nominal, clock)
     with clock.step("polishing"):
-        return _with_whole_runs(found, grown)
+        data = found.nominal.problem.data
+        return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
 
 
-def _with_whole_runs(found: Study, grown: InStretches) -> Study:
-    """The study with the answer and its parts fitted to the whole runs; a set that cannot be is no answer."""
+def _weigh_by_moment(
+    found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock, *, explained: bool
+) -> Study | None:
+    """The study of a body that nothing holds, whose sets are weighed by the moment that they leave.
+
+    Every small error of the moment moves the body for good, so that its angle departs further and further.
+
+    Args:
+        best: the set that leaves the random moment, which from then on is noise.
+
+        explained: whether it also explains the angle.
+
+    Returns:
+        None where it does not, and that moment is not small beside the one that the nominal model misses.
+    """
     data = found.nominal.problem.data
+    try:
+        base = fit(Problem(by_moment(best.fit)), found.nominal.point)
+    except (FitError, np.linalg.LinAlgError):
+        return None
+    if not explained and MOMENT_LEFT * (1.0 + base.excess) < 1.0:
+        return None
+
+    def whole(hypothesis: Hypothesis) -> Hypothesis | None:
+        with suppress(FitError, np.linalg.LinAlgError):
+            of_set = hypothesis.fit
+            return replace(hypothesis, fit=fit(replace(of_set.problem, data=data), of_set.point))
+        return None
+
+    with clock.step("effects"):
+        found = replace(found, hypotheses=tuple(grow(base, kinds, clock.progress)))
+    found = _pruned(found, base, clock)
+    found = replace(found, by_moment=found.hypotheses)
+    with clock.step("polishing"):
+        return _with_whole_runs(found, base, whole)
+
+
+def _with_whole_runs(
+    found: Study, nominal: Fit, whole_runs: Callable[[Hypothesis], Hypothesis | None]
+) -> Study:
+    """The study with the answer and its parts fitted to the whole runs; a set that cannot be is no answer."""
     while True:
-        weighed = _weighed(found, grown.nominal)
+        weighed = _weighed(found, nominal)
         answer = set(weighed[0].effects)
         polished = _polished(found.hypotheses, weighed[0], ())
-        whole = [grown.whole(h, data) if answer.issuperset(h.names) else h for h in polished]
+        whole = [whole_runs(h) if answer.issuperset(h.names) else h for h in polished]
         kept = replace(found, hypotheses=tuple(h for h in whole if h is not None), weighed=tuple(weighed))
         if weighed[0].effects == UNKNOWN or kept.hypothesis(weighed[0].effects) is not None:
             return kept

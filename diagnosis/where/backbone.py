@@ -33,7 +33,7 @@ class Backbone:
         frequency_std: of each, shape (n,), Hz, widened where a window's residual is not white.
         zeta: damping ratio, shape (n,).
         zeta_std: likewise, shape (n,).
-        nominal_frequency: of the nominal model, Hz.
+        nominal_frequency: of the nominal model, Hz; of a body that nothing holds, as `resonance` gives it.
         nominal_zeta: of the nominal model, dimensionless.
         alone_frequency: frequency of a linear fit to this run alone, Hz; None where that fails.
         alone_zeta: damping ratio of the same fit.
@@ -71,6 +71,8 @@ def backbones(fit: Fit, starts: Sequence[float] = ()) -> list[Backbone]:
 
 def _backbone(fit: Fit, index: int, run: RunData, start: float) -> Backbone:
     inertia, damping, stiffness = linear_coefficients(fit, index)
+    if fit.problem.data.unrestrained:
+        stiffness = inertia * (2.0 * np.pi * resonance(fit, index)) ** 2
     if run.drive is not None:
         return _of_driven(run, Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia))
     decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)

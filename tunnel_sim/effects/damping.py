@@ -118,6 +118,7 @@ class StructuralDamping(Effect):
     place = 3
     channel = "damping"
     condition = "always"
+    on_spring = True
     advice = "Model the hysteretic loss: the same share of the energy per cycle at every frequency"
     equation = "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz)"
     signature = (

@@ -26,6 +26,7 @@ class CubicStiffness(Effect):
     place = 4
     channel = "stiffness"
     condition = "always"
+    on_spring = True
     advice = "Model the spring's cubic stiffness, or release from smaller angles"
     equation = "−κ Kr β³; general form: |β|^p sgn β for β³"
     signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."
@@ -63,6 +64,7 @@ class AsymmetricStiffness(Effect):
     place = 5
     channel = "stiffness"
     condition = "always"
+    on_spring = True
     advice = "Seat the spring so that it is as stiff to both sides"
     equation = "−κ Kr β²; general form: |β|^p for β²"
     signature = (
@@ -102,6 +104,7 @@ class FreePlay(Effect):
     place = 6
     channel = "stiffness"
     condition = "always"
+    on_spring = True
     advice = "Take up the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
@@ -247,6 +250,7 @@ class SpringMiscalibration(Effect):
     place = 22
     channel = "calibration"
     condition = "always"
+    on_spring = True
     advice = "Measure the stiffness of that spring again"
     equation = "(1 + x) Kr instead of the stated Kr, in the runs of one spring"
     signature = (

@@ -171,6 +171,11 @@ class Campaign:
         """Whether any run has an input."""
         return any(run.drive is not None for run in self.runs)
 
+    @property
+    def unrestrained(self) -> bool:
+        """Whether nothing holds the body in any run (`Run.unrestrained`)."""
+        return all(run.unrestrained for run in self.runs)
+
     def __repr__(self) -> str:
         """The runs, their conditions, and where to go from here, in three lines."""
         count = f"{len(self.runs)} run{'' if len(self.runs) == 1 else 's'}"
