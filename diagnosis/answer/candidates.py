@@ -246,10 +246,11 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
 
     Returns:
         The size of every fitted cause, in the measured campaign's units. A cause that was read off the records or
-        is random has none, and neither has one that stops the motion at once.
+        is random has none, and neither has one that stops the motion at once or acts on driven runs only: the runs
+        simulated are free decays.
     """
     fit = study.chosen
-    found = (_size(study, fit, kind) for kind in fit.problem.effects)
+    found = (_size(study, fit, kind) for kind in fit.problem.effects if not kind.driven)
     return tuple(size for size in found if size is not None)
 
 

@@ -64,6 +64,7 @@ class Effect:
       shows it as a whole run does.
     - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
       records (``line``, ``lattice``) or found from their spectrum (``random``).
+    - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
@@ -88,6 +89,7 @@ class Effect:
     skips: ClassVar[bool] = False
     autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
+    driven: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False

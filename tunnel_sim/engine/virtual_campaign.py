@@ -148,8 +148,8 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         before those of the sensor itself.
 
     Raises:
-        TunnelError: when a name is unknown or given twice, a severity is missing, a value is out of range, or a
-            spring is not in the plan.
+        TunnelError: when a name is unknown or given twice, a severity is missing, a value is out of range, a
+            spring is not in the plan, or an effect acts on driven runs only.
     """
     effects = [_stated_effect(setting) for setting in plan.effects]
     names = [effect.name for effect in effects]
@@ -161,6 +161,7 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
                 remedy="give it once, with all its parameters",
             )
         _check_spring(effect, plan)
+        _check_input(effect)
     return tuple(
         sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, known_effects().index(type(effect))))
     )
@@ -191,6 +192,16 @@ def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
             f"no run has a spring_stiffness of {chosen:g} N m/rad",
             where=f"effect {effect.name}",
             remedy=f"give one of {', '.join(f'{spring:g}' for spring in springs)}",
+        )
+
+
+def _check_input(effect: Effect) -> None:
+    """Refuse an effect on the input: no run of a plan has one, so it would do nothing."""
+    if effect.driven and not effect.is_null:
+        raise TunnelError(
+            "acts on driven runs only, and all runs of a plan are free decays",
+            where=f"effect {effect.name}",
+            remedy="leave it out; tunnel diagnose fits it to driven runs",
         )
 
 
