@@ -35,7 +35,7 @@ class InputDelay(Effect):
         "In driven runs the phase between input and angle falls by ωτ, over the whole band and in proportion to "
         "the frequency; a free decay does not change."
     )
-    references = ("Ljung, System Identification, Prentice Hall 1999",)
+    references = ("Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999",)
     example = (0.02,)
     autonomous = False
     driven = True

@@ -240,8 +240,8 @@ def check(kind: type[Effect]) -> list[Verdict]:
         for free decays where the effect acts on them. An exception of the effect's own code is a fault.
     """
     unstated = kind.moment_oracle is Effect.moment_oracle
-    left_out = {oracle: unstated, free: not kind.driven}
-    return [_verdict(kind, holds) for holds in LAWS.values() if not left_out.get(holds)]
+    left_out = [law for law, absent in ((oracle, unstated), (free, not kind.driven)) if absent]
+    return [_verdict(kind, holds) for holds in LAWS.values() if holds not in left_out]
 
 
 def _verdict(kind: type[Effect], holds: Callable[[type[Effect]], str]) -> Verdict:
