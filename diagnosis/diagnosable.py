@@ -367,11 +367,11 @@ def kinds_for(
         kinds: the effects to answer with.
 
     Returns:
-        All of them, and no sentence, where no run is driven; else those that can be fitted to driven runs, and
-        sentences that name the others.
+        Those that act on free decays, and no sentence, where no run is driven; else those that can be fitted to
+        driven runs, and sentences that name the others.
     """
     if not campaign.driven:
-        return tuple(kinds), ()
+        return tuple(kind for kind in kinds if not kind.driven), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
     gone = {_NOT_TRIED: [kind for kind in kinds if kind not in kept]}
     if campaign.unrestrained:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import ClassVar
 
@@ -16,6 +16,10 @@ from diagnosis.likelihood.starting_points import unabsorbed
 from diagnosis.search.investigate import fit_nominal
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.registry import answering_with
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.run_settings import DriveMoment
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, SensorModel, Truth
 
 ABSORBED = 0.01
@@ -32,12 +36,14 @@ class Identifiability:
     Args:
         share: of the effect's change of the readings that the nominal model cannot absorb, a ratio of norms.
         cosines: absolute cosine between that and the same of another effect, by name, greatest first.
+        driven: whether the runs were driven, as an effect of the input needs.
     """
 
     LAW: ClassVar[str] = "The nominal model does not hide it, and no other effect moves the rig as it does"
 
     share: float
     cosines: Mapping[str, float]
+    driven: bool = False
 
     @property
     def fault(self) -> str:
@@ -51,7 +57,8 @@ class Identifiability:
         """The figures in words."""
         nearest = [f"{name} {cosine:.3f}" for name, cosine in list(self.cosines.items())[:5]]
         return [
-            "On 12 simulated runs (3 springs, wind off and on, 2 releases) the nominal model cannot absorb "
+            f"On 12 simulated {'driven ' if self.driven else ''}runs (3 springs, wind off and on, 2 releases) the "
+            "nominal model cannot absorb "
             f"{100.0 * self.share:.1f} % of its change of the readings.",
             f"Cosine of that with the nearest effects: {', '.join(nearest)}.",
         ]
@@ -67,10 +74,10 @@ def identifiability(kind: type[Effect]) -> Identifiability:
         The comparison by linear theory at typical sizes. Effects that are not fitted as a motion (random moments,
         periodic effects, missing samples, coarse steps) are left out.
     """
-    base = _nominal()
+    base = _nominal(driven=kind.driven)
     own = unabsorbed(base, kind)
     if own is None:
-        return Identifiability(0.0, {})
+        return Identifiability(0.0, {}, kind.driven)
     found = {}
     with answering_with([kind]):
         others = [other for other in known_effects() if other.name != kind.name]
@@ -79,7 +86,7 @@ def identifiability(kind: type[Effect]) -> Identifiability:
             left = unabsorbed(base, other)
             if left is not None:
                 found[other.name] = _cosine(own[0], left[0])
-    return Identifiability(own[1], dict(sorted(found.items(), key=lambda pair: -pair[1])))
+    return Identifiability(own[1], dict(sorted(found.items(), key=lambda pair: -pair[1])), kind.driven)
 
 
 def _cosine(one: np.ndarray, other: np.ndarray) -> float:
@@ -88,7 +95,7 @@ def _cosine(one: np.ndarray, other: np.ndarray) -> float:
 
 
 @cache
-def _nominal() -> Fit:
+def _nominal(*, driven: bool) -> Fit:
     """The nominal fit of a campaign without any effect."""
     from tunnel_sim.engine.virtual_campaign import simulate_campaign  # only here: loads MuJoCo
 
@@ -99,6 +106,23 @@ def _nominal() -> Fit:
         for degrees in (8.0, 20.0)
     )
     truth, sensor = Truth(0.47, -0.12, 0.1014, 0.018), SensorModel(sample_rate=200.0)
-    campaign = simulate_campaign(CampaignPlan("laws", 1, truth, conditions, sensor))
+    plan = CampaignPlan("laws", 1, truth, conditions, sensor)
+    campaign = _driven(plan) if driven else simulate_campaign(plan)
     variance = {run.id: sensor.noise_std**2 for run in campaign.runs}
     return fit_nominal(prepare(campaign, variance))
+
+
+def _driven(plan: CampaignPlan) -> Campaign:
+    """The runs of a plan with a moment beside the release: a chirp from 1 to 5 Hz, over all their resonances."""
+    from tunnel_sim.engine.effect_laws import record
+    from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
+
+    runs = []
+    for number, condition in enumerate(plan.conditions):
+        time = np.arange(round(condition.duration * plan.sensor.sample_rate)) / plan.sensor.sample_rate
+        values = 0.5 * np.sin(2.0 * np.pi * (1.0 + 2.0 * time / condition.duration) * time)
+        settings = replace(run_settings(plan.truth, condition), drive=DriveMoment(time, values))
+        seen = record((), settings, np.random.default_rng([plan.seed, number]), plan.sensor)
+        runs.append(replace(stated_run(condition, seen), drive=Drive("moment_nm", values)))
+    stated = RigProperties.of(load_rig()), SensorProperties.of(plan.sensor)
+    return Campaign(plan.name, *stated, tuple(runs))

@@ -246,13 +246,13 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
 
     Returns:
         The size of every fitted cause, in the measured campaign's units. A cause that was read off the records or
-        is random has none, and neither has one that stops the motion at once, or that acts on a body that nothing
-        holds: it does not swing by itself.
+        is random has none, and neither has one that stops the motion at once, acts on driven runs only, or acts
+        on a body that nothing holds: the runs simulated are free decays.
     """
     if study.nominal.problem.data.unrestrained:
         return ()
     fit = study.chosen
-    found = (_size(study, fit, kind) for kind in fit.problem.effects)
+    found = (_size(study, fit, kind) for kind in fit.problem.effects if not kind.driven)
     return tuple(size for size in found if size is not None)
 
 

@@ -222,7 +222,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         One per trial; none where the effect cannot be seen in these runs.
     """
     data = base.problem.data
-    if kind.condition == "wind_on" and not data.wind_on:
+    if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
         return []
     if kind.line or kind.skips:
         found_own = _FINDERS[kind.line or "skips"](base)

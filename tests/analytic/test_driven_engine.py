@@ -102,10 +102,22 @@ def test_many_runs_of_different_holds_and_lengths_have_the_bits_of_single_ones()
         assert all(np.array_equal(a, b.angle) for a, b in zip(alone, found, strict=True))
 
 
+@pytest.mark.parametrize("delay", [0.0037, -0.0237])
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+def test_a_delayed_input_is_of_second_order(hold: str, delay: float) -> None:
+    def error(steps: int) -> float:
+        run = driven(SMOOTH, steps=steps, hold=hold)
+        assert run.drive is not None
+        late = replace(run, drive=replace(run.drive, delay=delay))
+        return float(np.max(np.abs(angle(late) - forward_motion(RIG, late, RATE).angle)))
+
+    assert error(10) < 3e-5 * np.max(np.abs(angle(driven(SMOOTH))))
+    assert error(5) / error(40) > 40.0  # sixty-four, less what the place of a kink in its step does
+
+
 @pytest.mark.parametrize(
     "drive",
     [
-        DriveMoment(TIME, SMOOTH, delay=0.003),
         DriveMoment(TIME[1:], SMOOTH[1:]),
         DriveMoment(TIME**1.01, SMOOTH),
         DriveMoment(0.55 * TIME, SMOOTH),

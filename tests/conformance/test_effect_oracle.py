@@ -15,7 +15,7 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from tests.reference import effect_oracle as oracle
-from tests.reference.effect_cases import VALUES, VOCABULARY, settings
+from tests.reference.effect_cases import ON_DRIVEN_RUNS, VALUES, VOCABULARY, settings
 from tests.reference.effect_oracle import NOTHING, SOLVED, Setting, buffeted, fitted_phase, reading
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
@@ -23,12 +23,13 @@ from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
-from tunnel_sim.effects import Effect, EffectChain, effect_from
+from tunnel_sim.effects import Effect, EffectChain, effect_from, the_effect
 from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
+from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.plan import SensorModel
 
 RIG = load_rig()
@@ -134,7 +135,7 @@ def test_effect_matches_its_equation(name: str, values: dict[str, float], run: S
     assert np.max(np.abs(expected - nominal_reading(run))) > max(2e-4, 20.0 * tolerance)
 
 
-REFERRED = [name for name in VOCABULARY if name not in SOLVED]
+REFERRED = [name for name in VOCABULARY if name not in SOLVED | ON_DRIVEN_RUNS]
 # rad, or share of the run: halfway between two samples
 OWN = 1.4995 / RUN.duration
 
@@ -174,7 +175,36 @@ def test_effect_matches_the_reference_simulator(name: str) -> None:
 def test_every_effect_is_compared() -> None:
     compared = {name for name, _, _ in VARIANTS} | {"buffeting", "sensor_quantisation"}
     assert compared == SOLVED
-    assert compared | set(REFERRED) == set(VOCABULARY)
+    assert compared | set(REFERRED) | {the_effect(driven=True).name} == set(VOCABULARY)
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
+@pytest.mark.parametrize("delay", [0.02, 0.0137, 0.0004, -0.0137])
+def test_a_delayed_input_matches_the_equation_between_its_kinks(delay: float, held: bool) -> None:
+    run, time = replace(RUN, duration=1.5), np.arange(150) / 100.0
+    values = np.random.default_rng(5).standard_normal(time.size)  # a kink or jump at every sample
+    driven = replace(settings(run), drive=DriveMoment(time, values, held=held))
+    found = []
+    for late in (delay, 0.0):
+        chain = EffectChain(driven, (the_effect(driven=True)(late),), (None,))
+        found.append(forward_motion(RIG, chain.physics(), run.sample_rate).angle)
+        expected = oracle.driven_reading(time, values, late, run, held=held)
+        assert np.max(np.abs(found[-1] - expected)) < SMOOTH
+    assert np.max(np.abs(found[0] - found[1])) > 2e-4
+
+
+def test_a_motion_is_continuous_in_the_delay_of_its_input() -> None:
+    time = np.arange(150) / 100.0
+    values = np.random.default_rng(6).standard_normal(time.size)
+    driven = replace(settings(replace(RUN, duration=1.5)), drive=DriveMoment(time, values, held=True))
+
+    def moved(delay: float) -> np.ndarray:
+        chain = EffectChain(driven, (the_effect(driven=True)(delay),), (None,))
+        return forward_motion(RIG, chain.physics(), RUN.sample_rate).angle
+
+    # around one sample, where every jump passes from one step of the integrator to the next
+    steps = np.diff([moved(0.01 + shift) for shift in np.arange(-4, 5) * 1e-6], axis=0)
+    assert np.max(np.abs(np.diff(steps, axis=0))) < 1e-3 * np.max(np.abs(steps))
 
 
 def test_a_coarse_reading_is_the_rounded_angle() -> None:

@@ -118,7 +118,7 @@ def test_without_its_random_part_an_effect_is_refused_rather_than_left_out(kind:
     times = np.arange(100) / 100.0
 
     def applied(effect: Effect) -> None:
-        chain = EffectChain(WIND_ON, (effect,), (None,))
+        chain = EffectChain(effect_laws.stated(kind, WIND_ON), (effect,), (None,))
         chain.physics()
         chain.angle(np.zeros(100), chain.true_times(times))
 
@@ -137,7 +137,9 @@ def test_without_its_random_part_an_effect_is_refused_rather_than_left_out(kind:
 def test_another_seed_gives_another_draw_only_where_one_is_drawn(kind: type[Effect]) -> None:
     quiet = SensorModel(noise_std=0.0, resolution=0.0)
     one, other = (
-        simulate(RIG, WIND_ON, quiet, np.random.default_rng(seed), effects=(example(kind),))
+        effect_laws.record(
+            (example(kind),), effect_laws.stated(kind, WIND_ON), np.random.default_rng(seed), quiet
+        )
         for seed in (1, 2)
     )
     draws = example(kind).draw(WIND_ON, np.random.default_rng(1)) is not None

@@ -18,6 +18,10 @@ VOCABULARY = {
     name: (channel, condition) for name, channel, condition in _ROW.findall(_PAGE.read_text(encoding="utf-8"))
 }
 
+# The reference simulator has free decays only. What acts on driven runs only has no form there and is compared with
+# an independent integration instead (tests/conformance/test_effect_oracle.py).
+ON_DRIVEN_RUNS = frozenset(kind.name for kind in ALL_EFFECTS if kind.driven)
+
 # Values of the parameters at which the effect is seen.
 VALUES = {
     kind.name: {info.name: value for info, value in zip(kind.parameters(), kind.example, strict=False)}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import hypot, pi, sin, sqrt
 from typing import Any
 
@@ -39,6 +40,34 @@ class Setting:
     @property
     def times(self) -> np.ndarray:
         return np.arange(round(self.duration * self.sample_rate)) / self.sample_rate
+
+
+def driven_reading(
+    time: np.ndarray, values: np.ndarray, delay: float, run: Setting, *, held: bool
+) -> np.ndarray:
+    """The reading of the linear rig under a moment that acts ``delay`` s later than its stamps, rad.
+
+    Every piece between two kinks of the delayed moment is integrated by itself.
+    """
+    stiffness = pressure(run.speed) * CN_BETA - run.spring
+    damping = air_damping(run.speed) - DAMPING
+    kinks = time + delay
+    ends = np.unique(np.r_[0.0, kinks[(kinks > 0.0) & (kinks < run.times[-1])], run.times[-1]])
+    state, found = np.array([run.release, 0.0]), np.full(run.times.size, np.nan)
+    for start, end in pairwise(ends):
+        middle = 0.5 * (start + end) - delay
+        last = max(int(np.searchsorted(time, middle)) - 1, 0)
+
+        def moment(t: float, last: int = last) -> float:
+            return values[last] if held else float(np.interp(t - delay, time, values))
+
+        def slope(t: float, y: np.ndarray, given: Callable[[float], float] = moment) -> list[float]:
+            return [y[1], (stiffness * y[0] + damping * y[1] + given(t)) / INERTIA]
+
+        piece = solve_ivp(slope, (start, end), state, "DOP853", dense_output=True, rtol=1e-11, atol=1e-13)
+        within = (run.times >= start) & (run.times <= end)
+        found[within], state = piece.sol(run.times[within])[0], piece.y[:, -1]
+    return found
 
 
 def pressure(speed: float) -> float:

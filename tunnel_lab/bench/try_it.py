@@ -94,7 +94,7 @@ class _TryIt:
     def _effects(self) -> None:
         from tunnel_sim.effects import known_effects
 
-        self._kinds = {kind.name: kind for kind in known_effects()}
+        self._kinds = {kind.name: kind for kind in known_effects() if not kind.driven}  # of free decays
         names = {"": "none", **{name: name.replace("_", " ") for name in self._kinds}}
         ui.select(names, label="Effect", value="", on_change=self._choose).props("dense")
         self._severity = ui.element("div").classes("slider")

@@ -126,7 +126,8 @@ def run(
         tables.say(line)
     tables.show_tables(parameter_table(kinds[0]))
     tables.say(ABOUT_DIRECTIONS)
-    tables.say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kinds[0])}")
+    if not kinds[0].driven:  # the runs of a plan are free decays
+        tables.say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kinds[0])}")
 
 
 def _check(name: str) -> None:

@@ -65,6 +65,7 @@ class Effect:
     - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
       records (``line``, ``lattice``) or found from their spectrum (``random``).
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness, so that it vanishes without one.
+    - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
@@ -90,6 +91,7 @@ class Effect:
     autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
     on_spring: ClassVar[bool] = False
+    driven: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -17,7 +18,7 @@ from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import DriveMoment, Motion, RunSettings
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.plan import (
@@ -37,6 +38,9 @@ WIND_ON = RunSettings(
     wind_speed=20.0, air_density=1.204, release_angle=0.35, duration=1.0,
 )  # fmt: skip
 WIND_OFF = replace(WIND_ON, wind_speed=0.0)
+_TIME = np.arange(0.0, WIND_ON.duration, 1.0 / SENSOR.sample_rate)
+DRIVE = DriveMoment(_TIME, np.sin(2.0 * np.pi * (1.0 + 2.0 * _TIME) * _TIME))
+"""Of the runs of an effect that acts on driven runs only: a chirp over the resonance, N m."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +65,33 @@ def _values(kind: type[Effect]) -> dict[str, float]:
     return dict(zip((info.name for info in kind.parameters()), kind.example, strict=False))
 
 
-def _record(effects: tuple[Effect, ...], run: RunSettings = WIND_ON) -> Record:
-    return simulate(load_rig(), run, SENSOR, np.random.default_rng(1), effects=effects)
+def stated(kind: type[Effect], run: RunSettings = WIND_ON) -> RunSettings:
+    """The run with the input that an effect on driven runs needs."""
+    return replace(run, drive=DRIVE) if kind.driven else run
+
+
+def record(
+    effects: tuple[Effect, ...], run: RunSettings, rng: np.random.Generator, sensor: SensorModel = SENSOR
+) -> Record:
+    """Simulate a free decay in MuJoCo, or a driven run by the forward integrator."""
+    if run.drive is None:
+        return simulate(load_rig(), run, sensor, rng, effects=effects)
+    chain = EffectChain.draw(run, effects, rng)
+    return read_motion(_driven(chain.physics(), sensor.sample_rate), sensor, rng, chain)
+
+
+def _driven(run: RunSettings, sample_rate: float = SENSOR.sample_rate) -> Motion:
+    return forward_motion(load_rig(), follow_fastest(load_rig(), run), sample_rate)
+
+
+def _record(effects: tuple[Effect, ...], run: RunSettings) -> Record:
+    return record(effects, run, np.random.default_rng(1))
 
 
 @cache
-def _bare(run_is_windy: bool) -> Record:
-    return _record((), WIND_ON if run_is_windy else WIND_OFF)
+def _bare(*, windy: bool, driven: bool) -> Record:
+    run = WIND_ON if windy else WIND_OFF
+    return _record((), replace(run, drive=DRIVE) if driven else run)
 
 
 def _same(one: Record, other: Record) -> bool:
@@ -77,7 +101,8 @@ def _same(one: Record, other: Record) -> bool:
 def null(kind: type[Effect]) -> str:
     """At zero severity the record is bit-identical to one without the effect."""
     elsewhere = make_effect(kind, {**_values(kind), kind.parameters()[0].name: 0.0})
-    changed = [not _same(_record((effect,)), _bare(True)) for effect in (kind(), elsewhere)]
+    bare = _bare(windy=True, driven=kind.driven)
+    changed = [not _same(_record((effect,), stated(kind)), bare) for effect in (kind(), elsewhere)]
     return "the record changes although the severity is 0" if any(changed) else ""
 
 
@@ -86,15 +111,24 @@ def seen(kind: type[Effect]) -> str:
     effect = example(kind)
     if effect.is_null:
         return "its example has a severity of 0"
-    return "its example changes nothing" if _same(_record((effect,)), _bare(True)) else ""
+    unchanged = _same(_record((effect,), stated(kind)), _bare(windy=True, driven=kind.driven))
+    return "its example changes nothing" if unchanged else ""
 
 
 def condition(kind: type[Effect]) -> str:
     """It acts with the wind off if its condition is always, and only then."""
-    unchanged = _same(_record((example(kind),), WIND_OFF), _bare(False))
+    unchanged = _same(
+        _record((example(kind),), stated(kind, WIND_OFF)), _bare(windy=False, driven=kind.driven)
+    )
     if unchanged == (kind.condition == "wind_on"):
         return ""
     return f"its condition is {kind.condition}, but it {'does nothing' if unchanged else 'acts'} with the wind off"
+
+
+def free(kind: type[Effect]) -> str:
+    """It leaves a free decay bit-identical if it acts on driven runs only."""
+    acts = kind.driven and not _same(_record((example(kind),), WIND_ON), _bare(windy=True, driven=False))
+    return "it acts on a free decay" if acts else ""
 
 
 def round_trip(kind: type[Effect]) -> str:
@@ -121,31 +155,33 @@ def bounds(kind: type[Effect]) -> str:
 
 def determinism(kind: type[Effect]) -> str:
     """The same seed gives the same bits, with any number of threads."""
-    runs = [replace(WIND_ON, duration=0.4), replace(WIND_OFF, duration=0.4)] * 2
+    runs = [stated(kind, replace(run, duration=0.4)) for run in (WIND_ON, WIND_OFF)] * 2
 
     def records(threads: int) -> list[Record]:
         rngs = [np.random.default_rng([7, i]) for i in range(len(runs))]
         chains = [EffectChain.draw(run, (example(kind),), rng) for run, rng in zip(runs, rngs, strict=True)]
         true = [chain.physics() for chain in chains]
-        motions = simulate_motions(load_rig(), true, SENSOR.sample_rate, nthread=threads)
+        if kind.driven:
+            with ThreadPoolExecutor(threads) as pool:
+                motions = list(pool.map(_driven, true))
+        else:
+            motions = simulate_motions(load_rig(), true, SENSOR.sample_rate, nthread=threads)
         return [read_motion(m, SENSOR, rng, c) for m, rng, c in zip(motions, rngs, chains, strict=True)]
 
-    alone = [
-        simulate(load_rig(), run, SENSOR, np.random.default_rng([7, i]), effects=(example(kind),))
-        for i, run in enumerate(runs)
-    ]
+    alone = [record((example(kind),), run, np.random.default_rng([7, i])) for i, run in enumerate(runs)]
     same = all(_same(a, b) for threads in (1, 3) for a, b in zip(alone, records(threads), strict=True))
     return "" if same else "the records differ"
 
 
 def integration(kind: type[Effect]) -> str:
     """Half the integration step changes the motion by less than the integrators' tolerance, and MuJoCo agrees."""
-    chain = EffectChain.draw(WIND_ON, (example(kind),), np.random.default_rng(1))
+    chain = EffectChain.draw(stated(kind), (example(kind),), np.random.default_rng(1))
     run = follow_fastest(load_rig(), chain.physics())
     usual = forward_motion(load_rig(), run, 100.0)
     finer = forward_motion(load_rig(), replace(run, timestep=0.5 * run.timestep), 100.0)
-    engine = simulate_motion(build_model(load_rig(), run), 100.0)
-    error = max(float(np.max(np.abs(other.angle - usual.angle))) for other in (finer, engine))
+    # MuJoCo does not take the input of a driven run
+    others = [finer] if kind.driven else [finer, simulate_motion(build_model(load_rig(), run), 100.0)]
+    error = max(float(np.max(np.abs(other.angle - usual.angle))) for other in others)
     return "" if error < INTEGRATION_TOLERANCE else f"the angle changes by {error:.2g} rad"
 
 
@@ -183,6 +219,7 @@ LAWS: Mapping[str, Callable[[type[Effect]], str]] = {
     "null": null,
     "seen": seen,
     "condition": condition,
+    "free": free,
     "round trip": round_trip,
     "bounds": bounds,
     "determinism": determinism,
@@ -199,11 +236,12 @@ def check(kind: type[Effect]) -> list[Verdict]:
         kind: the effect, registered or not.
 
     Returns:
-        One verdict for each of `LAWS`, in their order; none for the oracle where the class states none. An
-        exception of the effect's own code is a fault.
+        One verdict for each of `LAWS`, in their order; none for the oracle where the class states none, and none
+        for free decays where the effect acts on them. An exception of the effect's own code is a fault.
     """
     unstated = kind.moment_oracle is Effect.moment_oracle
-    return [_verdict(kind, holds) for holds in LAWS.values() if not (unstated and holds is oracle)]
+    left_out = [law for law, absent in ((oracle, unstated), (free, not kind.driven)) if absent]
+    return [_verdict(kind, holds) for holds in LAWS.values() if holds not in left_out]
 
 
 def _verdict(kind: type[Effect], holds: Callable[[type[Effect]], str]) -> Verdict:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 from math import cos, pi, radians, sin
@@ -368,7 +368,8 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
 
 def _drive_numerics(drive: DriveMoment, timestep: float) -> dict[str, tuple[float, ...]]:
     """The moment of a drive, N m, at samples from time 0 on, and how it acts."""
-    times = drive.time_s + drive.delay
+    drive = drive if drive.delay == 0.0 else _mean_by_step(drive, timestep)
+    times = drive.time_s
     interval = float(times[-1]) / max(1, times.size - 1)
     even = times.size > 1 and np.allclose(
         times, interval * np.arange(times.size), rtol=0.0, atol=1e-6 * interval
@@ -377,7 +378,7 @@ def _drive_numerics(drive: DriveMoment, timestep: float) -> dict[str, tuple[floa
     if not even or abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise TunnelError(
             "the samples of the drive are not at even times from 0 on, a whole number of steps apart",
-            remedy="give it at the times of the record without a delay, and a timestep that divides their interval",
+            remedy="give it at the times of the record, and a timestep that divides their interval",
         )
     return {
         "drive": tuple((drive.scale * drive.values).tolist()),
@@ -385,6 +386,19 @@ def _drive_numerics(drive: DriveMoment, timestep: float) -> dict[str, tuple[floa
         "drive_held": (float(drive.held),),
         "drive_on_end": (float(not drive.on_body),),
     }
+
+
+def _mean_by_step(drive: DriveMoment, timestep: float) -> DriveMoment:
+    """A delayed drive as its mean over every step: its impulse is kept, and what is lost is of second order."""
+    at, values = drive.time_s, drive.values
+    ends = timestep * np.arange(round((at[-1] + max(drive.delay, 0.0)) / timestep) + 2) - drive.delay
+    before = np.clip(np.searchsorted(at, ends, side="right") - 1, 0, at.size - 1)
+    now = values[before] if drive.held else np.interp(ends, at, values)
+    until = np.diff(at) * (values[:-1] if drive.held else 0.5 * (values[:-1] + values[1:]))
+    integral = np.append(0.0, np.cumsum(until))[before] + 0.5 * (values[before] + now) * (ends - at[before])
+    means = np.diff(integral) / timestep
+    starts = timestep * np.arange(means.size, dtype=np.float64)
+    return replace(drive, time_s=starts, values=means, delay=0.0, held=True)
 
 
 def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:

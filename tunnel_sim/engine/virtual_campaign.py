@@ -173,8 +173,8 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         before those of the sensor itself.
 
     Raises:
-        TunnelError: when a name is unknown or given twice, a severity is missing, a value is out of range, or a
-            spring is not in the plan.
+        TunnelError: when a name is unknown or given twice, a severity is missing, a value is out of range, a
+            spring is not in the plan, or an effect acts on driven runs only.
     """
     effects = [_stated_effect(setting) for setting in plan.effects]
     names = [effect.name for effect in effects]
@@ -223,7 +223,15 @@ def _check_spring(effect: Effect, plan: CampaignPlan) -> None:
 def _check_driven(effect: Effect, plan: CampaignPlan) -> None:
     """Refuse effects whose meaning with an input is not defined."""
     drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
-    if not drives or effect.is_null:
+    if effect.is_null:
+        return
+    if effect.driven and not drives:
+        raise TunnelError(
+            "acts on driven runs only, and all runs of the plan are free decays",
+            where=f"effect {effect.name}",
+            remedy="leave it out, or add [drive]",
+        )
+    if not drives:
         return
     if effect.skips:
         raise TunnelError(

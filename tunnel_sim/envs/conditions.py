@@ -357,7 +357,7 @@ def _effects(
 
 def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
     """An effect of half to twice its typical severity."""
-    kinds = [kind for kind in ALL_EFFECTS if not kind.skips]
+    kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven)]
     kind = kinds[int(rng.integers(len(kinds)))]
     severity = kind.parameters()[0]
     value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))

@@ -252,10 +252,12 @@ class RunSettings:
         """What runs must have in common to share one compiled model.
 
         Returns:
-            Timestep, names and lengths of the series, lengths of program and drive, and whether the rod is rigid.
+            Timestep, names and lengths of the series, lengths of program and drive, the drive's delay, and whether
+            the rod is rigid.
         """
         series = tuple((name, len(series.values)) for name, series in self.series.items())
-        driven = None if self.drive is None else self.drive.values.size
+        drive = self.drive  # a delayed one is given by its means over the steps
+        driven = drive and (drive.values.size, drive.delay, float(drive.time_s[-1]) if drive.delay else 0.0)
         return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:

@@ -13,7 +13,7 @@ import pytest
 
 from diagnosis.identifiability import identifiability
 from tests.unit.own_effects import DETENT, OwnCubic
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.effects.base import Drawn, with_law
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.engine.effect_laws import check
@@ -70,6 +70,11 @@ class TooStiff(Broken):
 
 
 @dataclass(frozen=True)
+class ActsOnFreeDecays(Broken):
+    driven = True
+
+
+@dataclass(frozen=True)
 class OfWrongSign(Broken):
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float]:
         return lambda _t, angle, _rate: self.hardening * stated.spring_stiffness * angle**3
@@ -89,6 +94,7 @@ def test_a_sound_effect_obeys_every_law(kind: type[Effect]) -> None:
         (Wanders, "same seed", "differ"),
         (TooStiff, "integration step", "too|bound|changes by"),
         (OfWrongSign, "states independently", "differs by"),
+        (ActsOnFreeDecays, "driven runs only", "acts on a free decay"),
     ],
 )
 def test_a_broken_effect_violates_the_law_that_it_breaks(kind: type[Effect], law: str, fault: str) -> None:
@@ -104,3 +110,11 @@ def test_a_twin_of_a_known_effect_is_recognised() -> None:
     assert "cubic_stiffness" in found.fault
     assert identifiability(DETENT).fault == ""
     assert all(np.isfinite(cosine) for cosine in found.cosines.values())
+
+
+def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
+    kind = the_effect(driven=True)
+    assert [verdict.fault for verdict in check(kind)] == [""] * 8
+    found = identifiability(kind)
+    assert found.fault == ""
+    assert "12 simulated driven runs" in found.lines()[0]

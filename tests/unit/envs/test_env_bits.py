@@ -38,7 +38,7 @@ def of(kind: type[Effect]) -> dict[str, dict[str, float]]:
 TOGETHER = of(ALL_EFFECTS[0]) | {"buffeting": {"intensity": 0.01}, "mains_hum": {"amplitude": 0.002}}
 TOGETHER |= {"sensor_hysteresis": {"half_width": 0.002}, "wind_speed_drift": {"drift": 0.1}}
 CASES: dict[str, dict[str, dict[str, float]]] = {"none": {}, "together": TOGETHER}
-CASES |= {kind.name: of(kind) for kind in ALL_EFFECTS if not kind.skips}
+CASES |= {kind.name: of(kind) for kind in ALL_EFFECTS if not (kind.skips or kind.driven)}
 
 
 @pytest.mark.parametrize("case", CASES)
