@@ -252,10 +252,6 @@ _NO_MOMENT = "Without a spring these effects have no moment, and are not tried: 
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
 )
-_NOT_BY_MUJOCO = (
-    "The driven runs are checked by the integrator of the fits in shorter steps, since the MuJoCo model does not "
-    "take their input."
-)
 
 #: Said where effects are compared in this way.
 BY_MOMENT = (
@@ -379,7 +375,7 @@ def kinds_for(
         gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]
         kept = tuple(kind for kind in kept if kind not in (*gone[_NO_MOMENT], *gone[_NO_ZERO]))
     said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]
-    return kept, (*said, _NOT_BY_MUJOCO)
+    return kept, tuple(said)
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:

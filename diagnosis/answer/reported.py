@@ -16,12 +16,10 @@ from diagnosis.likelihood.run_data import RunData
 from diagnosis.policy import CONFIRMATION_TOLERANCE, GAP_FALSE_ALARM_RATE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
-from tunnel_sim.physics.forward import forward_motion
-from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
+from tunnel_sim.physics.run_settings import Motion, released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +106,7 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
     """Block means of the reading that the MuJoCo model predicts.
 
-    The MuJoCo model does not take the input of a driven run, which the forward integrator predicts in the same
-    short steps. Effects of the sensor act on every sample before it is averaged; the fits, which average first,
+    Effects of the sensor act on every sample before it is averaged; the fits, which average first,
     only approximate that.
 
     Args:
@@ -131,21 +128,10 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
     blocks: dict[str, Array] = {}
     for interval, group in by_interval.items():
         rig = campaign_rig(problem.data)
-        free = [case for case in group if case.run.drive is None]
-        motions = simulate_motions(rig, [case.physics for case in free], 1.0 / interval) if free else ()
-        for case, motion in zip(free, motions, strict=True):
+        motions = simulate_motions(rig, [case.physics for case in group], 1.0 / interval)
+        for case, motion in zip(group, motions, strict=True):
             blocks[case.run.id] = case.reading(motion)
-        for case in group:
-            if case.run.drive is not None:
-                blocks[case.run.id] = case.reading(_driven_motion(rig, case.physics, interval))
     return [blocks[run.id] for run in problem.data.runs]
-
-
-def _driven_motion(rig: Rig, physics: RunSettings, interval: float) -> Motion:
-    try:
-        return forward_motion(rig, physics, 1.0 / interval)
-    except ValueError as error:
-        raise TunnelError(str(error), remedy="do not rely on the fitted parameters") from error
 
 
 class _Case:
@@ -157,6 +143,8 @@ class _Case:
         self.zero = problem.zero(common, own)
         physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
+        if run.drive is not None:  # steps end at its samples
+            steps = run.block * -(-steps // run.block)
         blocks = run.reading.size + blocks_beyond(physics, run)
         self.physics = dataclasses.replace(
             physics, timestep=run.interval / steps, duration=(blocks + 1) * run.interval
