@@ -218,7 +218,13 @@ def _moved(parameters: Array, own: Array, step: Array, own_zeros: bool) -> tuple
 
 
 def normal_equations(
-    runs: Sequence[Run], links: Sequence[Array], parameters: Array, own: Array, *, own_zeros: bool
+    runs: Sequence[Run],
+    links: Sequence[Array],
+    parameters: Array,
+    own: Array,
+    *,
+    own_zeros: bool,
+    filters: Sequence[tuple[Array, Array]] | None = None,
 ) -> tuple[list[Array], Array, Array]:
     """Residuals, information and score of φ, the common zero where there is one, and the runs' own numbers.
 
@@ -227,6 +233,8 @@ def normal_equations(
         parameters: φ, shape (p,), SI.
         own: of each run as in `InputFit`, shape (r, 3).
         own_zeros: whether every run has its own zero.
+        filters: numerator and denominator per run, shape (3,) each, of a recursive filter that makes its noise
+            white; None where it is white.
 
     Returns:
         Residuals in rad; JᵀJ, shape (m, m); Jᵀ residual, shape (m,).
@@ -237,6 +245,10 @@ def normal_equations(
     gradient, residuals = np.zeros(len(normal)), []
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
         residual, jacobian = _linearised(run, link, parameters, own[i])
+        if filters is not None:
+            from scipy.signal import lfilter  # only here: slow to load
+
+            residual, jacobian = (lfilter(*filters[i], values, axis=0) for values in (residual, jacobian))
         places = np.r_[np.arange(shared), shared + width * i + np.arange(width)]
         normal[np.ix_(places, places)] += jacobian.T @ jacobian
         gradient[places] += jacobian.T @ residual

@@ -1,0 +1,153 @@
+"""Planned drives against free decays: ``python -m docs.studies.planned_drives docs`` fills the page's table.
+
+Both plans of a case take the same rig time. Bounds are those of `tunnel plan`; errors are those of estimates from
+simulated campaigns, by output error in still air and by filter error in buffeting.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import radians
+from pathlib import Path
+
+import numpy as np
+
+from docs.studies.campaign_policies import replaced
+from identification import identify
+from identification.uncertainty.drive_design import Limits, plan_bound, propose_drive
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.files.plan_file import EffectTable, PlanDocument, plan_from, read_plan
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.plan import CampaignPlan
+
+SEEDS = 16
+LIMITS = Limits(moment=0.5, angle=radians(20.0))  # the angle is that of the releases
+INTENSITY = 0.02  # of the buffeting: the example of the vocabulary
+PAUSE = 60.0  # s of rig time before each record, as `tunnel plan` assumes
+PLAN = """
+name = "study"
+seed = 0
+springs = {springs}
+wind_speeds = {speeds}
+release_angles_deg = [20.0]
+repeats = {repeats}
+duration = 20.0
+truth = {{ cn_beta = 0.4719, cn_r = -0.1033 }}
+sensor.sample_rate = 100.0
+"""
+PLANS = {
+    "spring 5, 0 and 15 m/s, five releases": {"springs": [5], "speeds": [0, 15], "repeats": 5},
+    "four springs, four speeds, one release": {
+        "springs": [3, 5, 6, 8],
+        "speeds": [0, 10, 15, 20],
+        "repeats": 1,
+    },
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One plan in one air.
+
+    Args:
+        drive: kind and number of frequencies of the planned drive.
+        bounds: Cnβ and Cnr of the free decays, then of the planned drive, 1/rad.
+        errors: root-mean-square errors of the estimates in the same order, 1/rad.
+    """
+
+    plan: str
+    air: str
+    drive: str
+    bounds: tuple[float, float, float, float]
+    errors: tuple[float, ...] = ()
+
+
+def document_of(name: str, *, buffeted: bool) -> PlanDocument:
+    """The free decays of a case.
+
+    Args:
+        name: one of `PLANS`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "plan.toml"
+        path.write_text(PLAN.format(**PLANS[name]), encoding="utf-8")
+        document = read_plan(path)
+    effects = [EffectTable(name="buffeting", parameters={"intensity": INTENSITY})] if buffeted else []
+    return document.model_copy(update={"effects": effects})
+
+
+def compare(name: str, *, buffeted: bool, seeds: int = SEEDS) -> Case:
+    """One case.
+
+    Args:
+        name: one of `PLANS`.
+        seeds: number of simulated campaigns of each plan; 0 gives the bounds alone.
+    """
+    free, rig = document_of(name, buffeted=buffeted), load_rig()
+    duration = free.repeats * (free.duration + PAUSE) - PAUSE
+    best = propose_drive(free, rig, LIMITS, duration=duration)
+    assert best.drive is not None
+    plans = [plan_from(each, rig, name) for each in (free, best)]
+    bounds = [plan_bound(plan, rig).std(each) for plan in plans for each in ("cn_beta", "cn_r")]
+    count = len(best.drive.frequencies_hz) or 1
+    drive = f"{best.drive.kind.replace('_', ' ')}, {count} frequenc{'y' if count == 1 else 'ies'}"
+    estimator = "filter_error" if buffeted else "output_error"
+    found = [_errors(plan, estimator, seeds) for plan in plans] if seeds else []
+    air = "buffeting" if buffeted else "still"
+    return Case(name, air, drive, (bounds[0], bounds[1], bounds[2], bounds[3]), tuple(sum(found, [])))
+
+
+def _errors(plan: CampaignPlan, estimator: str, seeds: int) -> list[float]:
+    errors = []
+    for seed in range(seeds):
+        estimate = identify(simulate_campaign(replace(plan, seed=seed)), estimator)
+        assert estimate.cn_beta is not None
+        assert estimate.cn_r is not None
+        errors.append(
+            [estimate.cn_beta.value - plan.truth.cn_beta, estimate.cn_r.value - plan.truth.cn_r]
+        )
+    mean: list[float] = np.sqrt(np.mean(np.square(errors), axis=0)).tolist()
+    return mean
+
+
+def table(cases: Sequence[Case]) -> str:
+    """The comparison in Markdown."""
+    head = (
+        "| plan of free decays | air | planned drive | Cnr, free decays [1/rad] | Cnr, planned [1/rad] | "
+        "ratio of Cnr | ratio of Cnβ |\n|---|---|---|---|---|---|---|"
+    )
+    rows = [
+        f"| {c.plan} | {c.air} | {c.drive} | {c.bounds[1]:.2g} ({c.errors[1]:.2g}) | "
+        f"{c.bounds[3]:.2g} ({c.errors[3]:.2g}) | {_ratio(c, 1)} | {_ratio(c, 0)} |"
+        for c in cases
+    ]
+    return "\n".join([head, *rows])
+
+
+def _ratio(case: Case, place: int) -> str:
+    bound, error = (values[place] / values[place + 2] for values in (case.bounds, case.errors))
+    return f"{bound:.2f} ({error:.2f})"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compare the plans and fill the page.
+
+    Args:
+        arguments: those of the process when None.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("docs", type=Path, help="the folder docs of the source tree")
+    page: Path = parser.parse_args(arguments).docs / "campaign-design.md"
+    cases = [compare(name, buffeted=buffeted) for name in PLANS for buffeted in (False, True)]
+    text = replaced(page.read_text(encoding="utf-8"), "planned drives", table(cases))
+    write_whole(page, text.encode())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
