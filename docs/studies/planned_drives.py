@@ -40,13 +40,12 @@ duration = 20.0
 truth = {{ cn_beta = 0.4719, cn_r = -0.1033 }}
 sensor.sample_rate = 100.0
 """
+_FOUR = {"springs": [3, 5, 6, 8], "speeds": [0, 10, 15, 20]}
 PLANS = {
     "spring 5, 0 and 15 m/s, five releases": {"springs": [5], "speeds": [0, 15], "repeats": 5},
-    "four springs, four speeds, one release": {
-        "springs": [3, 5, 6, 8],
-        "speeds": [0, 10, 15, 20],
-        "repeats": 1,
-    },
+    "spring 5, 0 and 15 m/s, one release": {"springs": [5], "speeds": [0, 15], "repeats": 1},
+    "four springs, four speeds, three releases": {**_FOUR, "repeats": 3},
+    "four springs, four speeds, one release": {**_FOUR, "repeats": 1},
 }
 
 
@@ -94,12 +93,13 @@ def compare(name: str, *, buffeted: bool, seeds: int = SEEDS) -> Case:
     assert best.drive is not None
     plans = [plan_from(each, rig, name) for each in (free, best)]
     bounds = [plan_bound(plan, rig).std(each) for plan in plans for each in ("cn_beta", "cn_r")]
-    count = len(best.drive.frequencies_hz) or 1
-    drive = f"{best.drive.kind.replace('_', ' ')}, {count} frequenc{'y' if count == 1 else 'ies'}"
+    drive = best.drive.kind.replace("_", " ")
+    if best.drive.frequencies_hz:
+        drive += f", {len(best.drive.frequencies_hz)} frequencies"
     estimator = "filter_error" if buffeted else "output_error"
-    found = [_errors(plan, estimator, seeds) for plan in plans] if seeds else []
+    found = [error for plan in plans for error in _errors(plan, estimator, seeds)] if seeds else []
     air = "buffeting" if buffeted else "still"
-    return Case(name, air, drive, (bounds[0], bounds[1], bounds[2], bounds[3]), tuple(sum(found, [])))
+    return Case(name, air, drive, (bounds[0], bounds[1], bounds[2], bounds[3]), tuple(found))
 
 
 def _errors(plan: CampaignPlan, estimator: str, seeds: int) -> list[float]:
@@ -108,9 +108,7 @@ def _errors(plan: CampaignPlan, estimator: str, seeds: int) -> list[float]:
         estimate = identify(simulate_campaign(replace(plan, seed=seed)), estimator)
         assert estimate.cn_beta is not None
         assert estimate.cn_r is not None
-        errors.append(
-            [estimate.cn_beta.value - plan.truth.cn_beta, estimate.cn_r.value - plan.truth.cn_r]
-        )
+        errors.append([estimate.cn_beta.value - plan.truth.cn_beta, estimate.cn_r.value - plan.truth.cn_r])
     mean: list[float] = np.sqrt(np.mean(np.square(errors), axis=0)).tolist()
     return mean
 

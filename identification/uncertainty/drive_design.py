@@ -1,7 +1,7 @@
 """The drive that tells most about Cnβ and Cnr, of those that a plan can express and a rig allows.
 
 Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, in the noise of its sensor
-and, with the effect ``buffeting``, in its random moment. A stepped sine begins at the resonances and loses
+and in the random moment of the plan's buffeting. A stepped sine begins at the resonances and loses
 frequencies as long as that lowers the bound. Its frequencies, and the ends of a multisine and a chirp, are then
 moved one at a time. The best of these, of sines at the resonances and of a broad multisine is taken. The response
 is linear in the input, so that the amplitude follows from the limits. Optimal inputs for linear systems: Goodwin &
@@ -61,8 +61,8 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
     """The bound of a plan's coefficients at its truth, with the quantisation, and with its buffeting.
 
     Args:
-        plan: free decays and runs driven by a moment. Of its effects only ``buffeting`` counts; its moment is taken
-            as white with the intensity that it has at each run's natural frequency.
+        plan: free decays and runs driven by a moment. Of its effects only buffeting counts; its moment is taken as
+            white with the intensity that it has at each run's natural frequency.
 
     Raises:
         TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
@@ -322,17 +322,13 @@ def _air(condition: Condition, rig: Rig) -> dict[str, float]:
 def _random_moments(plan: CampaignPlan, rig: Rig) -> list[float] | None:
     """Spectral intensity of the buffeting of each run over the inertia, at its natural frequency, rad²/s³."""
     from tunnel_sim.effects import effect_from  # only here: most plans have none
-    from tunnel_sim.effects.air import Buffeting
 
-    stated = next((setting for setting in plan.effects if setting.name == Buffeting.name), None)
-    if stated is None:
+    effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
+    if not any(effect.random == "broad_band" for effect in effects):
         return None
-    effect = effect_from(stated.name, stated.parameters)
-    assert isinstance(effect, Buffeting)
-    corner = 2.0 * pi * effect.bandwidth
     found = []
     for condition in plan.conditions:
-        moment = effect.intensity * aerodynamic_stiffness(1.0, **_air(condition, rig))
-        square = _decay(plan, condition, rig)[1]
-        found.append(2.0 * (moment / plan.truth.yaw_inertia) ** 2 * corner / (corner**2 + square))
+        scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
+        rate = sqrt(_decay(plan, condition, rig)[1])
+        found.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
     return found

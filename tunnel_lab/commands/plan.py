@@ -148,13 +148,15 @@ def _check(plan: Path, out: Path, drive: bool, numbers: dict[str, float | None])
 
 def _with_buffeting(document: PlanDocument, intensity: float | None) -> PlanDocument:
     """A plan with buffeting of this intensity, of the bandwidth that it states."""
+    from tunnel_sim.effects import ALL_EFFECTS
     from tunnel_sim.files.plan_file import EffectTable
 
     if intensity is None:
         return document
-    stated = next((e.parameters for e in document.effects if e.name == "buffeting"), {})
-    others = [effect for effect in document.effects if effect.name != "buffeting"]
-    added = EffectTable(name="buffeting", parameters={**stated, "intensity": intensity})
+    kind = next(kind for kind in ALL_EFFECTS if kind.random == "broad_band")
+    stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
+    others = [effect for effect in document.effects if effect.name != kind.name]
+    added = EffectTable(name=kind.name, parameters={**stated, kind.parameters()[0].name: intensity})
     return document.model_copy(update={"effects": [*others, added] if intensity else others})
 
 
