@@ -190,7 +190,7 @@ def fit_with_inputs(
         moved, moved_own = _moved(parameters, own, step, own_zeros)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
             trial = normal_equations(runs, links, moved, moved_own, own_zeros=own_zeros)
-        after = sum(float(r @ r) for r in trial[0])
+            after = sum(float(r @ r) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
             # of large residuals the step is too long, and without damping the fit would go to and fro
