@@ -27,6 +27,7 @@ from tunnel_lab.commands import (
     identify,
     importing,
     paper,
+    plan,
     plot,
     render,
     schema,
@@ -81,6 +82,7 @@ def tunnel(
     [bold]Start here[/bold]
       tunnel demo                        the whole chain, with figures
       tunnel springs                     inertia from the paper's spring table
+      tunnel plan p.toml --drive         the drive that tells most, in a plan's rig time
       tunnel simulate plan.toml --out c  simulate a campaign into folder c
       tunnel import log.csv --out c      make a campaign from a logger's files
       tunnel identify c --json est.json  its coefficients, simulated or measured
@@ -115,6 +117,7 @@ def tunnel(
 
 COMMANDS = (
     demo,
+    plan,
     simulate,
     importing,
     identify,

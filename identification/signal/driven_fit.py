@@ -193,7 +193,7 @@ def fit_with_inputs(
         moved, moved_own = _moved(parameters, own, step, own_zeros)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
             trial = normal_equations(runs, links, moved, moved_own, own_zeros=own_zeros)
-        after = sum(float(r @ r) for r in trial[0])
+            after = sum(float(r @ r) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
             # of large residuals the step is too long, and without damping the fit would go to and fro
@@ -221,7 +221,13 @@ def _moved(parameters: Array, own: Array, step: Array, own_zeros: bool) -> tuple
 
 
 def normal_equations(
-    runs: Sequence[Run], links: Sequence[Array], parameters: Array, own: Array, *, own_zeros: bool
+    runs: Sequence[Run],
+    links: Sequence[Array],
+    parameters: Array,
+    own: Array,
+    *,
+    own_zeros: bool,
+    filters: Sequence[tuple[Array, Array]] | None = None,
 ) -> tuple[list[Array], Array, Array]:
     """Residuals, information and score of φ, the common zero where there is one, and the runs' own numbers.
 
@@ -230,6 +236,8 @@ def normal_equations(
         parameters: φ, shape (p,), SI.
         own: of each run as in `InputFit`, shape (r, 3).
         own_zeros: whether every run has its own zero.
+        filters: numerator and denominator per run, shape (3,) each, of a recursive filter that makes its noise
+            white; None where it is white.
 
     Returns:
         Residuals in rad; JᵀJ, shape (m, m); Jᵀ residual, shape (m,).
@@ -240,6 +248,10 @@ def normal_equations(
     gradient, residuals = np.zeros(len(normal)), []
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
         residual, jacobian = _linearised(run, link, parameters, own[i])
+        if filters is not None:
+            from scipy.signal import lfilter  # only here: slow to load
+
+            residual, jacobian = (lfilter(*filters[i], values, axis=0) for values in (residual, jacobian))
         places = np.r_[np.arange(shared), shared + width * i + np.arange(width)]
         normal[np.ix_(places, places)] += jacobian.T @ jacobian
         gradient[places] += jacobian.T @ residual

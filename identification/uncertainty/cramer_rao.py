@@ -21,9 +21,10 @@ from identification.campaign.driven import with_gains
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import information_at
 from identification.signal.driven_fit import normal_equations
+from identification.signal.filter import discretised, steady_filters
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -145,6 +146,7 @@ def campaign_bound(
     noise_std: float,
     drive_gain: float = 1.0,
     initial_states: Sequence[tuple[float, float]] | None = None,
+    random_moments: Sequence[float] | None = None,
 ) -> CampaignBound:
     """The bound of Cnβ, Cnr, Izz and Cr together, of free and driven runs; an input is exact between its samples.
 
@@ -158,6 +160,10 @@ def campaign_bound(
         drive_gain: true gain of inputs that state none, unknown to the estimator, N m per unit.
         initial_states: angle [rad] and rate [rad/s] at each run's first sample; where None, the runs' nominal
             release angles at rest, and 0 of a driven run.
+        random_moments: spectral intensity q of a white random moment on each run over the inertia, ⟨w(t)w(t′)⟩ =
+            q δ(t − t′), rad²/s³; None where there is none. The bound is then that of the response to release and
+            input in noise of known spectrum, by the steady Kalman filter (doi:10.1137/0141046); what the random
+            motion itself says of the coefficients is left out. Samples must be even.
 
     Raises:
         TunnelError: when a run states no spring stiffness, the rig states no size although the wind is on, or a
@@ -184,7 +190,11 @@ def campaign_bound(
     states = initial_states if initial_states is not None else _released(campaign)
     own = np.array([(0.0, angle, rate) for angle, rate in states])
     drifting = any(run.unrestrained for run in runs)
-    normal = normal_equations(runs, linked.links, parameters, own, own_zeros=drifting)[1]
+    filters = None
+    if random_moments is not None:
+        coefficients = np.array([link[:2] @ parameters for link in linked.links])
+        filters = _whitening(runs, coefficients, np.asarray(random_moments), noise_std**2)
+    normal = normal_equations(runs, linked.links, parameters, own, own_zeros=drifting, filters=filters)[1]
     information, _ = eliminate(normal, np.zeros(len(normal)), design.size)
     found = derivatives(design, parameters[: design.size])
     covariance = found.jacobian @ (inverse(information) * noise_std**2) @ found.jacobian.T
@@ -200,3 +210,18 @@ def _released(campaign: Campaign) -> list[tuple[float, float]]:
             raise TunnelError("no initial state", where=where, remedy="state release_angle or initial_states")
         states.append((run.release_angle or 0.0, 0.0))
     return states
+
+
+def _whitening(
+    runs: Sequence[Run], coefficients: Array, intensities: Array, variance: float
+) -> list[tuple[Array, Array]]:
+    """The runs' filters from readings to innovations, of the variance of a reading; coefficients (a, k) by run."""
+    dynamics, drive = np.zeros((2, len(runs), 2, 2))
+    dynamics[:, 0, 1] = 1.0
+    dynamics[:, 1, 0], dynamics[:, 1, 1] = -coefficients[:, 1], -2.0 * coefficients[:, 0]
+    drive[:, 1, 1] = intensities
+    interval = np.array([run.record.duration / (run.record.time_s.size - 1) for run in runs])
+    steady = steady_filters(*discretised(dynamics, drive, interval), np.full(len(runs), variance))
+    return [
+        (numerator * np.sqrt(variance / spread), denominator) for numerator, denominator, spread in steady
+    ]

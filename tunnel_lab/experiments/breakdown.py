@@ -188,7 +188,7 @@ def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> BiasCase:
     campaign = as_campaign(simulated, "breakdown")
     starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
     noise = float(np.sqrt(draw.conditions.noise_power))
-    bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts)
+    bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts, random_moments=None)
     return BiasCase(
         effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
         severity=draw.effects[0].target if draw.effects else 0.0,

@@ -334,6 +334,11 @@ class Buffeting(Effect):
         default=20.0,
     )
 
+    def moment_density(self, rate: float) -> float:
+        """That of the random moment's spectrum at the frequency of the motion."""
+        corner = 2.0 * pi * self.bandwidth
+        return 2.0 * self.intensity**2 * corner / (corner**2 + rate**2)
+
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Array:
         """White noise that is filtered into the random moment; the first value sets its initial state."""
         kicks = rng.standard_normal(int(stated.duration / _INTERVAL) + 2)

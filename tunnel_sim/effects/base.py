@@ -173,6 +173,18 @@ class Effect:
         del stiffness
         return 0.0
 
+    def moment_density(self, rate: float) -> float:
+        """Spectral intensity of the effect's random moment, as if it were white.
+
+        Args:
+            rate: angular frequency of the motion, rad/s.
+
+        Returns:
+            q of the moment coefficient with the wind on, ⟨c(t)c(t′)⟩ = q δ(t − t′), s; 0 without a broad spectrum.
+        """
+        del rate
+        return 0.0
+
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.
 

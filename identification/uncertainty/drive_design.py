@@ -1,0 +1,334 @@
+"""The drive that tells most about Cnβ and Cnr, of those that a plan can express and a rig allows.
+
+Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, in the noise of its sensor
+and in the random moment of the plan's buffeting. A stepped sine begins at the resonances and loses
+frequencies as long as that lowers the bound. Its frequencies, and the ends of a multisine and a chirp, are then
+moved one at a time. The best of these, of sines at the resonances and of a broad multisine is taken. The response
+is linear in the input, so that the amplitude follows from the limits. Optimal inputs for linear systems: Goodwin &
+Payne, Dynamic System Identification (1977), ch. 6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from itertools import product
+from math import cos, floor, hypot, inf, log, log10, pi, sqrt
+from typing import Literal
+
+import numpy as np
+
+from identification.signal.driven import driven_rows
+from identification.uncertainty.cramer_rao import CampaignBound, campaign_bound
+from tunnel_sim.files.plan_drive import DriveTable, check_drive
+from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, plan_from
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import (
+    CampaignPlan,
+    Condition,
+    SensorModel,
+    aerodynamic_damping,
+    aerodynamic_stiffness,
+)
+from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.rig import Rig
+
+Goal = Literal["d", "cn_r"]
+"""The determinant of the covariance of (Cnβ, Cnr), or the variance of Cnr."""
+
+_PER_CYCLE = 8.0  # samples while inputs are compared
+_STEPS = (0.16, 0.08, 0.04, 0.02, 0.01)  # relative, of an end of the band
+_WIDER = 1.1  # ratio of an end to the outermost resonance, where the search starts
+_BROAD = 2.0  # ratio to it of a plain broad band
+_DIGITS = 3  # of an amplitude and a frequency in the plan
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the rig allows.
+
+    Args:
+        moment: peak of the input, N m.
+        angle: peak of the response from rest, rad.
+    """
+
+    moment: float
+    angle: float
+
+
+def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
+    """The bound of a plan's coefficients at its truth, with the quantisation, and with its buffeting.
+
+    Args:
+        plan: free decays and runs driven by a moment. Of its effects only buffeting counts; its moment is taken as
+            white with the intensity that it has at each run's natural frequency.
+
+    Raises:
+        TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
+    """
+    sensor = plan.sensor
+    noise = _noise(sensor)
+    if not noise > 0.0:
+        raise TunnelError(
+            "readings without noise have no bound", remedy="give noise_std under [sensor] in rad"
+        )
+    time = np.arange(max(2, round(plan.conditions[0].duration * sensor.sample_rate))) / sensor.sample_rate
+    record = Record(time, np.zeros(time.size))
+    runs = tuple(
+        Run(c.id, record, c.wind_speed, c.spring_stiffness, c.air_density, c.release_angle, c.drive)
+        for c in plan.conditions
+    )
+    campaign = Campaign(plan.name, RigProperties.of(rig), SensorProperties.of(sensor), runs)
+    try:
+        bound = campaign_bound(
+            campaign, **asdict(plan.truth), noise_std=noise, random_moments=_random_moments(plan, rig)
+        )
+    except np.linalg.LinAlgError:
+        bound = CampaignBound((), ())
+    if not {"cn_beta", "cn_r"} <= set(bound.parameters):
+        raise TunnelError(
+            "the runs do not determine Cnβ and Cnr",
+            remedy="give wind_speeds of 0 and above, such as [0, 15], and several springs where nothing is driven",
+        )
+    return bound
+
+
+def peak_response(plan: CampaignPlan, rig: Rig) -> float:
+    """The largest angle that the driven runs of a plan reach at its truth, rad.
+
+    Raises:
+        TunnelError: where the motion of a run grows out of range.
+    """
+    peak = 0.0
+    inertia = plan.truth.yaw_inertia
+    for condition in plan.conditions:
+        if condition.drive is None:
+            continue
+        time = np.arange(condition.drive.values.size) / plan.sensor.sample_rate
+        decay = _decay(plan, condition, rig)
+        with np.errstate(all="ignore"):
+            motion = driven_rows(
+                time, condition.drive.values / inertia, *decay, held=condition.drive.hold == "zero"
+            )[0]
+        if not np.isfinite(motion).all():
+            raise TunnelError(
+                "the motion grows without bound", where=f"run {condition.id}", remedy="lower wind_speeds"
+            )
+        peak = max(peak, float(np.abs(motion).max()))
+    return peak
+
+
+def driven_plan(document: PlanDocument, drive: DriveTable, duration: float) -> PlanDocument:
+    """A plan with one driven run of each spring and speed in place of its free decays.
+
+    Args:
+        duration: of each record, s.
+    """
+    return document.model_copy(
+        update={"release_angles_deg": [], "repeats": 1, "duration": duration, "drive": drive}
+    )
+
+
+def within_limits(
+    document: PlanDocument, drive: DriveTable, rig: Rig, limits: Limits, duration: float
+) -> PlanDocument:
+    """The driven plan whose input is as large as the limits allow.
+
+    Args:
+        drive: of one amplitude, which is replaced.
+        duration: of each record, s.
+    """
+    unit = driven_plan(document, drive.model_copy(update={"amplitudes_nm": [1.0]}), duration)
+    plan = plan_from(unit, rig, document.name)
+    largest = min(limits.moment, limits.angle / _peak_between_samples(plan, drive, rig))
+    return driven_plan(
+        document, drive.model_copy(update={"amplitudes_nm": [_rounded_down(largest)]}), duration
+    )
+
+
+def propose_drive(
+    document: PlanDocument,
+    rig: Rig,
+    limits: Limits,
+    *,
+    goal: Goal = "d",
+    duration: float | None = None,
+    progress: Callable[[], None] = lambda: None,
+) -> PlanDocument:
+    """The driven plan whose bound is the lowest that the search finds.
+
+    Args:
+        document: of free decays; its conditions, sensor and truth are kept.
+        duration: of each record, s; None: the plan's.
+        progress: called after each input that was tried.
+
+    Returns:
+        A plan of one driven run for each spring and speed, by a moment on the body.
+
+    Raises:
+        TunnelError: as `plan_bound` and `peak_response`.
+    """
+    length = document.duration if duration is None else duration
+    plan = plan_from(document, rig, document.name)
+    resonances = sorted({sqrt(max(_decay(plan, c, rig)[1], 0.0)) / (2.0 * pi) for c in plan.conditions})
+    if not resonances[0] > 0.0:
+        raise TunnelError(
+            "the wind overcomes the spring: a run has no resonance",
+            remedy="lower wind_speeds, or stiffen springs",
+        )
+    coarse = _thinned(document, _PER_CYCLE * _BROAD * resonances[-1])
+    tried: dict[str, float] = {}
+
+    def score(drive: DriveTable) -> float:
+        key = drive.model_dump_json()
+        if key not in tried:
+            tried[key] = _score(driven_plan(coarse, drive, length), rig, limits, goal)
+            progress()
+        return tried[key]
+
+    outer = (resonances[0], resonances[-1])
+    found = [
+        *(_stepped([f]) for f in resonances),
+        _band("multisine")([outer[0] / _BROAD, outer[1] * _BROAD]),
+        *(_moved(_band(k), [outer[0] / _WIDER, outer[1] * _WIDER], score) for k in ("multisine", "chirp")),
+        _moved(_stepped, _fewer(resonances, score), score),
+    ]
+    best = min(found, key=score)
+    if score(best) == inf:
+        raise TunnelError(
+            "no input has a line in the band of the resonances", remedy="give a longer duration or --minutes"
+        )
+    return within_limits(document, best, rig, limits, length)
+
+
+def _moved(
+    make: Callable[[list[float]], DriveTable], start: list[float], score: Callable[[DriveTable], float]
+) -> DriveTable:
+    """The input made from frequencies (Hz) that are moved one at a time, in shorter and shorter steps."""
+    rates, best = start, make(start)
+    for step in _STEPS:
+        improved = True
+        while improved:
+            improved = False
+            for i, factor in product(range(len(rates)), (1.0 - step, 1.0 + step)):
+                moved = [*rates[:i], rates[i] * factor, *rates[i + 1 :]]
+                if score(trial := make(moved)) < score(best):
+                    rates, best, improved = moved, trial, True
+    return best
+
+
+def _fewer(rates: list[float], score: Callable[[DriveTable], float]) -> list[float]:
+    """Frequencies of a stepped sine (Hz) without those whose time is better spent at the others."""
+    while len(rates) > 1:
+        shorter = min(
+            ([*rates[:i], *rates[i + 1 :]] for i in range(len(rates))), key=lambda left: score(_stepped(left))
+        )
+        if score(_stepped(shorter)) >= score(_stepped(rates)):
+            break
+        rates = shorter
+    return rates
+
+
+def _stepped(rates: list[float]) -> DriveTable:
+    if len(rates) == 1:
+        return _table("sine", frequency_hz=rates[0])
+    return _table("stepped_sine", frequencies_hz=rates)
+
+
+def _band(kind: str) -> Callable[[list[float]], DriveTable]:
+    return lambda ends: _table(kind, from_hz=ends[0], to_hz=ends[1])
+
+
+def _table(kind: str, **keys: float | list[float]) -> DriveTable:
+    rounded = {
+        name: [_rounded(f) for f in value] if isinstance(value, list) else _rounded(value)
+        for name, value in keys.items()
+    }
+    return DriveTable.model_validate({"kind": kind, "amplitudes_nm": [1.0], **rounded})
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS + 1}g}")
+
+
+def _rounded_down(value: float) -> float:
+    unit = 10.0 ** (_DIGITS - 1 - floor(log10(value)))
+    return floor(value * unit) / unit
+
+
+def _score(unit: PlanDocument, rig: Rig, limits: Limits, goal: Goal) -> float:
+    """Logarithm of Cnr's standard deviation or of the geometric mean of both; infinite for a refused input."""
+    drive = unit.drive
+    assert drive is not None
+    try:
+        check_drive(drive, unit.samples, unit.sample_rate, unit.name)
+    except TunnelError:
+        return inf
+    plan = plan_from(unit, rig, unit.name)
+    bound = plan_bound(plan, rig)
+    amplitude = min(limits.moment, limits.angle / _peak_between_samples(plan, drive, rig))
+    if goal == "cn_r":
+        return log(bound.std("cn_r")) - log(amplitude)
+    places = [bound.parameters.index(name) for name in ("cn_beta", "cn_r")]
+    return 0.25 * float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1]) - log(
+        amplitude
+    )
+
+
+def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> float:
+    """The peak with what samples of the fastest motion may miss of it, rad."""
+    fastest = max(
+        drive.to_hz or 0.0,
+        drive.from_hz or 0.0,
+        drive.frequency_hz or 0.0,
+        *drive.frequencies_hz,
+        *(sqrt(_decay(plan, c, rig)[1]) / (2.0 * pi) for c in plan.conditions),
+    )
+    return peak_response(plan, rig) / max(cos(pi * fastest / plan.sensor.sample_rate), 0.5)
+
+
+def _thinned(document: PlanDocument, sample_rate: float) -> PlanDocument:
+    """The same plan with fewer readings of as much information."""
+    if sample_rate >= document.sample_rate:
+        return document
+    sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
+    noise = _noise(sensor) * sqrt(sample_rate / document.sample_rate)
+    thin = SensorModelTable(sample_rate=sample_rate, noise_std=noise, resolution=0.0)
+    return document.model_copy(update={"sensor": thin})
+
+
+def _noise(sensor: SensorModel) -> float:
+    return hypot(sensor.noise_std, sensor.resolution / sqrt(12.0))
+
+
+def _decay(plan: CampaignPlan, condition: Condition, rig: Rig) -> tuple[float, float]:
+    """Decay rate (1/s) and stiffness (1/s²) of a run at the truth."""
+    truth, air = plan.truth, _air(condition, rig)
+    stiffness = condition.spring_stiffness - aerodynamic_stiffness(truth.cn_beta, **air)
+    damping = truth.mechanical_damping - aerodynamic_damping(truth.cn_r, **air)
+    return 0.5 * damping / truth.yaw_inertia, stiffness / truth.yaw_inertia
+
+
+def _air(condition: Condition, rig: Rig) -> dict[str, float]:
+    return {
+        "air_density": condition.air_density,
+        "wind_speed": condition.wind_speed,
+        "frontal_area": rig.body.frontal_area,
+        "reference_length": rig.body.length,
+    }
+
+
+def _random_moments(plan: CampaignPlan, rig: Rig) -> list[float] | None:
+    """Spectral intensity of the buffeting of each run over the inertia, at its natural frequency, rad²/s³."""
+    from tunnel_sim.effects import effect_from  # only here: most plans have none
+
+    effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
+    if not any(effect.random == "broad_band" for effect in effects):
+        return None
+    found = []
+    for condition in plan.conditions:
+        scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
+        rate = sqrt(_decay(plan, condition, rig)[1])
+        found.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
+    return found
