@@ -25,6 +25,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
 UNDETERMINED_PLACE = "cannot be determined from these runs"
+WITHIN_THE_NOISE = "within the noise"
+"""What is left where it is not significant, in the words of the verdict."""
 CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: UNDETERMINED_PLACE}
 
 
