@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.decision import plain
 from diagnosis.policy import LISTED_PROBABILITY
+from diagnosis.printing import probability
 from identification.printing import coefficient_label
 from tunnel_lab.plotting.style import (
     COLOURS,
@@ -101,13 +102,11 @@ def candidates_figure(document: Document) -> Figure | None:
     values = [candidate["probability"] for candidate in shown]
     axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
     for index, value in enumerate(values):
-        axes.text(
-            value + 0.01, index, ("> 99.9 %" if value >= 0.9995 else f"{100.0 * value:.1f} %"), va="center"
-        )
+        axes.text(value + 0.01, index, probability(value), va="center")
     axes.set_yticks(range(len(shown)), names)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.12)
-    axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])
+    axes.set_xticks(np.linspace(0.0, 1.0, 6))
     axes.set_xlabel("probability")
     grid(axes, "x")
     return fig

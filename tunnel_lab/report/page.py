@@ -126,6 +126,7 @@ def render_report(
         "byline": (byline or Byline()),
         "answer": answer,
         "kind": kind,
+        "verdict": view.verdict_words(document),
         "summary": summary,
         "named": kind in ("open", "found"),
         "facts": view.facts(document),

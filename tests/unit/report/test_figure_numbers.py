@@ -13,7 +13,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from tests.unit.diagnosis_document import CONDITIONS, IDS, document
-from tests.unit.shown_numbers import assert_shows, numbers
+from tests.unit.shown_numbers import numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
@@ -46,11 +46,11 @@ def test_bars_of_the_answers(given: Document) -> None:
     words = [text for text in axes.texts if text.get_text()]
     assert [round(text.get_position()[1]) for text in words] == list(range(4))
     for text, candidate in zip(words, shown, strict=True):
-        assert_shows(text.get_text(), [100.0 * candidate["probability"]])
+        assert text.get_text() == f"{candidate['probability']:.2f}"
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == [c["effect"].replace("_", " ") for c in shown]
     ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
-    assert all(label.get_text() == f"{100 * tick:.0f}%" for tick, label in ticks)
+    assert all(float(label.get_text()) == pytest.approx(tick) for tick, label in ticks)
     colours = [bar.get_facecolor() for bar in axes.patches]
     assert colours[0] != colours[1]
     assert len(set(colours[1:])) == 1
@@ -69,7 +69,7 @@ def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
     fig = answer.candidates_figure(given)
     assert fig is not None
-    assert fig.axes[0].texts[0].get_text() == "> 99.9 %"
+    assert fig.axes[0].texts[0].get_text() == "> 0.99"
 
 
 def rms(excess: Any) -> Any:
