@@ -40,7 +40,7 @@ from tunnel_lab.report.drawing import (
     faded,
     misfit_scale,
 )
-from tunnel_lab.report.fit import fit_figure
+from tunnel_lab.report.fit import fit_figure, fit_sheets
 from tunnel_lab.report.waterfall import waterfall_figure
 from tunnel_sim.vocabulary.record import Array
 
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
 SHOWN = 8
 """Most answers drawn."""
+_LOW = 2.1  # inches: a map on the printed summary
 _LABEL = 24  # characters in a line of a label
 _LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
 _MOST_CURVES = len(COLOURS)
@@ -67,10 +68,7 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
     Returns:
         Figures by name, in the order of the report.
     """
-    figures: dict[str, Figure | None] = {}
-    if document.get("maps") and document["causes"]:
-        figures["place"] = where.place_figure(document)
-    figures["waterfall"] = waterfall_figure(document)
+    figures = _first_figures(document)
     if document.get("maps"):
         figures["fit"] = fit_figure(document)
         figures["where-runs"] = where.runs_figure(document)
@@ -84,6 +82,23 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
     figures["law"] = law_figure(document)
     figures["coefficients"] = coefficients_figure(document)
     return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def summary_figures(document: Document) -> dict[str, Figure]:
+    """The figures of the printed summary.
+
+    Returns:
+        Figures by name, with the fit over the data in several heights, of which the page shows one.
+    """
+    first = {name: fig for name, fig in _first_figures(document, _LOW).items() if fig is not None}
+    return first | fit_sheets(document)
+
+
+def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure | None]:
+    """Where the gap is, in a map of some height in inches, and how far it closes."""
+    located = document.get("maps") and document["causes"]
+    place = where.place_figure(document, height) if located else None
+    return {"place": place, "waterfall": waterfall_figure(document)}
 
 
 @styled
