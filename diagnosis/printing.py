@@ -30,7 +30,7 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         the coefficients, and the caveats.
     """
     return [
-        document["verdict"],
+        verdict_line(document),
         where_line(document),
         *rival_lines(document),
         candidates_table(document),
@@ -289,29 +289,45 @@ def closing_lines(document: Document) -> list[str]:
     return lines
 
 
+def verdict_line(document: Document) -> str:
+    """The verdict, in which no probability is rounded to 1."""
+    return str(document["verdict"]).replace("probability 1.00", f"probability {probability(1.0)}")
+
+
+def noise_powers(excess: float) -> str:
+    """What is left, as the verdict states it.
+
+    Args:
+        excess: in noise powers, a ratio.
+    """
+    return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
+
+
 def probability(value: float) -> str:
-    """A probability to three digits, never rounded to 0 or 1.
+    """A probability to two decimals, as in the verdict, never rounded to 0 or 1.
 
     Args:
         value: probability.
 
     Returns:
-        Text such as ``0.973`` or ``> 0.999``.
+        Text such as ``0.97`` or ``> 0.99``.
     """
-    if value > 0.9995:
-        return "> 0.999"
-    return f"{value:.3f}" if value >= 0.0005 else "< 0.001"
+    if value >= 0.995:
+        return "> 0.99"
+    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
 
 
 def share(value: float) -> str:
-    """A share in per cent, never rounded up to 100 %.
+    """A share in per cent, never rounded to 0 or 100 %.
 
     Args:
-        value: share, 0 to 1.
+        value: share, at most 1.
 
     Returns:
-        Text such as ``98.2 %``.
+        Text such as ``98.2 %`` or ``> 99.9 %``.
     """
-    if 0.9995 <= value < 1.0:
-        return "> 99.9 %"
+    if value > 0.9995:
+        return "> 99.9 %" if value < 1.0 else "100 %"
+    if 0.0 <= value < 0.0005:
+        return "< 0.1 %" if value > 0.0 else "0 %"
     return f"{100.0 * value:.1f} %"

@@ -223,8 +223,8 @@ class _Answer:
 def figures(document: dict[str, Any]) -> list[str]:
     """The report's figures of the summary, as elements of a page."""
     from tunnel_lab.report.drawing import inline_svg
-    from tunnel_lab.report.figures import waterfall_figure
     from tunnel_lab.report.page import DESCRIPTIONS
+    from tunnel_lab.report.waterfall import waterfall_figure
     from tunnel_lab.report.where import runs_figure
 
     drawn = {"waterfall": waterfall_figure(document)}

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from diagnosis.decision import plain
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import excess_std
-from identification.printing import coefficient_label, significant
+from diagnosis.printing import probability
+from identification.printing import coefficient_label
 from tunnel_lab.plotting.style import (
     COLOURS,
     INTERVAL,
@@ -42,7 +40,8 @@ from tunnel_lab.report.drawing import (
     faded,
     misfit_scale,
 )
-from tunnel_lab.report.fit import fit_figure
+from tunnel_lab.report.fit import fit_figure, fit_sheets
+from tunnel_lab.report.waterfall import waterfall_figure
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -51,15 +50,13 @@ if TYPE_CHECKING:
 
 SHOWN = 8
 """Most answers drawn."""
+_LOW = 2.1  # inches: a map on the printed summary
 _LABEL = 24  # characters in a line of a label
 _LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
 _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
 _AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the start [s]"}
-_STEP_LABEL = 20  # characters in a line of a label
-_ROOM = 1.5  # times the greatest value
-_LEAST_STEP_NOISE = 1e-3  # noise powers: where the document has no maps, and so no noise of an excess
 
 
 def diagnosis_figures(document: Document) -> dict[str, Figure]:
@@ -71,10 +68,7 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
     Returns:
         Figures by name, in the order of the report.
     """
-    figures: dict[str, Figure | None] = {}
-    if document.get("maps") and document["causes"]:
-        figures["place"] = where.place_figure(document)
-    figures["waterfall"] = waterfall_figure(document)
+    figures = _first_figures(document)
     if document.get("maps"):
         figures["fit"] = fit_figure(document)
         figures["where-runs"] = where.runs_figure(document)
@@ -88,6 +82,23 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
     figures["law"] = law_figure(document)
     figures["coefficients"] = coefficients_figure(document)
     return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+def summary_figures(document: Document) -> dict[str, Figure]:
+    """The figures of the printed summary.
+
+    Returns:
+        Figures by name, with the fit over the data in several heights, of which the page shows one.
+    """
+    first = {name: fig for name, fig in _first_figures(document, _LOW).items() if fig is not None}
+    return first | fit_sheets(document)
+
+
+def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure | None]:
+    """Where the gap is, in a map of some height in inches, and how far it closes."""
+    located = document.get("maps") and document["causes"]
+    place = where.place_figure(document, height) if located else None
+    return {"place": place, "waterfall": waterfall_figure(document)}
 
 
 @styled
@@ -106,13 +117,11 @@ def candidates_figure(document: Document) -> Figure | None:
     values = [candidate["probability"] for candidate in shown]
     axes.barh(range(len(shown)), values, color=[ACCENT, *[QUIET] * (len(shown) - 1)], height=0.6)
     for index, value in enumerate(values):
-        axes.text(
-            value + 0.01, index, ("> 99.9 %" if value >= 0.9995 else f"{100.0 * value:.1f} %"), va="center"
-        )
+        axes.text(value + 0.01, index, probability(value), va="center")
     axes.set_yticks(range(len(shown)), names)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.12)
-    axes.set_xticks(np.linspace(0.0, 1.0, 6), [f"{v:.0%}" for v in np.linspace(0.0, 1.0, 6)])
+    axes.set_xticks(np.linspace(0.0, 1.0, 6))
     axes.set_xlabel("probability")
     grid(axes, "x")
     return fig
@@ -284,69 +293,3 @@ def law_figure(document: Document) -> Figure | None:
     axes.set_ylabel(_AXES[curve["over"][1]])
     fig.colorbar(mesh, ax=axes, label=name)
     return fig
-
-
-@styled
-def waterfall_figure(document: Document) -> Figure | None:
-    """What is left of the gap as the causes are added one after another.
-
-    Returns:
-        A dot for the nominal gap, a bar for each cause from what was left before it to what it leaves, and a dot
-        for the rest, on a linear scale of the root mean square misfit. None where no cause is named.
-    """
-    steps = document.get("waterfall", [])
-    if len(steps) < 2:
-        return None
-    unit, size = misfit_scale(document)
-    noise = size(SIGMAS * (excess_std(document) or _LEAST_STEP_NOISE))
-    left = np.array([size(step["excess"]) for step in steps], np.float64)
-    without = {name: size(value) for name, value in document.get("without", {}).items()}
-    fig = figure(NARROW, 1.2 + 0.4 * (left.size + 1))
-    axes = fig.add_subplot()
-    axes.axvspan(0.0, noise, color=NOISE, linewidth=0, label="noise (3σ)")
-    greatest = max([*left.tolist(), *without.values()])
-    axes.set_xlim(0.0, _ROOM * greatest)  # room for the numbers
-    axes.set_xlabel(f"root mean square misfit [{unit}]")
-    _steps(axes, left, unit)
-    _alone(axes, document, without)
-    names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
-    axes.set_yticks(
-        range(left.size + 1), ["nominal model", *names, textwrap.fill(_rest_name(document), _STEP_LABEL)]
-    )
-    axes.invert_yaxis()
-    fig.legend(loc="outside upper left", ncols=2)
-    grid(axes, "x")
-    return fig
-
-
-def _steps(axes: Axes, left: Array, unit: str) -> None:
-    """What each cause closes (or opens) as a bar between two values; the first and the last value as dots."""
-    starts, ends = np.minimum(left[:-1], left[1:]), np.maximum(left[:-1], left[1:])
-    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(left)]
-    rows = np.arange(left.size + 1)
-    axes.barh(rows[1:-1], ends - starts, left=starts, color=colours, height=0.55)
-    for row, value, colour in ((0, left[0], BEFORE), (rows[-1], left[-1], ACCENT)):
-        axes.plot(value, row, "o", color=colour, ms=8, clip_on=False)
-    axes.vlines(left, rows[:-1], rows[1:], color=QUIET, linewidth=0.8)
-    texts = [
-        f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}" for value in left.tolist()
-    ]
-    words = [texts[0], *(f"leaves {text}" for text in texts[1:]), texts[-1]]
-    for row, (text, end) in enumerate(zip(words, [left[0], *ends, left[-1]], strict=True)):
-        axes.annotate(text, (float(end), row), (7, 0), textcoords="offset points", va="center")
-
-
-def _alone(axes: Axes, document: Document, without: Mapping[str, float]) -> None:
-    """Mark what is left without each cause alone, where there are several."""
-    rows = {step["effect"]: row for row, step in enumerate(document["waterfall"])}
-    if len(without) < 2:
-        return
-    places = [rows[name] for name in without]
-    axes.plot(list(without.values()), places, "o", color=INK, mfc=PAPER, ms=5, label="without it alone")
-
-
-def _rest_name(document: Document) -> str:
-    rest = document.get("rest") or {}
-    if not rest.get("significant"):
-        return "the rest: within the noise"
-    return "the rest: material" if rest.get("material") else "the rest: immaterial"

@@ -20,6 +20,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = 2  # runs in a figure
+_HEIGHT = 5.4  # inches
+_SHEETS = {
+    "fit": _HEIGHT, "fit-whole-2": 4.9, "fit-whole-3": 4.4, "fit-whole-4": 4.0,
+    "fit-near-1": 3.6, "fit-near-2": 3.2, "fit-near-3": 2.8, "fit-near-4": 2.5, "fit-near-5": 2.25,
+}  # fmt: skip
+"""Heights in inches; ``near`` leaves the whole record out."""
 _TIME = "time since the start of the record [s]"
 _MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
 
@@ -105,24 +111,38 @@ def fit_pages(document: Document, ids: Sequence[str] = ()) -> list[Figure]:
     return [_drawn(runs[first : first + _COLUMNS]) for first in range(0, len(runs), _COLUMNS)]
 
 
+def fit_sheets(document: Document) -> dict[str, Figure]:
+    """The fit over the data of the two runs with the largest gap, in the heights that a printed page may have left.
+
+    Returns:
+        Figures by name, the highest first; the lower ones show the cycles where the models differ most and not the
+        whole record. None without runs.
+    """
+    runs = fitted_runs(document)[:_COLUMNS]
+    sheets = _SHEETS.items() if runs else ()
+    return {name: _drawn(runs, height, whole="near" not in name) for name, height in sheets}
+
+
 @styled
-def _drawn(runs: Sequence[Curves]) -> Figure:
-    fig = figure(WIDTH, 5.4)
-    panels = fig.subplots(3, len(runs), squeeze=False, height_ratios=(0.7, 1.3, 0.9))
-    for (whole, near, left), run in zip(panels.T, runs, strict=True):
-        whole.plot(*with_breaks(run.time, run.reading), color=QUIET, linewidth=0.7)
-        whole.axvspan(*run.differ, color=MARK, alpha=0.4, linewidth=0)
-        whole.set_title(figure_text(run.label))
+def _drawn(runs: Sequence[Curves], height: float = _HEIGHT, *, whole: bool = True) -> Figure:
+    fig = figure(WIDTH, height)
+    ratios = (0.7, 1.3, 0.9) if whole else (1.3, 0.9)
+    panels = fig.subplots(len(ratios), len(runs), squeeze=False, height_ratios=ratios)
+    for (*above, near, left), run in zip(panels.T, runs, strict=True):
+        for axes in above:
+            axes.plot(*with_breaks(run.time, run.reading), color=QUIET, linewidth=0.7)
+            axes.axvspan(*run.differ, color=MARK, alpha=0.4, linewidth=0)
+        (*above, near)[0].set_title(figure_text(run.label))
         _curves(near, run, run.reading, run.reading - run.before, run.reading - run.after)
         near.tick_params(labelbottom=False)
         _curves(left, run, None, run.before, run.after)
         left.axhline(0.0, color=QUIET, linewidth=0.8, zorder=0)
         left.set_xlabel(_TIME)
-        for axes in (whole, near, left):
+        for axes in (*above, near, left):
             grid(axes)
-    for axes, name in zip(panels[:, 0], ("whole reading", "reading", "residual"), strict=True):
+    for axes, name in zip(panels[::-1, 0], ("residual", "reading", "whole reading"), strict=False):
         axes.set_ylabel(f"{name} [{runs[0].unit}]")
-    handles, labels = panels[1, 0].get_legend_handles_labels()
+    handles, labels = panels[-2, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside lower center", ncols=3)
     return fig
 

@@ -22,7 +22,7 @@ from diagnosis.printing import inclusion_line
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import advice, view
 from tunnel_lab.report.drawing import inline_svg, shown_text
-from tunnel_lab.report.figures import diagnosis_figures
+from tunnel_lab.report.figures import diagnosis_figures, summary_figures
 from tunnel_lab.report.fit import fit_charts, fit_figure
 from tunnel_lab.report.view import Document
 from tunnel_lab.report.where import Chart, charts
@@ -126,6 +126,7 @@ def render_report(
         "byline": (byline or Byline()),
         "answer": answer,
         "kind": kind,
+        "verdict": view.verdict_words(document),
         "summary": summary,
         "named": kind in ("open", "found"),
         "facts": view.facts(document),
@@ -133,6 +134,8 @@ def render_report(
         "coefficients": view.coefficient_rows(document),
         "next_steps": advice.next_steps(document),
     } | _detail(document, campaign)
+    if summary:
+        return _rendered("page.html.j2", context | _parts(summary_figures(document), {}, "summary"))
     drawn = diagnosis_figures(document)
     return _rendered("page.html.j2", context | _parts(drawn, fit_charts(document) | charts(document)))
 
@@ -189,23 +192,29 @@ def _resource(name: str) -> str:
     return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
 
 
-def _parts(drawn: Mapping[str, Figure], shown: dict[str, list[Chart]]) -> dict[str, Any]:
+def _parts(drawn: Mapping[str, Figure], shown: dict[str, list[Chart]], kind: str = "page") -> dict[str, Any]:
     """Figures, styles and scripts: text that is part of the page as it is."""
     from markupsafe import Markup
 
     figures = {
-        name: inline_svg(figure, name, DESCRIPTIONS[name])  # the SVG is already escaped
+        name: inline_svg(figure, name, _description(name))  # the SVG is already escaped
         for name, figure in drawn.items()
     }
     font = font_face(shown_text("".join(figures.values())))
+    sheets = ["vendor/uPlot.min.css", "style.css"] if kind == "page" else ["style.css", f"{kind}.css"]
     return {
         "figures": {name: Markup(svg) for name, svg in figures.items()},
-        "style": Markup("\n".join([font, _resource("vendor/uPlot.min.css"), _resource("style.css")])),
+        "style": Markup("\n".join([font, *map(_resource, sheets)])),
         "licence": Markup(_resource("vendor/uPlot-LICENSE.txt")),
         "library": Markup(_resource("vendor/uPlot.iife.min.js")),
-        "script": Markup(_resource("page.js")),
+        "script": Markup(_resource(f"{kind}.js")),
         "charts": shown,
     }
+
+
+def _description(name: str) -> str:
+    """The text alternative of a figure, or of one in another height, such as ``fit-low``."""
+    return DESCRIPTIONS[name] if name in DESCRIPTIONS else DESCRIPTIONS[name.partition("-")[0]]
 
 
 def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
 from diagnosis.decision import plain
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import held_out_excess, misfit_text
+from diagnosis.printing import misfit_text, noise_powers, probability, share, verdict_line
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -25,6 +25,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
 UNDETERMINED_PLACE = "cannot be determined from these runs"
+WITHIN_THE_NOISE = "within the noise"
+"""What is left where it is not significant, in the words of the verdict."""
 CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: UNDETERMINED_PLACE}
 
 
@@ -35,6 +37,8 @@ CHANNELS = {
     "sensor": "the reading",
     "calibration": "a stated value",
 }
+_POWER = re.compile(r"(?<=[\d)])e([+-]\d+)\b")
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _VISIBLE = 0.005  # of a damping ratio: a change that is said
 _VISIBLE_FREQUENCY = 5e-5  # as a fraction, likewise
 
@@ -75,37 +79,60 @@ def headline(document: Document) -> tuple[str, str]:
     return names, "found"
 
 
+def verdict_words(document: Document) -> str:
+    """The verdict, with minus signs and powers of ten."""
+    return typeset(verdict_line(document))
+
+
 def facts(document: Document) -> list[Fact]:
-    """The figures at the head of the page."""
+    """The figures at the head of the page, each in the form in which the verdict states it."""
     gap = document["gap"]
     decided = document.get("decided", True)
     added = "the causes" if decided else "the most probable answer"
-    listed = [misfit_fact(document, "Misfit of the nominal model", gap["excess_before"])]
+    before = misfit_fact(document, "Misfit of the nominal model", gap["excess_before"])
+    if not document["causes"]:
+        before = Fact(before.label, WITHIN_THE_NOISE, times_noise(gap["excess_before"]))
+    listed = [before]
     if document["causes"] and document["causes"] != ["unknown"]:
-        after = misfit_fact(document, f"With {added} added", gap["excess_after"])
-        if (document.get("rest") or {}).get("significant") is False:
-            left = f"{minus(held_out_excess(gap['excess_after']))} noise powers"
-            after = Fact(after.label, "within the noise", left)
+        after = misfit_fact(document, f"With {added} added", gap["excess_after"], left=True)
+        if _calm(document):
+            after = Fact(after.label, WITHIN_THE_NOISE, noise_powers(gap["excess_after"]))
         listed += [after, Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"])]
     if document["candidates"]:
         first = document["candidates"][0]
         whose = "answer" if decided else "most probable answer"
-        listed.append(Fact(f"Probability of the {whose}", percent(first["probability"])))
+        listed.append(Fact(f"Probability of the {whose}", probability(first["probability"])))
     return listed
 
 
-def misfit_fact(document: Document, label: str, value: float) -> Fact:
+def _calm(document: Document) -> bool:
+    """Whether what remains is stated to be within the noise."""
+    return (document.get("rest") or {}).get("significant") is False
+
+
+def misfit_fact(document: Document, label: str, value: float, *, left: bool = False) -> Fact:
     """A gap in the units that people use, and in noise powers beside them.
 
     Args:
         label: of the figure.
         value: the gap as an excess, in noise variances, a ratio.
+        left: whether it is what is left with the causes.
     """
     misfit = misfit_of(document)
-    powers = f"{minus(held_out_excess(value))} noise powers"
+    powers = typeset(noise_powers(value)) if left else times_noise(value)
     if misfit is None:
         return Fact(label, powers)
     return Fact(label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}")
+
+
+def times_noise(value: float) -> str:
+    """A gap against the noise, as the verdict states it.
+
+    Args:
+        value: the gap as an excess, in noise variances, a ratio.
+    """
+    text = significant(value, 4) if value >= 10.0 else f"{value:.{3 if abs(value) < 0.1 else 2}f}"
+    return f"{typeset(text)} times the noise power"
 
 
 def misfit_shown(document: Document, value: float) -> str:
@@ -115,7 +142,7 @@ def misfit_shown(document: Document, value: float) -> str:
         value: the gap as an excess, in noise variances, a ratio.
     """
     misfit = misfit_of(document)
-    return f"{minus(held_out_excess(value))} noise powers" if misfit is None else rms_shown(misfit, value)
+    return times_noise(value) if misfit is None else rms_shown(misfit, value)
 
 
 def windy(document: Document) -> bool:
@@ -152,9 +179,7 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
             if full.partition(".")[0] == name or len(names) == 1
         }
         old, new = steps.get(name, (None, None))
-        closes = (
-            "" if new is None else " to ".join(misfit_shown(document, step["excess"]) for step in (old, new))
-        )
+        closes = "" if new is None else f"{_left(document, old)} to {_left(document, new)}"
         found.append(
             {
                 "name": plain(name),
@@ -165,6 +190,12 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
             }
         )
     return found
+
+
+def _left(document: Document, step: Document) -> str:
+    """What a step of the waterfall leaves."""
+    last = step["effect"] == document["waterfall"][-1]["effect"]
+    return WITHIN_THE_NOISE if last and _calm(document) else misfit_shown(document, step["excess"])
 
 
 def size_words(document: Document, size: Document) -> str:
@@ -183,7 +214,8 @@ def size_words(document: Document, size: Document) -> str:
     if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
         said.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
     if abs(size["frequency_change"]) > _VISIBLE_FREQUENCY:
-        said.append(f"frequency {100.0 * size['frequency_change']:+.2g} %")
+        change = 100.0 * size["frequency_change"]
+        said.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
     reading = factor * size["reading_change"]
     if abs(size["zero_change"]) > 0.5 * size["reading_change"]:
         said.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
@@ -191,32 +223,29 @@ def size_words(document: Document, size: Document) -> str:
     held = angle * size["stands_rad"]
     stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
     amplitude = significant(angle * size["amplitude_rad"], 2)
-    return minus_inside(f"Over three cycles from {amplitude}°: {', '.join(said)}{stands}")
+    return typeset(f"Over three cycles from {amplitude}°: {', '.join(said)}{stands}")
 
 
 def _spaced(mark: str) -> str:
     return mark if mark == "°" else f" {mark}"
 
 
-def minus_inside(text: str) -> str:
-    """A text in which numbers have a minus sign in place of a leading hyphen."""
-    return re.sub(r"(?<![\w.])-(?=\d)", "−", text)
+def typeset(text: str) -> str:
+    """A text in which numbers have a minus sign in place of a leading hyphen, and powers of ten."""
+    text = re.sub(r"(?<![\w.])-(?=\d)", "−", text)
+    return _POWER.sub(lambda found: f" × 10{str(int(found[1])).translate(_RAISED)}", text)
 
 
 def percent(value: float) -> str:
-    """A share as a percentage.
+    """A share as a percentage, as the terminal prints it.
 
     Args:
-        value: 0 to 1, a fraction.
+        value: at most 1, a fraction.
 
     Returns:
         Text such as ``98.3 %``; shares close to 0 or 1 are given as bounds.
     """
-    if value > 0.9995:
-        return "> 99.9 %" if value < 1.0 else "100 %"
-    if value < 0.0005:
-        return "< 0.1 %" if value > 0.0 else "0 %"
-    return f"{100.0 * value:.1f} %"
+    return minus(share(value))
 
 
 def excess(value: float) -> str:
@@ -241,7 +270,7 @@ def candidate_rows(document: Document) -> list[dict[str, Any]]:
     return [
         {
             "name": plain(c["effect"]),
-            "probability": percent(c["probability"]),
+            "probability": probability(c["probability"]),
             "closed": "–" if c["effect"] in ("none", "unknown") else percent(c["closed"]),
             "excess": excess(c["excess_after"]),
             "parameters": [(plain(n).replace(".", ": "), estimate(v)) for n, v in c["parameters"].items()],
@@ -258,8 +287,11 @@ def others(document: Document) -> str:
     count = (
         "1 more answer has" if len(probabilities) == 1 else f"{len(probabilities)} more answers have together"
     )
-    each = "" if len(probabilities) == 1 else f", none of them more than {percent(max(probabilities))}"
-    return f"{count} a probability of {percent(sum(probabilities))}{each}. The JSON document lists all."
+    together, most = (
+        probability(value).replace("<", "less than") for value in (sum(probabilities), max(probabilities))
+    )
+    each = "" if len(probabilities) == 1 or most == together else f", none of them more than {most}"
+    return f"{count} a probability of {together}{each}. The JSON document lists all."
 
 
 def _listed(document: Document) -> int:
@@ -399,7 +431,7 @@ def step_rows(document: Document) -> list[dict[str, str]]:
 
 def _gap(document: Document, value: float | None) -> str:
     """A gap in words; empty for none."""
-    return "" if value is None else minus_inside(misfit_text(document, value))
+    return "" if value is None else typeset(misfit_text(document, value))
 
 
 def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:

@@ -35,14 +35,17 @@ _UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 Chart = dict[str, Any]
 _LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
 _ALL = "all runs together"
+PLACE_HEIGHT = 2.7
+"""Height of the map of where the gap is, inches."""
 
 
 @styled
-def place_figure(document: Document) -> Figure | None:
+def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | None:
     """Where the gap is: misfit by amplitude and by wind speed, or by amplitude and time where there is one speed.
 
     Args:
         document: a diagnosis with its maps.
+        height: of the figure, inches.
 
     Returns:
         A map small enough for a phone, in which cells within the noise stay empty; None for maps without it.
@@ -57,7 +60,7 @@ def place_figure(document: Document) -> Figure | None:
     columns = np.arange(len(speeds) + 1) - 0.5 if speeds else array(grid_of["time_edges_s"])
     cells = np.vectorize(size, otypes=[float])(np.nan_to_num(excess))
     shown = np.where(excess > SIGMAS * std, cells, np.nan)
-    fig = figure(NARROW, 2.7)
+    fig = figure(NARROW, height)
     axes = fig.add_subplot()
     top = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
     mesh = axes.pcolormesh(columns, rows, shown, cmap=faded(BEFORE), vmin=0.0, vmax=top)

@@ -66,6 +66,20 @@ def test_the_gap_is_said_in_degrees_and_of_the_swing_first():
     assert "(0.810 °/s root mean square, 2.8 % of the swing" in said("coulomb_friction", size=rates)
 
 
+@pytest.mark.parametrize("excess", [0.15, 2.754, 9.994, 22.401, 1.91e6])
+def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
+    found = replace(gap(True), excess_before=excess, closed=0.9998)
+    given = document()
+    given["gap"] |= found.to_json_dict()
+    given["verdict"] = said("quadratic_damping", size=found)
+    words = view.verdict_words(given)
+    before, _, closed, probability = view.facts(given | {"candidates": [{"probability": 0.9}]})
+    assert f"{before.value} root mean square, " in words
+    assert before.note.rpartition("; ")[2] in words
+    assert f"{closed.value} of the gap closes" in words
+    assert f"(probability {probability.value})" in words
+
+
 @pytest.mark.parametrize("held_out", [(True, True), (True, False), (False, False)])
 def test_the_totals_are_those_of_the_waterfall(held_out):
     steps = Waterfall((Step(None, 4.0), Step("coulomb_friction", 0.2)), {}, "on stretches of time")

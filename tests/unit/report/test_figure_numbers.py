@@ -13,12 +13,12 @@ import pytest
 from matplotlib.colors import to_hex
 
 from tests.unit.diagnosis_document import CONDITIONS, IDS, document
-from tests.unit.shown_numbers import assert_shows, numbers
+from tests.unit.shown_numbers import numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
 from tunnel_lab.report.drawing import run_label
-from tunnel_lab.report.figures import backbone_figure, law_figure, waterfall_figure
+from tunnel_lab.report.figures import backbone_figure, law_figure
 
 Document = dict[str, Any]
 
@@ -46,11 +46,11 @@ def test_bars_of_the_answers(given: Document) -> None:
     words = [text for text in axes.texts if text.get_text()]
     assert [round(text.get_position()[1]) for text in words] == list(range(4))
     for text, candidate in zip(words, shown, strict=True):
-        assert_shows(text.get_text(), [100.0 * candidate["probability"]])
+        assert text.get_text() == f"{candidate['probability']:.2f}"
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == [c["effect"].replace("_", " ") for c in shown]
     ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
-    assert all(label.get_text() == f"{100 * tick:.0f}%" for tick, label in ticks)
+    assert all(float(label.get_text()) == pytest.approx(tick) for tick, label in ticks)
     colours = [bar.get_facecolor() for bar in axes.patches]
     assert colours[0] != colours[1]
     assert len(set(colours[1:])) == 1
@@ -69,56 +69,12 @@ def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
     fig = answer.candidates_figure(given)
     assert fig is not None
-    assert fig.axes[0].texts[0].get_text() == "> 99.9 %"
+    assert fig.axes[0].texts[0].get_text() == "> 0.99"
 
 
 def rms(excess: Any) -> Any:
     """A misfit in degrees, by the noise of the document."""
     return np.degrees(4.5e-4) * np.sqrt(np.maximum(excess, 0.0))
-
-
-def test_bars_of_the_waterfall(given: Document) -> None:
-    fig = waterfall_figure(given)
-    assert fig is not None
-    (axes,) = fig.axes
-    noise = 3.0 * np.sqrt(np.mean(np.square([0.021, 0.019, 0.017])) / 3.0)
-    shade, *bars = axes.patches
-    ends = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in bars]
-    box = shade.get_extents().transformed(axes.transData.inverted())
-    assert (box.x0, box.x1) == pytest.approx((0.0, rms(noise)))
-    assert np.array(ends) == pytest.approx(rms([(2.75, 28.45), (0.1345, 2.75)]))
-    assert [bar.get_y() + 0.5 * bar.get_height() for bar in bars] == pytest.approx([1.0, 2.0])
-    texts = [text.get_text() for text in axes.texts]
-    for text, value in zip(texts, rms([28.45, 2.75, 0.1345, 0.1345]), strict=True):
-        assert_shows(text, [value])
-        assert text.endswith("°")
-    labels = [label.get_text() for label in axes.get_yticklabels()]
-    assert labels == ["nominal model", "+ quadratic damping", "+ coulomb friction", "the rest: immaterial"]
-    first, last, alone = axes.lines
-    (at,), (end,), beside = (np.array(curve(line)) for line in (first, last, alone))
-    assert (*at, *end) == pytest.approx((rms(28.45), 0, rms(0.1345), 3))
-    assert beside == pytest.approx(np.array([(rms(21.85), 1), (rms(2.85), 2)]))
-    assert axes.get_xscale() == "linear"
-    assert axes.get_xlabel() == "root mean square misfit [°]"
-
-
-def test_a_waterfall_below_the_noise_ends_at_zero(given: Document) -> None:
-    given["waterfall"][-1]["excess"] = -0.002
-    given["maps"], given["rest"] = None, given["rest"] | {"significant": False}
-    fig = waterfall_figure(given)
-    assert fig is not None
-    ((least, _),) = curve(fig.axes[0].lines[1])
-    assert least == 0.0
-    assert fig.axes[0].get_yticklabels()[-1].get_text().replace("\n", " ") == "the rest: within the noise"
-    assert waterfall_figure(given | {"waterfall": given["waterfall"][:1]}) is None
-
-
-def test_a_document_without_misfit_is_drawn_in_the_noise(given: Document) -> None:
-    del given["gap"]["misfit"]
-    fig = waterfall_figure(given)
-    assert fig is not None
-    assert curve(fig.axes[0].lines[0]) == [(pytest.approx(np.sqrt(28.45)), 0)]
-    assert fig.axes[0].get_xlabel() == "root mean square misfit [noise std]"
 
 
 def test_points_of_the_closure(given: Document) -> None:

@@ -170,7 +170,8 @@ def test_figures_have_words_for_those_who_cannot_see_them(page):
 
 def test_numbers_are_those_of_the_document(page):
     text = Page(page).text.replace("\u00a0", " ")
-    assert "91.2 %" in text
+    assert "0.91" in text
+    assert "91.2" not in text
     assert "98.7 %" in text
     assert "0.003000 ± 0.000010 N m" in text
     assert "−0.310 ± 0.020" in text

@@ -315,20 +315,59 @@ def pages(printed: bytes) -> int:
     return len(re.findall(rb"/Type\s*/Page\b", printed))
 
 
-def test_the_summary_is_one_printed_page(browser: Any, tmp_path: Path) -> None:
-    given = document()
-    given["verdict"] = "The gap comes from quadratic damping. " * 8
+PT = 96.0 / 72.0  # px
+LETTER = 279.4 - 24.0  # mm: what is printed of the less high paper
+SUMMARY = """() => {
+  const seen = (what) => [...document.querySelectorAll(what)].filter((one) => one.checkVisibility());
+  const shown = seen("#fit figure");
+  const svg = shown[0].querySelector("svg");
+  const texts = seen("main text, main p, main td, main li");
+  const size = (one) => one instanceof SVGElement
+    ? Math.hypot(one.getScreenCTM().a, one.getScreenCTM().b) * parseFloat(getComputedStyle(one).fontSize)
+    : parseFloat(getComputedStyle(one).fontSize) * (parseFloat(document.body.style.zoom) || 1);
+  return {
+    drawings: shown.length,
+    width: svg.getBoundingClientRect().width / document.body.getBoundingClientRect().width,
+    least: Math.min(...[...svg.querySelectorAll("text")].map(size)),
+    smallest: Math.min(...texts.map(size)),
+    bottom: svg.getBoundingClientRect().bottom,
+  };
+}"""
+
+
+def crowded(given: Any) -> None:
+    given["verdict"] = "The gap comes from quadratic damping. " * 12
     given["waterfall"] += [{"effect": name, "excess": 0.1} for name in ("free_play", "mains_hum")]
-    (tmp_path / "summary.html").write_text(render_report(given, campaign(), summary=True))
+
+
+def without_causes(given: Any) -> None:
+    given["causes"], given["waterfall"], given["without"] = [], given["waterfall"][:1], {}
+    given["candidates"][0]["effect"] = "none"
+
+
+@pytest.mark.parametrize("change", [lambda _: None, crowded, without_causes])
+def test_the_summary_is_one_printed_page_well_filled(browser: Any, tmp_path: Path, change: Any) -> None:
+    change(given := document())
+    (tmp_path / "summary.html").write_text(render_report(given, campaign(), summary=True), encoding="utf-8")
     page = browser.new_page()
     page.goto((tmp_path / "summary.html").as_uri())
     margins = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
     for paper in ("A4", "Letter"):
         assert pages(page.pdf(format=paper, margin=margins)) == 1
     page.emulate_media(media="print")
-    assert page.is_visible('figure[data-figure="fit"] svg')
+    found = page.evaluate(SUMMARY)
+    assert found["drawings"] == 1
+    assert found["width"] > 0.98
+    assert found["least"] > 7.0 * PT
+    assert found["smallest"] > 5.5 * PT
+    assert 0.9 * LETTER < found["bottom"] * 25.4 / 96.0 < LETTER
     assert not page.is_visible("text=Tests, noise and provenance")
     page.close()
+
+
+@pytest.mark.usefixtures("browser")
+def test_the_summary_is_written_as_a_file_of_one_page(tmp_path: Path) -> None:
+    crowded(given := document())
     path = write_summary(given, campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1

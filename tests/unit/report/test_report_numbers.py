@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis import printing
+from diagnosis.answer import what_remains
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import advice, render_report, view
 from tunnel_lab.report import page as report_page
+from tunnel_lab.report.figures import candidates_figure
 
 Document = dict[str, Any]
 NOT_READ = ("svg", "style", "script", "caption", "figcaption", "footer")
@@ -84,12 +87,54 @@ def test_the_head_of_the_page(given: Document) -> None:
     assert before.note.startswith("root mean square; ")
     assert_shows(share.value, [100 * gap["closed"]])
     assert share.note == gap["closed_on"]
-    assert_shows(probability.value, [91.23])
+    assert probability.value == "0.91"
     calm = view.facts(given | {"rest": given["rest"] | {"significant": False}})[1]
     assert calm.value == "within the noise"
     assert_shows(calm.note, [gap["excess_after"]])
+    none = view.facts(given | {"causes": []})[0]
+    assert none.value == "within the noise"
+    assert_shows(none.note, [gap["excess_before"]])
     del (old := copy.deepcopy(given))["gap"]["misfit"]
     assert_shows(view.facts(old)[0].value, [gap["excess_before"]])
+
+
+@pytest.mark.parametrize("value", [-0.002, 0.0004, 0.00496, 0.1478, 9.456, 38.123, 974.88])
+def test_what_is_left_is_stated_as_in_the_verdict(given: Document, value: float) -> None:
+    given = copy.deepcopy(given)
+    assert printing.noise_powers(value) == what_remains._noise_powers(value)
+    given["gap"]["excess_after"] = value
+    assert view.facts(given)[1].note.endswith(f"; {printing.noise_powers(value)}")
+    calm = given | {"rest": given["rest"] | {"significant": False}}
+    assert view.facts(calm)[1].note == printing.noise_powers(value)
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.9634, "0.96"), (0.9951, "> 0.99"), (0.5712, "0.57")])
+def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
+    given: Document, value: float, text: str
+) -> None:
+    given = copy.deepcopy(given)
+    given["candidates"][0]["probability"] = value
+    given["verdict"] = f"The gap comes from quadratic damping (probability {value:.2f}): the damping."
+    assert f"(probability {text}):" in view.verdict_words(given)
+    assert printing.diagnosis_parts(given)[0] == view.verdict_words(given)
+    assert view.facts(given)[-1].value == text
+    assert view.candidate_rows(given)[0]["probability"] == text
+    assert printing.candidates_table(given).rows[0][1] == text
+    drawn = candidates_figure(given)
+    assert drawn is not None
+    assert drawn.axes[0].texts[0].get_text() == text
+
+
+def test_what_a_last_cause_leaves_within_the_noise_is_not_a_number(given: Document) -> None:
+    steps = [given["waterfall"][0], given["waterfall"][1] | {"excess": -0.001}]
+    calm = {"waterfall": steps, "rest": given["rest"] | {"significant": False}}
+    (cause,) = view.causes_found(given | calm)
+    assert cause["closes"].endswith("° to within the noise")
+
+
+def test_minus_signs_and_powers_of_ten() -> None:
+    assert view.typeset("-0.5 to (1.2 ± 0.3)e-05, 1.910e+06") == "−0.5 to (1.2 ± 0.3) × 10⁻⁵, 1.910 × 10⁶"
+    assert view.typeset("wind-on run r-1e5 at 3e") == "wind-on run r-1e5 at 3e"
 
 
 def both(excess: float) -> list[float]:
@@ -163,8 +208,9 @@ def test_narrow_lines(given: Document, page: Sections) -> None:
 def test_answers_weighed(given: Document, page: Sections) -> None:
     for candidate in given["candidates"][:4]:
         text = page.row("which", candidate["effect"].replace("_", " "))
-        wanted = [100 * candidate["probability"]]
-        wanted += [] if candidate["effect"] in ("none", "unknown") else [100 * candidate["closed"]]
+        assert printing.probability(candidate["probability"]) in text
+        text = text.replace(printing.probability(candidate["probability"]), "", 1)
+        wanted = [] if candidate["effect"] in ("none", "unknown") else [100 * candidate["closed"]]
         wanted += [candidate["excess_after"]]
         for estimate in candidate["parameters"].values():
             wanted += [estimate["value"], estimate["std"]] if estimate["std"] else [estimate["value"]]
@@ -172,7 +218,7 @@ def test_answers_weighed(given: Document, page: Sections) -> None:
 
 
 def test_effects_among_the_causes(page: Sections) -> None:
-    assert "with probability: quadratic damping 0.932, coulomb friction 0.065." in page.texts["which"]
+    assert "with probability: quadratic damping 0.93, coulomb friction 0.07." in page.texts["which"]
     assert "free play" not in page.texts["which"]
 
 
@@ -197,9 +243,11 @@ def test_a_p_value_is_never_zero(given: Document) -> None:
 
 def test_answers_left_out_are_counted(given: Document) -> None:
     assert len(view.candidate_rows(given)) == 4
-    assert_shows(
-        view.others(given), [3, 0.1, 0.1]
-    )  # 0.4 + 0.05 + 0.03 thousandths, none above 0.4 thousandths
+    # 0.4 + 0.05 + 0.03 thousandths
+    assert view.others(given).startswith("3 more answers have together a probability of less than 0.01. The")
+    likely = given["candidates"][:4] + [{**given["candidates"][6], "probability": 0.0095}] * 5
+    words = "5 more answers have together a probability of 0.05, none of them more than 0.01. The"
+    assert view.others(given | {"candidates": likely}).startswith(words)
     few = given | {"candidates": given["candidates"][:2]}
     assert view.others(few) == ""
     assert len(view.candidate_rows(few)) == 2
