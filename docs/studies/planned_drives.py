@@ -25,7 +25,7 @@ from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
-SEEDS = 16
+SEEDS = 40
 LIMITS = Limits(moment=0.5, angle=radians(20.0))  # the angle is that of the releases
 MISTAKE = 0.02  # relative, of the prior guess of Izz
 INTENSITY = 0.02  # of the buffeting: the example of the vocabulary
