@@ -126,8 +126,7 @@ def run(
         tables.say(line)
     tables.show_tables(parameter_table(kinds[0]))
     tables.say(ABOUT_DIRECTIONS)
-    if not kinds[0].driven:  # the runs of a plan are free decays
-        tables.say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kinds[0])}")
+    tables.say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kinds[0])}")
 
 
 def _check(name: str) -> None:
