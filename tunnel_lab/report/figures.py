@@ -227,8 +227,8 @@ def backbone_figure(document: Document) -> Figure:
         _curve(damping, amplitude, change, change_std, style, labels[curve["id"]])
         shifts.append((shift, shift_std))
         changes.append((change, change_std))
-    for axes, name in ((frequency, "frequency against the nominal model [%]"),
-                       (damping, "damping ratio minus the nominal one [10⁻³]")):  # fmt: skip
+    for axes, name in ((frequency, "frequency minus\nthe nominal one [%]"),
+                       (damping, "damping ratio minus\nthe nominal one [10⁻³]")):  # fmt: skip
         axes.axhline(0.0, color=INK, linewidth=1.0)
         axes.set_xlabel("amplitude [rad]")
         axes.set_ylabel(name)

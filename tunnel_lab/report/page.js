@@ -17,12 +17,19 @@
     made.textContent = words;
     return parent.appendChild(made);
   };
-  const number = (value) => (value == null ? "–" : String(Number(value.toPrecision(4))).replace("-", "−"));
+  const raised = (power) => [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
+  const power = (value) => value.toExponential().replace(/e\+(\d+)$/, (_, p) => `·10${raised(p)}`).replace(/^1·/, "");
+  const number = (value) => {
+    if (value == null) return "–";
+    const shown = Number(value.toPrecision(4)), large = Math.abs(shown) >= 1e6;
+    return (large ? shown.toExponential().replace(/e\+(\d+)$/, (_, p) => ` × 10${raised(p)}`) : String(shown)).replace("-", "−");
+  };
 
   const axis = (given, extra = {}) => ({
     label: given.label, labelSize: 18, font: "11px system-ui", labelFont: "12px system-ui",
     stroke: colour("ink"), grid: { stroke: colour("line"), width: 1, ...(given.log && { filter: decades }) },
-    ticks: { stroke: colour("line"), size: 5 }, ...extra,
+    ticks: { stroke: colour("line"), size: 5 },
+    ...(given.log && { values: (_, splits) => splits.map((v) => (v == null ? null : v >= 1e4 ? power(v) : String(v))) }), ...extra,
   });
   // A logarithmic axis ends where its data end, not at a decade, and has grid lines at decades only.
   const scale = (given) => (given.log

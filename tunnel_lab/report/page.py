@@ -234,6 +234,7 @@ def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:
         "rivals": [plain(name) for name in document["ambiguous_with"]],
         "next_run": advice.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
+        "windy": any(run.wind_on for run in campaign.runs),
         "budget": budget(document),
         "tests": test_rows(document),
         "false_alarms": false_alarms(document),

@@ -290,7 +290,8 @@ def others(document: Document) -> str:
     together, most = (
         probability(value).replace("<", "less than") for value in (sum(probabilities), max(probabilities))
     )
-    each = "" if len(probabilities) == 1 or most == together else f", none of them more than {most}"
+    least = f", each of them {most}" if most.startswith("less") else f", none of them more than {most}"
+    each = "" if len(probabilities) == 1 or most == together else least
     return f"{count} a probability of {together}{each}. The JSON document lists all."
 
 

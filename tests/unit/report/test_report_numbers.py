@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from typing import Any
 
@@ -183,6 +184,16 @@ def test_without_wind_no_wind_is_mentioned(given: Document) -> None:
         texts += [label for label, _ in view.place_rows(one)]
         assert ("wind" in " ".join(texts).replace(advice.run_words(given["next_run"]), "")) == said
         assert ("Condition" in texts) == said
+
+
+def test_a_campaign_without_wind_has_no_column_for_it(given: Document) -> None:
+    windy = campaign()
+    runs = tuple(replace(run, wind_speed=0.0) for run in windy.runs)
+    for data, said in ((windy, True), (replace(windy, runs=runs), False)):
+        page = render_report(given | {"maps": None}, data)
+        assert ("Wind [m/s]" in page) == said
+        assert ("wind speed, air density" in page) == said
+        assert "Sample rate [Hz]" in page
 
 
 def test_the_head_is_on_the_page(given: Document, page: Sections) -> None:
