@@ -78,22 +78,38 @@ def _common(held: Iterable[tuple[set[str], float]]) -> dict[str, float]:
     return {name: value for name, value in ranked if value >= CREDIBLE}
 
 
+def probability(value: float) -> str:
+    """A probability to two decimals, never rounded to 0 or 1.
+
+    Args:
+        value: probability.
+
+    Returns:
+        Text such as ``0.97`` or ``> 0.99``.
+    """
+    if value >= 0.995:
+        return "> 0.99"
+    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+
+
 def undecided_words(found: Decision) -> str:
     """What an undecided diagnosis does say, in sentences."""
-    answers = [f"{_words(effect)} ({value:.2f})" for effect, value in found.credible[:_SHOWN]]
+    answers = [f"{_words(effect)} ({probability(value)})" for effect, value in found.credible[:_SHOWN]]
     if len(found.credible) > _SHOWN:
         answers.append(f"{len(found.credible) - _SHOWN} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
-    together = sum(value for _, value in found.credible)
-    return f"{_common_words(found)} The answer is one of these, with probability {together:.2f} together: {most}."
+    together = probability(sum(value for _, value in found.credible))
+    return f"{_common_words(found)} The answer is one of these, with probability {together} together: {most}."
 
 
 def _common_words(found: Decision) -> str:
     channels = {kind.name: kind.channel for kind in known_effects()}
     named = {channels[name] for name in found.effects}
-    parts = [f"contain {plain(name)} ({value:.2f})" for name, value in found.effects.items()]
+    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in found.effects.items()]
     parts += [
-        f"act on the {name} ({value:.2f})" for name, value in found.channels.items() if name not in named
+        f"act on the {name} ({probability(value)})"
+        for name, value in found.channels.items()
+        if name not in named
     ]
     if not parts:
         return "The likely answers have no effect and no channel in common."

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagnosis.closure import closable_table, closable_words, misfit_of, of_swing, rms_shown
-from diagnosis.decision import plain
+from diagnosis.decision import plain, probability
 from diagnosis.patched import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
@@ -30,7 +30,7 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         the coefficients, and the caveats.
     """
     return [
-        verdict_line(document),
+        str(document["verdict"]),
         where_line(document),
         *rival_lines(document),
         candidates_table(document),
@@ -289,11 +289,6 @@ def closing_lines(document: Document) -> list[str]:
     return lines
 
 
-def verdict_line(document: Document) -> str:
-    """The verdict, in which no probability is rounded to 1."""
-    return str(document["verdict"]).replace("probability 1.00", f"probability {probability(1.0)}")
-
-
 def noise_powers(excess: float) -> str:
     """What is left, as the verdict states it.
 
@@ -301,20 +296,6 @@ def noise_powers(excess: float) -> str:
         excess: in noise powers, a ratio.
     """
     return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
-
-
-def probability(value: float) -> str:
-    """A probability to two decimals, as in the verdict, never rounded to 0 or 1.
-
-    Args:
-        value: probability.
-
-    Returns:
-        Text such as ``0.97`` or ``> 0.99``.
-    """
-    if value >= 0.995:
-        return "> 0.99"
-    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
 
 
 def share(value: float) -> str:

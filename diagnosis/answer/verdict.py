@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.closure import Remainder, of_swing, rms_shown
-from diagnosis.decision import Decision, plain, undecided_words
+from diagnosis.decision import Decision, plain, probability, undecided_words
 from diagnosis.noise.sensor_noise import Noise
 from diagnosis.policy import FEW_RUNS, NOISE_CONTRADICTED
 from diagnosis.printing import share
@@ -145,7 +145,7 @@ def verdict(
     )
     return (
         f"The gap ({size}) comes {'only in part ' if rest.material else ''}"
-        f"from {plain(*causes)} (probability {found.credible[0][1]:.2f}): "
+        f"from {plain(*causes)} (probability {probability(found.credible[0][1])}): "
         f"{sources}. With {'them' if several else 'it'} added, {share(gap.closed)} of the gap "
         f"closes {gap.closed_on}. {rest.words}"
     )

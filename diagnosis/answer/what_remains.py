@@ -12,9 +12,10 @@ from diagnosis.closure import Move, Remainder
 from diagnosis.noise.gap import gap_test
 from diagnosis.noise.rounding import rounding_errors
 from diagnosis.policy import GAP_FALSE_ALARM_RATE, MATERIAL_SHARE
+from diagnosis.printing import noise_powers
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.investigate import Study
-from identification.printing import COEFFICIENTS, significant, unit_mark
+from identification.printing import COEFFICIENTS, unit_mark
 
 Estimates = Mapping[str, ParameterEstimate]
 
@@ -76,7 +77,7 @@ def _words(
     """What remains, in a sentence or two."""
     if not study.causes:
         return "No gap: nothing remains beyond the noise."
-    left = f"what remains ({_noise_powers(excess)})" if study.named else "it"
+    left = f"what remains ({noise_powers(excess)})" if study.named else "it"
     if not significant:
         return f"Explained; {left} is within the noise."
     if material:
@@ -96,10 +97,6 @@ def _words(
 
 def _each(names: list[str], size: Callable[[str], str]) -> str:
     return " and ".join(f"{COEFFICIENTS.get(name, name)} by {size(name)}" for name in names)
-
-
-def _noise_powers(excess: float) -> str:
-    return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
 
 
 def _sized(size: float, given: ParameterEstimate) -> str:

@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Any
 
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.decision import plain
+from diagnosis.decision import plain, probability
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import misfit_text, noise_powers, probability, share, verdict_line
+from diagnosis.printing import misfit_text, noise_powers, share
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -81,7 +81,7 @@ def headline(document: Document) -> tuple[str, str]:
 
 def verdict_words(document: Document) -> str:
     """The verdict, with minus signs and powers of ten."""
-    return typeset(verdict_line(document))
+    return typeset(str(document["verdict"]))
 
 
 def facts(document: Document) -> list[Fact]:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from diagnosis import printing
-from diagnosis.answer import what_remains
+from diagnosis.decision import decision, undecided_words
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import advice, render_report, view
@@ -100,9 +100,8 @@ def test_the_head_of_the_page(given: Document) -> None:
 
 
 @pytest.mark.parametrize("value", [-0.002, 0.0004, 0.00496, 0.1478, 9.456, 38.123, 974.88])
-def test_what_is_left_is_stated_as_in_the_verdict(given: Document, value: float) -> None:
+def test_what_is_left_has_one_form_in_a_tile(given: Document, value: float) -> None:
     given = copy.deepcopy(given)
-    assert printing.noise_powers(value) == what_remains._noise_powers(value)
     given["gap"]["excess_after"] = value
     assert view.facts(given)[1].note.endswith(f"; {printing.noise_powers(value)}")
     calm = given | {"rest": given["rest"] | {"significant": False}}
@@ -115,9 +114,9 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
 ) -> None:
     given = copy.deepcopy(given)
     given["candidates"][0]["probability"] = value
-    given["verdict"] = f"The gap comes from quadratic damping (probability {value:.2f}): the damping."
-    assert f"(probability {text}):" in view.verdict_words(given)
-    assert printing.diagnosis_parts(given)[0] == view.verdict_words(given)
+    assert undecided_words(decision([("quadratic_damping", value)])).endswith(
+        f": quadratic damping ({text})."
+    )
     assert view.facts(given)[-1].value == text
     assert view.candidate_rows(given)[0]["probability"] == text
     assert printing.candidates_table(given).rows[0][1] == text
