@@ -255,10 +255,10 @@ _NO_ZERO = (
 
 #: Said where effects are compared in this way.
 BY_MOMENT = (
-    "Nothing holds the body, and small errors of the moment add up in its angle: it departs from every model. "
-    "Effects are therefore compared by the moment that they leave, which counts as random noise beside the answer: "
-    "its parameters, the coefficients and the shares in the table of answers are so found; all other sizes and "
-    "shares are those of the angle."
+    "Nothing holds the body, so that small errors of the moment add up in its angle, which departs from every "
+    "model. Effects are therefore compared by the moment that they leave. It counts as random noise beside the "
+    "answer: parameters, coefficients and the shares in the table of answers come from fits with that noise. All "
+    "other sizes and shares are those of the angle."
 )
 
 #: Said of a campaign with driven runs.

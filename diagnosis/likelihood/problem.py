@@ -101,7 +101,7 @@ class Problem:
         """
         if self.data.own_zeros:
             return float(own[2])
-        if self.data.unrestrained:  # it cannot be told from the initial angle
+        if self.data.unrestrained:  # it cannot be separated from the initial angle
             return 0.0
         return self._held["zero"] if "zero" in self._held else float(common[self.nominal_names.index("zero")])
 
@@ -119,7 +119,7 @@ class Problem:
 
     def _is_free(self, kind: type[Effect], info: ParameterInfo) -> bool:
         freed = not info.form or kind.name in self.free_forms
-        # in small swings the rest angle of a body that nothing else holds is one with a constant moment
+        # in small swings the rest angle of a body that nothing else holds acts as a constant moment does
         loose = self.data.normalised or (self.data.unrestrained and self.data.swing < SWING)
         return freed and not (info.beside_spring and loose)
 

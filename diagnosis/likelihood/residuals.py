@@ -112,9 +112,7 @@ def by_moment(fit: Fit) -> Data:
         likeliest, least = run, np.inf
         for power in _POWERS:
             average = _moving_average(shape, power)
-            variance = (
-                shape[2] / average[2]
-            )  # of the innovations: the last coefficients of both products are equal
+            variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
             cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
             if cost < least:
                 noise = run.noise_variance * variance
@@ -124,9 +122,8 @@ def by_moment(fit: Fit) -> Data:
     return fit.problem.data.with_runs(tuple(runs))
 
 
-_POWERS = np.geomspace(
-    1e-12, 1e12, 49
-)  # of a random moment's response per interval, in variances of white noise
+# Of a random moment's response per interval, in variances of white noise.
+_POWERS = np.geomspace(1e-12, 1e12, 49)
 
 
 def _moving_average(shape: Array, power: float) -> Array:
