@@ -3,7 +3,8 @@
 A run has the decay rate a, the stiffness k and the gain g of its input per unit inertia, (a, k, g) = L φ, and three
 numbers of its own: initial angle, initial rate, and the sensor's zero. A body without a spring has k = 0, and its
 zero cannot be separated from its initial angle. Its third number is instead a constant acceleration, by a moment
-beside the input. With a spring, such a moment shifts the zero. The method is that of Levenberg and Marquardt, with exact derivatives.
+beside the input. With a spring, such a moment shifts the zero. The method is that of Levenberg and Marquardt, with
+exact derivatives.
 """
 
 from __future__ import annotations

@@ -172,7 +172,7 @@ STAGES = (
     Stage("identify", "Identify", "identify.build"),
     Stage("diagnose", "Diagnose", "diagnosis.build_diagnose"),
     Stage("next-run", "Next run", "diagnosis.build_next_run"),
-    Stage("report", "Report", "diagnosis.build_report"),
+    Stage("report", "Report", "report.build_report"),
 )
 
 
