@@ -136,7 +136,7 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
     assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
     sized = replace(
         assembled,
-        remarks=(*chosen.remarks, *noise_remarks(study.noise, study.trend)),
+        remarks=(*chosen.remarks, *noise_remarks(study.noise, study.trend, study.test)),
         sizes=cause_sizes(study) if study.named else (),
         data=chosen.examined,
     )

@@ -48,7 +48,7 @@ def localise(study: Study) -> tuple[Where, Maps]:
     answer = None if study.chosen is study.nominal else study.chosen
     maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
     if not study.causes:
-        return Where(None, None, words=nowhere(found)), maps
+        return Where(None, None, words=nowhere(found, within_step=study.test.within_step)), maps
     where = Where(
         channel=place.channel.value,
         condition=place.condition.value,

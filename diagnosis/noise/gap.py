@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import bdtrc, chdtrc, stdtr
@@ -112,12 +112,14 @@ class GapTest:
         tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
             above the stated level.
+        within_step: whether a gap is no larger than the error of the readings' lattice, and is therefore none.
     """
 
     detected: bool
     p_value: float
     tests: Mapping[str, float]
     noisy: bool
+    within_step: bool = False
 
 
 def gap_test(
@@ -184,6 +186,10 @@ def gap_or_colour(
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
         Nor is it believed where there would be more noise than is stated, or where it alone would close the gap of
         a wandering zero. Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
+
+        A gap within the error of the readings' lattice is not detected: the levels of a camera or an encoder may be
+        off by half a step, which follows the motion as long as no noise of half a step blurs it (Widrow and
+        Kollár, Quantization Noise, 2008).
     """
     errors = rounding_errors(nominal, noise.white(step), step)
     allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
@@ -202,7 +208,15 @@ def gap_or_colour(
         believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None
         if believed if test.detected else not zero_wanders(nominal, found):
             return white, coloured, test
+    if plain.detected and not coarse_step and _within_step(nominal, noise, step):
+        plain = replace(plain, detected=False, p_value=1.0, within_step=True)
     return nominal, noise, plain
+
+
+def _within_step(nominal: Fit, noise: Noise, step: float) -> bool:
+    """Whether the gap has no more power than readings that are off by up to half a step, with less noise."""
+    own = [run.noise_variance for run in nominal.problem.data.runs]
+    return max(noise.white(step).values()) < 0.5 * step and nominal.excess * max(own) < step**2 / 12.0
 
 
 def _colour_sources(nominal: Fit) -> Iterator[Fit]:
@@ -317,17 +331,21 @@ def _under_rounding(fit: Fit, errors: Sequence[Array]) -> tuple[Array, Array]:
     return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
 
 
-def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:
+def noise_remarks(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Remark, ...]:
     """What the user should know of the noise.
 
     Args:
         trend: of the noise with the motion.
 
     Returns:
-        Remarks where the noise is coloured, and where the sampling is too slow to compare it with the motion.
+        Remarks where the noise is coloured, where the sampling is too slow to compare it with the motion, and where
+        the readings' steps may be all of the gap.
     """
     found = []
     runs = tuple(noise.variance)
+    if test.within_step:
+        what = "the model departs from the readings by less than their own steps do, whose error may follow the motion"
+        found.append(Remark(Outcome.NOTED, runs, what, "read the angle more finely to see smaller gaps"))
     if noise.colour is not None:
         span = noise.colour.frequency[-1] / noise.colour.frequency[0]
         ratio = np.exp(np.ptp(noise.colour.level))

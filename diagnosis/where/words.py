@@ -32,14 +32,19 @@ _CHANNEL_WORDS = {
 _CONDITION_WORDS = {"always": "with the wind on and off", "wind_on": "only with the wind on"}
 
 
-def nowhere(found: Survey) -> str:
-    """The sentence for a campaign without a gap."""
+def nowhere(found: Survey, *, within_step: bool) -> str:
+    """The sentence for a campaign without a gap.
+
+    Args:
+        within_step: whether the residual is not white, but within the steps of the readings.
+    """
     count = len(found.maps.runs)
     least = min(1.0, count * min(run.p_value for run in found.maps.runs))
-    return (
-        f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is consistent with the noise "
-        f"(p {p_text(least)} for the run that differs most, corrected for their number)."
-    )
+    runs = f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is"
+    chance = f"p {p_text(least)} for the run that differs most, corrected for their number"
+    if within_step:
+        return f"{runs} not white noise ({chance}), but within the steps of the readings."
+    return f"{runs} consistent with the noise ({chance})."
 
 
 def describe(

@@ -46,6 +46,19 @@ def test_a_motion_that_the_model_misses_is_a_gap_beside_the_rounding(rate, step)
     assert judged(with_records(decays(rate, None), stiffening))[2].detected
 
 
+@pytest.mark.parametrize(("share", "gap"), [(0.75, False), (3.0, True)])
+def test_a_gap_is_larger_than_the_error_of_the_steps(share, gap):
+    """The levels of a camera are off by a share of a step, from its middle to its edge, whatever the motion."""
+    step = 0.2 * DEGREE
+
+    def bowed(_time, yaw):
+        return step * np.round(yaw / step + 0.5 * share * np.cos(2.0 * np.pi * yaw / np.abs(yaw).max()))
+
+    fit, _, found = judged(with_records(decays(30.0, None, noise=0.1 * step, duration=30.0), bowed))
+    assert fit.excess > 0.1
+    assert (found.detected, found.within_step) == (gap, not gap)
+
+
 def test_noise_that_blurs_the_steps_needs_no_allowance():
     data = decays(500.0, 4e-4, noise=4e-4)
     noise = campaign_noise(data)
