@@ -1,8 +1,4 @@
-"""What a user states about files, and the conditions of runs that files, names and tables state.
-
-The recipe keeps what a user states. Conditions come from a table, from the names of files, from the files
-themselves, or are stated for all.
-"""
+"""What a user states about files, and the conditions of runs: from tables, names of files, or the files."""
 
 from __future__ import annotations
 
@@ -98,12 +94,7 @@ class ImportChoices(StrictModel):
     conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
 
     def stretch_of(self, file: str, run: str) -> Stretch:
-        """What is stated about where a run lies and rests.
-
-        Args:
-            file: the name of the file.
-            run: the name of the run.
-        """
+        """What is stated about where a run lies in its file and rests."""
         found = (one for one in self.stretches if (one.file, one.run) == (file, run))
         # A file may have a name that no recipe can hold: nothing is stated about it.
         return next(found, Stretch.model_construct(file=file, run=run))
@@ -126,28 +117,14 @@ class Recipe(StrictModel):
 
 
 def read_recipe(path: Path) -> ImportChoices:
-    """The choices of an earlier import.
-
-    Args:
-        path: its ``import.toml``, or the campaign's folder that holds it.
-
-    Raises:
-        TunnelError: no such file, or not a recipe.
-    """
+    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder that holds it."""
     path = path / IMPORT_RECIPE if path.is_dir() else path
     missing = f"an import writes {IMPORT_RECIPE} into its campaign; name that file"
     return read_document(Recipe, path, missing=missing).choices
 
 
 def parse_setting(text: str, where: str) -> Conditions:
-    """Conditions from ``key=value``, separated by commas.
-
-    Args:
-        text: such as ``wind_speed=12.5, air_density=1.2``.
-
-    Raises:
-        TunnelError: not of that form, an unknown key, or a value out of range.
-    """
+    """Conditions from ``key=value``, separated by commas, such as ``wind_speed=12.5, air_density=1.2``."""
     values: dict[str, float] = {}
     for part in text.split(","):
         key, _, value = part.partition("=")
@@ -190,13 +167,7 @@ _EVEN = 1e-9  # of a value: a column that varies less is constant
 
 
 def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
-    """The condition or size that a column or a number states, a key of `Conditions`.
-
-    Args:
-        name: as `split_unit` gives it.
-        unit: of it.
-        alone: whether it is a single number, for which "speed" is the wind's.
-    """
+    """The condition or size, a key of `Conditions`, that a column states, or a number ``alone``."""
     if name in RIG_KEYS and unit == "":
         return name
     name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
@@ -214,15 +185,7 @@ def in_si(key: str, unit: str) -> float | None:
 
 
 def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
-    """Conditions of the runs and sizes of the rig that a file states beside its columns.
-
-    Args:
-        facts: numbers by name.
-        said: a remark is added on each.
-
-    Returns:
-        By key of `Conditions`, in its units.
-    """
+    """Conditions and sizes, by key of `Conditions` and in its units, that numbers of a file state; each is said."""
     found = {}
     for heading, value in facts.items():
         name, unit = split_unit(heading)
@@ -237,11 +200,6 @@ def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
 
 def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
     """The condition of a run that a column states, in the unit of `Conditions`.
-
-    Args:
-        key: of `Conditions`.
-        rows: those of the run, shape (n,).
-        said: a remark is added where it varies, or its unit is not known.
 
     Returns:
         The median; zero for a wind speed that lies about zero; None where the column says nothing.
@@ -267,20 +225,12 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
 
 def _no_unit(heading: str, key: str) -> str:
     kind = ", ".join(UNITS[_KINDS[key]])
-    return (
-        f"'{one_line(heading, 60)}' is left out: its unit is not one of {kind}; --set {key}=NUMBER states it"
-    )
+    left = f"'{one_line(heading, 60)}' is left out"
+    return f"{left}: its unit is not one of {kind}; --set {key}=NUMBER states it"
 
 
 def name_pattern(text: str) -> re.Pattern[str]:
-    """The pattern of file names as a regular expression.
-
-    Args:
-        text: such as ``S{spring}_V{wind_speed}_*``; ``*`` stands for anything, ``{}`` for a number.
-
-    Raises:
-        TunnelError: an unknown name in braces.
-    """
+    """The regular expression of a pattern such as ``S{spring}_V{wind_speed}_*``; ``*`` stands for anything."""
     parts = re.split(r"(\{\w*\}|\*)", text)
     expression = ""
     for part in parts:
@@ -302,14 +252,7 @@ def name_pattern(text: str) -> re.Pattern[str]:
 
 
 def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
-    """Conditions in the name of a file.
-
-    Args:
-        pattern: of `name_pattern`; None: the name says nothing.
-
-    Raises:
-        TunnelError: when the name is not of that pattern.
-    """
+    """Conditions in the name of a file, which must match the pattern where there is one."""
     if pattern is None:
         return {}
     found = pattern.match(path.name)
@@ -327,9 +270,6 @@ class ConditionTable:
 
     Args:
         path: a text file with a column ``file`` or ``run``, and columns named as in ``campaign.toml``.
-
-    Raises:
-        TunnelError: not such a table, a name that occurs twice, or a value out of range.
     """
 
     def __init__(self, path: Path) -> None:
@@ -339,9 +279,9 @@ class ConditionTable:
         self._key = next((i for i, name in enumerate(keys) if name in ("file", "run", "id")), None)
         used = {name: i for i, name in enumerate(keys) if name in RUN_KEYS}
         if self._key is None or not used:
+            wanted = "file or run" if self._key is None else "of conditions"
             raise TunnelError(
-                f"no column {'file or run' if self._key is None else 'of conditions'} "
-                f"(columns found: {one_line(', '.join(names), 80)})",
+                f"no column {wanted} (columns found: {one_line(', '.join(names), 80)})",
                 where=shown(path),
                 remedy=f"name the columns file (or run) and {', '.join(RUN_KEYS)}",
             )
@@ -353,17 +293,21 @@ class ConditionTable:
                 raise TunnelError(
                     f"'{one_line(name)}' occurs twice", where=shown(path), remedy="leave one out"
                 )
-            self._rows[name.lower()] = _numbers({key: row[i] for key, i in used.items()}, name, path)
+            values = {}
+            for key, text in ((key, row[i]) for key, i in used.items() if row[i].strip()):
+                try:
+                    values[key] = float(text.replace(",", "."))
+                except ValueError:
+                    raise TunnelError(
+                        f"{key} = '{one_line(text, 30)}' is not a number",
+                        where=f"{shown(path)}, '{one_line(name)}'",
+                        remedy="give a number in SI units",
+                    ) from None
+            validate(Conditions, values, path)
+            self._rows[name.lower()] = values
 
     def of(self, path: Path, run: str) -> dict[str, float]:
-        """Conditions of a run.
-
-        Args:
-            path: the file that holds it.
-
-        Raises:
-            TunnelError: when no row names the file or the run.
-        """
+        """Conditions of a run, by its name or that of the file that holds it."""
         for name in (run, path.name, path.stem):
             if name.lower() in self._rows:
                 return self._rows[name.lower()]
@@ -372,21 +316,3 @@ class ConditionTable:
             where=shown(self.path),
             remedy="add a row with that run or file",
         )
-
-
-def _numbers(cells: Mapping[str, str], name: str, path: Path) -> dict[str, float]:
-    where = f"{shown(path)}, '{one_line(name)}'"
-    values = {}
-    for key, text in cells.items():
-        if not text.strip():
-            continue
-        try:
-            values[key] = float(text.replace(",", "."))
-        except ValueError:
-            raise TunnelError(
-                f"{key} = '{one_line(text, 30)}' is not a number",
-                where=where,
-                remedy="give a number in SI units",
-            ) from None
-    validate(Conditions, values, path)
-    return values

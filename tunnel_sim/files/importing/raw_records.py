@@ -37,15 +37,8 @@ class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
-        id: of its runs, without their number.
-        source: the file.
-        column: the reading's column.
         cleaned: times and readings.
         quantity: what the readings are.
-        unit: that the readings had in the file.
-        stated: conditions and sizes in the file, beside its columns.
-        named: conditions in the name of the file.
-        said: how it was read, and what was changed.
         columns: of conditions, by key, with the rows of the record.
         clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
         whole: whether the file itself says that it is one run.
@@ -99,102 +92,69 @@ def raw_records(
     *,
     several: bool,
 ) -> list[RawRecord]:
-    """The records of a file.
-
-    Args:
-        source: the file.
-        calibration: of a voltage.
-        named: conditions in the file's name.
-        several: whether ids must name the file, because there are others.
-
-    Raises:
-        TunnelError: when columns or units must be stated, or a record has fewer than two samples.
-    """
+    """The records of a file; ``several``: ids must name the file, because there are others."""
     # A short table beside longer ones holds conditions or sizes.
     long = [table for table in source.tables if table.channels[0].values.size >= _LEAST_ROWS]
-    tables = long or source.tables
-    return [
-        raw for table in tables for raw in _raws(source, table, choices, calibration, named, several=several)
-    ]
-
-
-def _raws(
-    source: Source,
-    table: Table,
-    choices: ImportChoices,
-    calibration: Calibration | None,
-    named: dict[str, float],
-    *,
-    several: bool,
-) -> list[RawRecord]:
-    """The records of a table."""
-    where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
     found = []
-    for pair in find_pairs(table, choices, where):
-        said = [*pair.said]
-        time = _times(pair, table, choices, said, where)
-        values = without_overflow(pair.reading.values, said)
-        reading = Channel(pair.reading.name, values, pair.reading.unit)
-        readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
-        kept = _within(time, choices, said)
-        driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
-        time, readings = time[kept], readings[kept]
-        conditions = _condition_columns(table, pair, kept, said)
-        names = [source.path.stem if several or not (table.part or pair.run) else "", table.part, pair.run]
-        name = one_line("-".join(part for part in names if part))
-        stated = from_facts(table.facts, said)
-        said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
-        starts = [0, *restarts(time), time.size]
-        if len(starts) > 2:
-            said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
-        for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
-            clean = cleaned(time[a:b], readings[a:b])
-            label = name if len(starts) == 2 else f"{name}-{place}"
-            if clean.time_s.size < 2:
-                raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
-            given = None if driven is None else _input(driven, kept, time, readings, (a, b), clean, where)
-            columns = {key: replace(c, values=c.values[a:b]) for key, c in conditions.items()}
-            found.append(
-                RawRecord(
-                    label,
-                    source.path,
-                    pair.reading.name,
-                    clean,
-                    quantity,
-                    unit,
-                    stated,
-                    named,
-                    (*said, *clean.said),
-                    columns,
-                    time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
-                    table.named and len(starts) == 2,
-                    given,
-                    {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))},
+    for table in long or source.tables:
+        where = shown(source.path) + (f", {one_line(table.part)}" if table.part else "")
+        facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
+        for pair in find_pairs(table, choices, where):
+            said = [*pair.said]
+            time = _times(pair, table, choices, said, where)
+            values = without_overflow(pair.reading.values, said)
+            reading = Channel(pair.reading.name, values, pair.reading.unit)
+            readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
+            kept = _within(time, choices, said)
+            driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
+            time, readings = time[kept], readings[kept]
+            conditions = _condition_columns(table, pair, kept, said)
+            names = [
+                source.path.stem if several or not (table.part or pair.run) else "",
+                table.part,
+                pair.run,
+            ]
+            name = one_line("-".join(part for part in names if part))
+            stated = from_facts(table.facts, said)
+            said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
+            starts = [0, *restarts(time), time.size]
+            if len(starts) > 2:
+                said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
+            for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
+                clean = cleaned(time[a:b], readings[a:b])
+                if clean.time_s.size < 2:
+                    raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
+                given = None
+                if driven is not None:
+                    values = at_times(driven[1][kept][a:b], time[a:b], readings[a:b], clean.time_s)
+                    missing = int(np.count_nonzero(~np.isfinite(values)))
+                    if missing:
+                        raise TunnelError(
+                            f"the input {driven[0]} has no number at {missing} of {values.size} samples",
+                            where=where,
+                            remedy="give one value for each sample of the reading, on the same clock, "
+                            "or --input none",
+                        )
+                    given = driven[0], values
+                found.append(
+                    RawRecord(
+                        id=name if len(starts) == 2 else f"{name}-{place}",
+                        source=source.path,
+                        column=pair.reading.name,
+                        cleaned=clean,
+                        quantity=quantity,
+                        unit=unit,
+                        stated=stated,
+                        named=named,
+                        said=(*said, *clean.said),
+                        columns={key: replace(c, values=c.values[a:b]) for key, c in conditions.items()},
+                        clock=time[a:b] - np.nanmin(np.where(np.isfinite(readings[a:b]), time[a:b], np.nan)),
+                        whole=table.named and len(starts) == 2,
+                        input=given,
+                        input_facts=facts,
+                    )
                 )
-            )
     return found
-
-
-def _input(
-    driven: tuple[InputColumn, Array],
-    kept: NDArray[np.bool_],
-    time: Array,
-    readings: Array,
-    ends: tuple[int, int],
-    clean: Cleaned,
-    where: str,
-) -> tuple[InputColumn, Array]:
-    """The input at the times of a cleaned record."""
-    part = slice(*ends)
-    values = at_times(driven[1][kept][part], time[part], readings[part], clean.time_s)
-    missing = int(np.count_nonzero(~np.isfinite(values)))
-    if missing:
-        raise TunnelError(
-            f"the input {driven[0]} has no number at {missing} of {values.size} samples",
-            where=where,
-            remedy="give one value for each sample of the reading, on the same clock, or --input none",
-        )
-    return driven[0], values
 
 
 def _times(pair: ColumnPair, table: Table, choices: ImportChoices, said: list[str], where: str) -> Array:

@@ -1,8 +1,7 @@
 """From a file to its tables: its reader is chosen, and runs in a process with limits.
 
-A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process serves
-one file after another. It is ended when it exceeds a limit, and another one takes its place. Tables come back as
-JSON and raw numbers. `tunnel_sim.vocabulary.limits` holds the limits.
+A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process
+serves one file after another; where it exceeds a limit another one takes its place.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ import numpy as np
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
 from tunnel_sim.files.importing.text import TEXT, read_text_tables
-from tunnel_sim.files.readers import Reader, load_reader, reader_place
+from tunnel_sim.files.readers import load_reader, reader_place
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -39,24 +38,14 @@ _SERVE = (
     "from tunnel_sim.files.importing.source import serve; serve()"
 )
 _LATEST = 3.0  # times the allowed time
-_OUT_OF_TIME = -getattr(
-    signal, "SIGXCPU", math.inf
-)  # exit status of a process that Linux or macOS ended for it
+_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)  # exit status where Linux or macOS ended it for its time
 _DAMAGED = "export it again, or as text"
 _lock = threading.Lock()
 _kept: list[_Server] = []
 
 
 def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
-    """The tables of a file, read in a process with limits.
-
-    Args:
-        reader: where the `Reader` of the format is, ``module:name``.
-        content: of the file.
-
-    Raises:
-        TunnelError: as the reader, or when a limit is exceeded or the process dies.
-    """
+    """The tables of a file by the reader at ``module:name``, read in a process with limits."""
     with _lock:
         if _kept and not _kept[0].usable():
             _kept.pop().end()
@@ -140,7 +129,12 @@ class _Server:
             self._process.wait()
         if "error" in answer:
             raise TunnelError(answer["error"], where=where, remedy=answer["remedy"])
-        return _unpacked(answer["tables"], arrays)
+        values = (np.frombuffer(array) for array in arrays)
+        tables = []
+        for table in answer["tables"]:
+            channels = tuple(Channel(name, next(values), unit) for name, unit in table["channels"])
+            tables.append(Table(**table | {"channels": channels, "said": tuple(table["said"])}))
+        return tables
 
 
 def serve() -> None:
@@ -157,7 +151,16 @@ def serve() -> None:
             _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
             try:
                 tables = pkgutil.resolve_name(request["reader"]).read_tables(content.pop(), request["where"])
-                _send(answers, *_packed(tables))
+                columns = [
+                    np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels
+                ]
+                described = [
+                    {field.name: getattr(table, field.name) for field in fields(Table)}
+                    | {"channels": [(c.name, c.unit) for c in table.channels]}
+                    for table in tables
+                ]
+                head = {"tables": described, "sizes": [c.nbytes for c in columns]}
+                _send(answers, head, [c.data for c in columns])
             except TunnelError as error:
                 _send(answers, {"error": error.what, "remedy": error.remedy, "sizes": []}, [])
             except MemoryError:
@@ -186,7 +189,7 @@ def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memory
 
 
 def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
-    """What `_send` has sent.
+    """What `_send` has sent; EOFError where the other process has ended.
 
     Raises:
         EOFError: the other process has ended.
@@ -199,32 +202,6 @@ def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
     if [len(part) for part in parts] != head["sizes"]:
         raise EOFError
     return head, parts
-
-
-def _packed(tables: Sequence[Table]) -> tuple[dict[str, Any], list[memoryview]]:
-    """Tables as JSON, and the values of their columns."""
-    columns = [np.ascontiguousarray(c.values, dtype=np.float64) for table in tables for c in table.channels]
-    described = [
-        {field.name: getattr(table, field.name) for field in fields(Table)}
-        | {"channels": [(c.name, c.unit) for c in table.channels]}
-        for table in tables
-    ]
-    return {"tables": described, "sizes": [c.nbytes for c in columns]}, [c.data for c in columns]
-
-
-def _unpacked(described: Sequence[dict[str, Any]], arrays: Sequence[bytes]) -> list[Table]:
-    """The tables that `_packed` has described."""
-    values = (np.frombuffer(array) for array in arrays)
-    return [
-        Table(
-            **table
-            | {
-                "channels": tuple(Channel(name, next(values), unit) for name, unit in table["channels"]),
-                "said": tuple(table["said"]),
-            }
-        )
-        for table in described
-    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,14 +234,7 @@ _BEGINNINGS = {
 
 
 def read_source(path: Path, choices: ImportChoices) -> Source:
-    """Read a file of any known format.
-
-    Returns:
-        Its tables. Nothing is known yet about the meaning of their columns.
-
-    Raises:
-        TunnelError: no such file, too large, or not of the format that its name says.
-    """
+    """Read a file of any known format; the meaning of its columns is not known yet."""
     where = shown(path)
     ending = path.suffix.lower()
     reader, place = load_reader(ending), reader_place(ending)
@@ -273,7 +243,14 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
     content = read_regular(path, reader.limit)
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
-    _check_beginning(content, reader, where)
+    if not reader.magic or not content.startswith(reader.magic):
+        really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
+        if really is not None or reader.magic:
+            raise TunnelError(
+                f"is not {reader.kind}" + (f": it begins like {really}" if really else ""),
+                where=where,
+                remedy="give the file the ending of its format, or export it again",
+            )
     known: dict[str, str] = {}
     if place is None:
         tables, known = read_text_tables(content, where, choices)
@@ -301,16 +278,3 @@ def _computable(table: Table) -> Table:
             channel = replace(channel, values=np.where(wild, np.nan, channel.values))
         channels.append(channel)
     return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
-
-
-def _check_beginning(content: bytes, reader: Reader, where: str) -> None:
-    if reader.magic and content.startswith(reader.magic):
-        return
-    really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
-    if really is not None or reader.magic:
-        remedy = "give the file the ending of its format, or export it again"
-        raise TunnelError(
-            f"is not {reader.kind}" + (f": it begins like {really}" if really else ""),
-            where=where,
-            remedy=remedy,
-        )

@@ -85,14 +85,9 @@ def kind_of(unit: str) -> str:
 
 
 def split_unit(heading: str) -> tuple[str, str]:
-    """A heading as name and unit.
+    """A heading such as ``Angle (deg) Run #1``, ``yaw_rad`` or ``t / s`` as name and unit.
 
-    Args:
-        heading: such as ``Angle (deg) Run #1``, ``yaw_rad`` or ``t / s``.
-
-    Returns:
-        The name without its unit, and the unit: one of `UNITS`, the text in brackets where it is another one, or
-        an empty text.
+    The unit is one of `UNITS`, the text in brackets where it is another one, or an empty text.
     """
     heading = " ".join(heading.split())
     if "/" in heading and known_unit(heading):  # a unit alone, such as "m/s"
@@ -146,7 +141,6 @@ class Table:
     """Columns of the same length.
 
     Args:
-        channels: the columns that hold numbers, in their order.
         part: sheet, group, structure or run in the file; empty where the file holds one table.
         facts: single numbers beside the columns, by name.
         said: how the table was read, and what was left out.
@@ -200,15 +194,9 @@ def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
 
 
 def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequence[str]) -> list[Table]:
-    """A table as one for each run.
+    """A table as one for each run that a column names; as it is where the column cannot name runs.
 
-    Args:
-        column: that names the runs.
-        starts: the first row of each stretch of rows of one name, but for the first.
-        names: of these stretches; the rows of an empty one belong to no run.
-
-    Returns:
-        In their order; the table as it is where the column cannot name runs, because it is no such column.
+    The rows of a stretch without a name belong to no run.
     """
     runs = [name for name in names if name]
     rows = table.channels[0].values.size if table.channels else 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,11 +46,7 @@ _LONG_UNIT = 8  # characters: a longer text is a name
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
-    """Whether a text is a number.
-
-    Args:
-        decimal: the decimal sign.
-    """
+    """Whether a text is a number."""
     return _NUMBER[decimal].fullmatch(text) is not None
 
 
@@ -65,9 +61,7 @@ class Layout:
 
     Args:
         first: index of the first row of numbers.
-        names: of the columns, without units.
         units: of the columns, as `split_unit` gives them.
-        headed: whether the names are those of the file.
         facts: numbers that the lines above the table state, by name, in SI units where their unit is known.
     """
 
@@ -80,36 +74,45 @@ class Layout:
     @property
     def runs(self) -> int | None:
         """Index of the column that says to which run a row belongs."""
-        found = (
-            i
-            for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
-            if names_runs(name) and not unit
-        )
-        return next(found, None)
+        columns = enumerate(zip(self.names, self.units, strict=True))
+        return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
 
 
 def find_layout(
     rows: Sequence[Sequence[str]], lines: Sequence[str], decimal: str, width: int
 ) -> Layout | None:
-    """Find names, units and the first row of numbers.
+    """Names, units and the first row of numbers of a sheet; None where no row holds numbers.
 
     Args:
-        rows: the first rows of the sheet, split into cells.
         lines: the same rows as they are, for numbers stated in them.
         decimal: the decimal sign.
         width: number of columns (a count).
-
-    Returns:
-        The layout; None where no row holds numbers.
     """
-    first = _first_row(rows, decimal, width)
+    tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
+    numeric = [
+        column
+        for column in range(width)
+        if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
+    ]
+
+    def is_data(row: Sequence[str]) -> bool:
+        cells = [row[column] if column < len(row) else "" for column in numeric]
+        filled = sum(is_number(cell, decimal) for cell in cells)
+        return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
+
+    first = next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
     if first is None:
         return None
-    above = [
-        (index, cells)
-        for index, row in enumerate(rows[:first])
-        if (cells := _heading(row, width, lambda text: is_number(text, decimal))) is not None
-    ]
+    above = []  # the rows that may name every column
+    for index, row in enumerate(rows[:first]):
+        cells = [cell.strip().strip('"').strip() for cell in row]
+        if cells:
+            cells[0] = cells[0].lstrip("#%!*/;").strip()
+        while len(cells) > width and not cells[-1]:
+            cells.pop()
+        texts = [cell for cell in cells if cell and not is_number(cell, decimal)]
+        if len(cells) <= width and 2 * len(texts) >= width and (width <= 1 or len(texts) > 1):
+            above.append((index, cells + [""] * (width - len(cells))))
     units: list[str] = [""] * width
     if len(above) > 1 and _are_units(above[-1][1]):
         units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
@@ -125,38 +128,6 @@ def find_layout(
         bool(names),
         _facts(lines[: above[-1][0] if above else first]),
     )
-
-
-def _first_row(rows: Sequence[Sequence[str]], decimal: str, width: int) -> int | None:
-    """The first row from which on the columns of numbers hold numbers."""
-    tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
-    numeric = [
-        column
-        for column in range(width)
-        if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
-    ]
-    if not numeric:
-        return None
-
-    def is_data(row: Sequence[str]) -> bool:
-        cells = [row[column] if column < len(row) else "" for column in numeric]
-        filled = sum(is_number(cell, decimal) for cell in cells)
-        return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
-
-    return next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
-
-
-def _heading(row: Sequence[str], width: int, number: Callable[[str], bool]) -> list[str] | None:
-    """The cells of a row that may name every column; None where it may not."""
-    cells = [cell.strip().strip('"').strip() for cell in row]
-    if cells:
-        cells[0] = cells[0].lstrip("#%!*/;").strip()
-    while len(cells) > width and not cells[-1]:
-        cells.pop()
-    texts = [cell for cell in cells if cell and not number(cell)]
-    if len(cells) > width or 2 * len(texts) < width or (width > 1 and len(texts) < 2):
-        return None
-    return cells + [""] * (width - len(cells))
 
 
 def _are_units(cells: Sequence[str]) -> bool:
@@ -222,23 +193,24 @@ def read_text_tables(
 ) -> tuple[list[Table], dict[str, str]]:
     """The table of a text file; and how it was read, for the recipe."""
     content, encoding = _as_utf8(content, where)
-    head, body = _samples(content)
-    dialect = find_dialect(body, choices)
+    head = content[:_HEAD].decode(errors="replace").splitlines()
+    if len(content) > _HEAD:
+        head.pop()
+    head = head[:_HEAD_LINES]
+    half = len(content) // 2
+    middle = content[half : half + _MIDDLE].decode(errors="replace").splitlines()[1:-1]
+    body = middle if len(middle) >= len(head) // 2 else head[len(head) // 2 :] or head
+    dialect = find_dialect([line for line in body if line.strip() and line[0] not in "#%"], choices)
     if dialect is None:
-        raise TunnelError(
-            "no columns of numbers", where=where, remedy="give --delimiter and --decimal, or name a table"
-        )
+        remedy = "give --delimiter and --decimal, or name a table"
+        raise TunnelError("no columns of numbers", where=where, remedy=remedy)
     check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-    check_count(
-        content.count(b"\n"), limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out"
-    )
+    lines = content.count(b"\n")
+    check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
     layout = find_layout([dialect.split(line) for line in head], head, dialect.decimal, dialect.width)
     if layout is None:
-        raise TunnelError(
-            f"no numbers in the first {len(head)} lines",
-            where=where,
-            remedy="remove the lines above the table",
-        )
+        what = f"no numbers in the first {len(head)} lines"
+        raise TunnelError(what, where=where, remedy="remove the lines above the table")
     heading = "names in the line above the numbers" if layout.headed else "no names of columns"
     said = (
         f"text ({encoding}), {dialect.width} columns separated by {_SAID[dialect.delimiter]}, decimal "
@@ -252,12 +224,7 @@ def read_text_tables(
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
-    """The dialect in which most cells of some lines are numbers; of several, the one with most columns.
-
-    Args:
-        body: lines of the table.
-        choices: delimiter and decimal sign where they are stated.
-    """
+    """The dialect in which most cells of some lines are numbers; of several, the one with most columns."""
     delimiters = _NAMES.values() if choices.delimiter is None else (_NAMES[choices.delimiter],)
     decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
     best, score = None, (0.2, 0)
@@ -297,18 +264,6 @@ def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
     return (content if b"\n" in content else content.replace(b"\r", b"\n")), encoding
 
 
-def _samples(content: bytes) -> tuple[list[str], list[str]]:
-    """The first lines, and lines of the table's body."""
-    head = content[:_HEAD].decode(errors="replace").splitlines()
-    if len(content) > _HEAD:
-        head.pop()
-    head = head[:_HEAD_LINES]
-    half = len(content) // 2
-    middle = content[half : half + _MIDDLE].decode(errors="replace").splitlines()[1:-1]
-    body = middle if len(middle) >= len(head) // 2 else head[len(head) // 2 :] or head
-    return head, [line for line in body if line.strip() and line[0] not in "#%"]
-
-
 def _tables(content: bytes, dialect: Dialect, layout: Layout, where: str, said: str) -> list[Table]:
     """The columns of numbers, run by run where a column names the runs, with remarks on what is not a number."""
     if dialect.delimiter == " ":
@@ -346,17 +301,9 @@ def _tables(content: bytes, dialect: Dialect, layout: Layout, where: str, said: 
 def tables_of(
     frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
 ) -> list[Table]:
-    """The tables of a sheet.
+    """The tables of a sheet with the columns that hold numbers or times of day: one, or one for each run.
 
-    Args:
-        frame: numbers and texts, nulls where there are none.
-        layout: as many names and units.
-        decimal: the decimal sign of the texts.
-        labels: the run of each row, where a column names the runs.
-        table: what else is known of it.
-
-    Returns:
-        One, or one for each run, with the columns that hold numbers or times of day.
+    ``table`` holds what else is known of it, ``labels`` the run of each row where a column names the runs.
     """
     channels, notes = [], {-1: table.said[0]}
     for i, (name, unit, column) in enumerate(
@@ -405,17 +352,7 @@ def _clock(text: pl.Series) -> pl.Series | None:
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    """A small table of names and texts, such as one of conditions.
-
-    Args:
-        path: the file; its first line names the columns.
-
-    Returns:
-        The names, and the cells of every further line, one for each name.
-
-    Raises:
-        TunnelError: no such file, or lines that differ in length.
-    """
+    """A small table of texts, such as one of conditions: its names, and the cells of every further line."""
     where = shown(path)
     content, _ = _as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
     lines = [line for line in content.decode(errors="replace").splitlines() if line.strip()]
