@@ -1,13 +1,9 @@
-"""A campaign as a folder: ``campaign.toml`` and one CSV or Parquet file per run.
-
-The reader never opens ``truth.json``. The
-writer writes the whole campaign or nothing.
-"""
+"""A campaign as a folder: ``campaign.toml`` and one CSV or Parquet file per run; ``truth.json`` is never read."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, Literal
 
@@ -20,7 +16,7 @@ from tunnel_sim.files.plausible import (
     plausible_values,
 )
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
-from tunnel_sim.files.run_files import RUN_FORMATS, RunTableValues, read_table, table_bytes
+from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.toml_input import (
     OneLine,
     SampleRate,
@@ -43,6 +39,7 @@ from tunnel_sim.vocabulary.campaign import (
 )
 from tunnel_sim.vocabulary.drive import Drive, Hold, checked_drive, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Array, Record
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
@@ -112,23 +109,12 @@ class CampaignDocument(StrictModel):
 
 
 def read_document(path: Path) -> CampaignDocument:
-    """Read and validate ``campaign.toml``; the run files are not opened.
-
-    Raises:
-        TunnelError: for the first fault, naming file, run and remedy.
-    """
+    """Read and validate ``campaign.toml``; the run files are not opened."""
     return parse_document(load_toml(path, missing=NO_CAMPAIGN), path)
 
 
 def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
-    """Validate the content of ``campaign.toml``.
-
-    Args:
-        path: the file that is read or written, for the message.
-
-    Raises:
-        TunnelError: for the first fault, naming file, run and remedy.
-    """
+    """Validate the content of the ``campaign.toml`` at a path."""
     check_version(document, path)
     parsed = validate(CampaignDocument, document, path)
     remedy = "put the runs into several campaigns"
@@ -156,44 +142,19 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
                 remedy="put the file inside the folder and name it without '..' or a leading '/'",
             )
     if parsed.sensor.plausible is not False:
-        _check_sizes(parsed, path)
+        plausible_values(parsed.rig.model_dump(), f"{shown(path)}, [rig]")
+        for run in parsed.runs:
+            plausible_values(run.model_dump(), run_place(path, run.id))
     return parsed
 
 
 def run_place(path: Path, run_id: str) -> str:
-    """File and run for an error message.
-
-    Args:
-        path: of the run's file, or of the campaign's folder.
-    """
+    """File and run for an error message."""
     return f"{shown(path)}, run '{run_id}'"
 
 
-def _check_sizes(document: CampaignDocument, path: Path) -> None:
-    plausible_values(document.rig.model_dump(), f"{shown(path)}, [rig]")
-    for run in document.runs:
-        plausible_values(run.model_dump(), run_place(path, run.id))
-
-
-def rig_properties(table: RigTable) -> RigProperties:
-    """The vocabulary's form of ``[rig]``."""
-    return RigProperties(**table.model_dump())
-
-
-def sensor_properties(table: SensorTable) -> SensorProperties:
-    """``[sensor]`` as `SensorProperties`."""
-    return SensorProperties(**table.model_dump())
-
-
 def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, Any]:
-    """The tables of ``campaign.toml`` for a campaign.
-
-    Args:
-        files: the file of every run, by id, relative to the campaign's folder.
-
-    Returns:
-        The tables, in the order in which they are written, without values that are None.
-    """
+    """The tables of ``campaign.toml`` in their order, without values that are None; ``files`` by id of the run."""
     head = {"name": campaign.name, "description": campaign.description or None}
     document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
     for key, values in (("rig", vars(campaign.rig)), ("sensor", vars(campaign.sensor))):
@@ -244,25 +205,24 @@ def read_campaign(folder: Path | str) -> Campaign:
         remedy = nearest_campaign(folder) or nearest(folder / CAMPAIGN_FILE) or NO_CAMPAIGN
         raise TunnelError("no such file", where=shown(folder / CAMPAIGN_FILE), remedy=remedy)
     document = read_document(folder / CAMPAIGN_FILE)
-    sensor = sensor_properties(document.sensor)
+    sensor = SensorProperties(**document.sensor.model_dump())
+    runs, samples = [], 0
+    for table in document.runs:
+        runs.append(_read_run(folder, table, sensor))
+        samples += runs[-1].record.time_s.size
+        remedy = "put the runs into several campaigns"
+        check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
-        rig=rig_properties(document.rig),
+        rig=RigProperties(**document.rig.model_dump()),
         sensor=sensor,
-        runs=tuple(_read_runs(folder, document, sensor)),
+        runs=tuple(runs),
     )
 
 
 def as_campaign(given: Campaign | Path | str) -> Campaign:
-    """A campaign, read where its place is given.
-
-    Args:
-        given: the campaign; its folder, or the ``campaign.toml`` in it; or one file of a data logger.
-
-    Raises:
-        TunnelError: as for `read_campaign`, and where a file cannot be imported without options.
-    """
+    """A campaign, read where its folder, its ``campaign.toml`` or one file of a data logger is given."""
     if isinstance(given, Campaign):
         return given
     path = Path(given)
@@ -287,13 +247,8 @@ def write_campaign(
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
     Args:
-        campaign: what to write; it must pass every check of the reader.
         folder: the folder to create, with its parents where they are missing.
-        run_format: ``parquet`` or ``csv``.
-        truth: the simulated truth, written as ``truth.json``; None: no such file.
         overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
-        text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
-        beside: further files of the folder, by name.
         checked: whether every record has passed `checked_record`, so that this need not be done again.
 
     Raises:
@@ -304,44 +259,42 @@ def write_campaign(
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:
-        raise TunnelError(
-            f"unknown run format '{run_format}'",
-            where=shown(folder),
-            remedy=did_you_mean(run_format, RUN_FORMATS),
-        )
+        remedy = did_you_mean(run_format, RUN_FORMATS)
+        raise TunnelError(f"unknown run format '{run_format}'", where=shown(folder), remedy=remedy)
     clear_leftovers(folder.resolve().parent)  # restores what a killed command had set aside
     _check_target(folder, overwrite=overwrite)
-    files = _run_files(campaign, run_format)
+    # Run files are named by id where all ids are safe file names, else by number.
+    ids = [run.id for run in campaign.runs]
+    safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
+    named = safe and len({name.lower() for name in ids}) == len(ids)
+    files = {
+        name: f"{RUN_FOLDER}/{name if named else f'run-{number:04d}'}.{run_format}"
+        for number, name in enumerate(ids, start=1)
+    }
     document = campaign_document(campaign, files)
     parse_document(document, folder / CAMPAIGN_FILE)
-    if not checked:
-        _check_records(campaign, folder)
+    for run in () if checked else campaign.runs:
+        where = run_place(folder, run.id)
+        time_s, yaw = run.record.time_s, run.record.yaw_rad
+        if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
+            raise TunnelError(
+                "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
+            )
+        _record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, run.drive, where)
+        without_spring_needs_drive(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder, replace=overwrite) as partial:
         (partial / RUN_FOLDER).mkdir()
         for run in campaign.runs:
-            (partial / files[run.id]).write_bytes(
-                table_bytes(
-                    run.record, folder / files[run.id], campaign.sensor.quantity or "angle", run.drive
-                )
-            )
+            quantity = campaign.sensor.quantity or "angle"
+            content = table_bytes(run.record, folder / files[run.id], quantity, run.drive)
+            (partial / files[run.id]).write_bytes(content)
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
         for name, content in (beside or {}).items():
             (partial / name).write_bytes(content)
         (partial / CAMPAIGN_FILE).write_bytes(text(document).encode())
     return folder
-
-
-def _read_runs(folder: Path, document: CampaignDocument, sensor: SensorProperties) -> Iterator[Run]:
-    """The runs one by one, up to the limit on samples."""
-    samples = 0
-    for table in document.runs:
-        run = _read_run(folder, table, sensor)
-        yield run
-        samples += run.record.time_s.size
-        remedy = "put the runs into several campaigns"
-        check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
 
 
 def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
@@ -354,11 +307,8 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
     except (OSError, RuntimeError, ValueError):
         raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
     if not inside:
-        raise TunnelError(
-            "a symbolic link leads outside the campaign's folder",
-            where=where,
-            remedy="copy the file into the folder",
-        )
+        what = "a symbolic link leads outside the campaign's folder"
+        raise TunnelError(what, where=where, remedy="copy the file into the folder")
     held = read_table(path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle")
     time_s = held.time_s
     if time_s is None:
@@ -369,69 +319,41 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
                 remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
             )
         time_s = np.arange(held.reading.size) / sample_rate
-    drive = _drive(run, held, where)
-    record = checked_record(
-        time_s, held.reading, held.column, sensor, run.release_angle, where, driven=drive is not None
-    )
-    if drive is not None:
-        checked_drive(drive, record, where, judged=sensor.plausible is not False)
-    without_spring_needs_drive(run.spring_stiffness, drive, where)
-    return Run(
-        id=run.id,
-        record=record,
-        wind_speed=run.wind_speed,
-        spring_stiffness=run.spring_stiffness,
-        air_density=run.air_density,
-        release_angle=run.release_angle,
-        drive=drive,
-    )
-
-
-def _drive(run: RunTable, held: RunTableValues, where: str) -> Drive | None:
-    if held.input is None or held.input_column is None:
-        stated = next((key for key in ("drive_hold", "drive_gain") if getattr(run, key) is not None), None)
-        if stated is None:
-            return None
+    drive = None
+    if held.input is not None and held.input_column is not None:
+        if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
+            raise TunnelError(
+                f"drive_gain = {run.drive_gain:g} of the column {held.input_column}",
+                where=where,
+                remedy="give drive_gain of a column drive only, in N m per unit, not zero",
+            )
+        drive = Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
+    elif run.drive_hold is not None or run.drive_gain is not None:
         raise TunnelError(
-            f"{stated} without an input column",
+            f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column",
             where=where,
             remedy="add a column moment_nm, drive or base_rad to the run file, or leave the key out",
         )
-    if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
-        raise TunnelError(
-            f"drive_gain = {run.drive_gain:g} of the column {held.input_column}",
-            where=where,
-            remedy="give drive_gain of a column drive only, in N m per unit, not zero",
-        )
-    return Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
+    record = _record(time_s, held.reading, held.column, sensor, run.release_angle, drive, where)
+    without_spring_needs_drive(run.spring_stiffness, drive, where)
+    conditions = run.spring_stiffness, run.air_density, run.release_angle
+    return Run(run.id, record, run.wind_speed, *conditions, drive=drive)
 
 
-def _check_records(campaign: Campaign, folder: Path) -> None:
-    """Refuse the records that the reader would refuse, before anything is written."""
-    for run in campaign.runs:
-        where = run_place(folder, run.id)
-        time_s, yaw = run.record.time_s, run.record.yaw_rad
-        if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
-            raise TunnelError(
-                "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
-            )
-        record = checked_record(
-            time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, driven=run.drive is not None
-        )
-        if run.drive is not None:
-            checked_drive(run.drive, record, where, judged=campaign.sensor.plausible is not False)
-        without_spring_needs_drive(run.spring_stiffness, run.drive, where)
-
-
-def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:
-    """The file of every run: named by id where all ids are safe file names, else by number."""
-    ids = [run.id for run in campaign.runs]
-    safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
-    named = safe and len({name.lower() for name in ids}) == len(ids)
-    return {
-        name: f"{RUN_FOLDER}/{name if named else f'run-{number:04d}'}.{run_format}"
-        for number, name in enumerate(ids, start=1)
-    }
+def _record(
+    time_s: Array,
+    reading: Array,
+    column: str,
+    sensor: SensorProperties,
+    release_angle: float | None,
+    drive: Drive | None,
+    where: str,
+) -> Record:
+    """The record of a run, unless it or its input is refused."""
+    record = checked_record(time_s, reading, column, sensor, release_angle, where, driven=drive is not None)
+    if drive is not None:
+        checked_drive(drive, record, where, judged=sensor.plausible is not False)
+    return record
 
 
 def _check_target(folder: Path, *, overwrite: bool) -> None:

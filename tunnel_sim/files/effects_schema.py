@@ -51,16 +51,10 @@ class EffectsDocument(StrictModel):
 
 
 def read_effect_tables(path: Path) -> list[OwnEffectTable]:
-    """Read an effects file.
+    """The tables of an effects file (TOML), their expressions not yet parsed.
 
     Args:
         path: a TOML file.
-
-    Returns:
-        Its tables, their expressions not yet parsed.
-
-    Raises:
-        TunnelError: for the first fault.
     """
     document = load_toml(path, missing="name an effects file; docs/how-to/add-an-effect.md has an example")
     return validate(EffectsDocument, document, path).effects

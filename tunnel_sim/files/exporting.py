@@ -23,19 +23,9 @@ _SHEET_ROWS = 1_048_576
 
 
 def export_campaign(campaign: Campaign, path: Path, kind: str) -> Path:
-    """Write a campaign as one file, completely or not at all.
+    """Write a campaign as one file of the kind ``mat``, ``csv``, ``xlsx`` or ``hdf5``, completely or not at all.
 
-    Args:
-        path: the file; replaced when it exists.
-        kind: ``mat``, ``csv``, ``xlsx`` or ``hdf5``.
-
-    Returns:
-        The same path. Units are those of the campaign format; conditions that are not stated are left out, or
-        empty.
-
-    Raises:
-        TunnelError: an unknown format, a library that is missing, a run too long for a sheet, or a file that
-            cannot be written.
+    Units are those of the campaign format; conditions that are not stated are left out, or empty.
     """
     if kind not in WRITERS:
         raise TunnelError(f"unknown format '{kind}'", where=shown(path), remedy=did_you_mean(kind, WRITERS))

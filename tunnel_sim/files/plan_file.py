@@ -5,7 +5,7 @@ The packaged ``data/paper-campaign.toml`` is an example with a comment on every 
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator
 from importlib import resources
 from itertools import count
 from math import radians
@@ -123,11 +123,7 @@ class PlanDocument(StrictModel):
 
 
 def read_plan(path: Path) -> PlanDocument:
-    """Read and validate a campaign description.
-
-    Raises:
-        TunnelError: for the first fault, in one line that names file, key and remedy.
-    """
+    """Read and validate a campaign description."""
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
     plan = validate(PlanDocument, document, path)
     check_conditions(plan, shown(path))
@@ -140,12 +136,8 @@ def read_plan(path: Path) -> PlanDocument:
         )
     check_size(run_count(plan, driven), plan.duration, plan.sample_rate, shown(path))
     if plan.drive is not None:
-        check_drive(plan.drive, plan.samples, plan.sample_rate, _drive_of(path))
+        check_drive(plan.drive, plan.samples, plan.sample_rate, f"{shown(path)}, [drive]")
     return plan
-
-
-def _drive_of(path: Path) -> str:
-    return f"{shown(path)}, [drive]"
 
 
 class ConditionKeys(Protocol):
@@ -173,10 +165,9 @@ class ConditionKeys(Protocol):
 
 
 def run_count(keys: ConditionKeys, driven: int = 0) -> int:
-    """The number of runs, calculated from the lengths of the lists.
+    """The number of runs, from the lengths of the lists of a description, or of a table with the same keys.
 
     Args:
-        keys: a campaign description, or a table with the same keys.
         driven: number of driven runs of each spring and speed, before repeats.
     """
     springs = len(keys.springs) + len(keys.spring_stiffness)
@@ -190,9 +181,6 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
         runs: number of runs.
         duration: of each run, s.
         sample_rate: Hz.
-
-    Raises:
-        TunnelError: too many runs, samples or integration steps, with their number and the limit.
     """
     check_count(runs, limits.CAMPAIGN_RUNS, "runs", where, "shorten a list, or make several campaigns")
     # Even the shortest run has two samples.
@@ -216,66 +204,69 @@ def first_twice(values: Iterable[HashableT]) -> HashableT | None:
 
 
 def check_conditions(plan: ConditionKeys, where: str) -> None:
-    """Refuse conditions that give no runs, or the same run twice.
-
-    Args:
-        plan: a campaign description, or a table with the same keys.
-
-    Raises:
-        TunnelError: when no spring is given, or a value occurs twice.
-    """
+    """Refuse conditions that give no runs, or the same run twice."""
     if not plan.springs and not plan.spring_stiffness:
-        raise TunnelError(
-            "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
-        )
+        remedy = "give springs (numbers) or spring_stiffness (N m/rad)"
+        raise TunnelError("no spring", where=where, remedy=remedy)
     for key in ("springs", "spring_stiffness", "wind_speeds", "release_angles_deg"):
         twice = first_twice(getattr(plan, key))
         if twice is not None:
-            raise TunnelError(
-                f"{key} holds {twice:g} twice",
-                where=where,
-                remedy="leave one out, and use repeats for more runs",
-            )
+            remedy = "leave one out, and use repeats for more runs"
+            raise TunnelError(f"{key} holds {twice:g} twice", where=where, remedy=remedy)
 
 
 def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
-    """Read a campaign description.
+    """Read a campaign description, a TOML file like the packaged ``paper-campaign.toml``.
 
     Args:
-        path: a TOML file like the packaged ``paper-campaign.toml``.
         rig: defines the numbered springs, and the inertia, damping and air density that the description does not
             state; None uses the packaged rig.
 
     Returns:
         The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
         and repeats.
-
-    Raises:
-        TunnelError: for the first fault, in one line that names file, key and remedy.
     """
     path = Path(path)
     return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path), path.parent)
 
 
 def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path()) -> CampaignPlan:
-    """The plan defined by a validated campaign description.
+    """The plan defined by a validated campaign description; the file of a drive is sought in the folder."""
+    table, time, numbers = document.drive, np.arange(document.samples) / document.sample_rate, count()
+    given = None
+    if table is not None and table.file is not None:
+        given = drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
+    for number in document.springs:
+        if number not in rig.springs:
+            raise TunnelError(
+                f"there is no spring {number}",
+                where=where,
+                remedy=f"use one of {', '.join(map(str, rig.springs))}, or give spring_stiffness in N m/rad",
+            )
+    springs = [(f"s{number}", rig.springs[number]) for number in document.springs]
+    springs += [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
 
-    Args:
-        rig: as in `load_plan`.
-        folder: in which the file of a drive is sought.
+    def starts() -> Iterator[tuple[str, float, Drive | None]]:
+        """End of the id, release angle (rad) and input of the runs of a spring and a speed, free decays first."""
+        repeats = [f"-{number + 1}" if document.repeats > 1 else "" for number in range(document.repeats)]
+        for angle in document.release_angles_deg:
+            yield from ((f"a{_short(angle)}{repeat}", radians(angle), None) for repeat in repeats)
+        for amplitude in () if table is None else table.amplitudes:
+            for repeat in repeats:
+                if amplitude is None or table is None:
+                    yield f"file{repeat}", 0.0, given
+                else:
+                    drive = drive_of_run(table, amplitude, next(numbers), time)
+                    yield f"d{_short(amplitude)}{repeat}", 0.0, drive
 
-    Raises:
-        TunnelError: when the rig has no such spring, or the file of a drive is refused.
-    """
     stated = document.truth.model_dump(exclude_none=True)
-    inertia, damping = rig.dynamics.yaw_inertia, rig.dynamics.mechanical_damping
-    given, numbers = _file_drive(document, folder, where), count()
+    own = {"yaw_inertia": rig.dynamics.yaw_inertia, "mechanical_damping": rig.dynamics.mechanical_damping}
     density = rig.air.density if document.air_density is None else document.air_density
     return CampaignPlan(
         name=document.name,
         description=document.description,
         seed=document.seed,
-        truth=Truth(**({"yaw_inertia": inertia, "mechanical_damping": damping} | stated)),
+        truth=Truth(**(own | stated)),
         conditions=tuple(
             Condition(
                 id=f"{label}-v{_short(speed)}-{start}",
@@ -286,9 +277,9 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
                 duration=document.duration,
                 drive=drive,
             )
-            for label, stiffness in _stiffnesses(document, rig.springs, where)
+            for label, stiffness in springs
             for speed in document.wind_speeds
-            for start, angle, drive in _starts(document, given, numbers)
+            for start, angle, drive in starts()
         ),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
@@ -299,45 +290,6 @@ def paper_plan() -> CampaignPlan:
     """The paper's campaign (``data/paper-campaign.toml``): four springs, wind off and at three speeds."""
     with resources.as_file(resources.files("tunnel_sim") / "data" / "paper-campaign.toml") as path:
         return load_plan(path)
-
-
-def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: str) -> list[tuple[str, float]]:
-    """A label and the stiffness of every numbered spring and of every spring stated by its stiffness."""
-    for number in document.springs:
-        if number not in springs:
-            raise TunnelError(
-                f"there is no spring {number}",
-                where=where,
-                remedy=f"use one of {', '.join(map(str, springs))}, or give spring_stiffness in N m/rad",
-            )
-    numbered = [(f"s{number}", springs[number]) for number in document.springs]
-    return numbered + [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
-
-
-def _file_drive(document: PlanDocument, folder: Path, where: str) -> Drive | None:
-    table = document.drive
-    if table is None or table.file is None:
-        return None
-    time = np.arange(document.samples) / document.sample_rate
-    return drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
-
-
-def _starts(
-    document: PlanDocument, given: Drive | None, numbers: Iterator[int]
-) -> Iterator[tuple[str, float, Drive | None]]:
-    """End of the id, release angle (rad) and input of every run of a spring and a speed, free decays first."""
-    repeats = [f"-{number + 1}" if document.repeats > 1 else "" for number in range(document.repeats)]
-    for angle in document.release_angles_deg:
-        yield from ((f"a{_short(angle)}{repeat}", radians(angle), None) for repeat in repeats)
-    table = document.drive
-    time = np.arange(document.samples) / document.sample_rate
-    for amplitude in () if table is None else table.amplitudes:
-        for repeat in repeats:
-            if amplitude is None or table is None:
-                yield f"file{repeat}", 0.0, given
-            else:
-                drive = drive_of_run(table, amplitude, next(numbers), time)
-                yield f"d{_short(amplitude)}{repeat}", 0.0, drive
 
 
 def _short(value: float) -> str:

@@ -1,10 +1,8 @@
 """Whether a run can be what it is said to be: plausible ranges, increasing times, angles in radians, three cycles.
 
 Outside the plausible ranges of a rig, its air and its clock a wrong unit is more likely than such a rig. The
-ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres, so only a wrong
-unit that leaves them is detected. Speeds in km/h, wrong by a factor of 3.6, mostly remain inside: a free decay
-cannot distinguish an error of V from a factor on Cnβ and Cnr. Stiffness and inertia have no range, because both
-scale with the fifth power of a rig's size.
+ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres. Stiffness
+and inertia have none, because both scale with the fifth power of a rig's size.
 """
 
 from __future__ import annotations
@@ -38,7 +36,6 @@ class Range:
         unit: unit in the file format.
         above: likely unit of a value above the range.
         below: likely unit of a value below the range.
-        reason: why the range ends where it does.
     """
 
     low: float
@@ -88,14 +85,9 @@ step and its period of oscillation."""
 
 
 def plausible_values(values: Mapping[str, Any], where: str) -> None:
-    """Refuse stated values that appear to be in a wrong unit.
+    """Refuse stated values, by key of ``campaign.toml`` and in its units, that appear to be in a wrong unit.
 
-    Args:
-        values: by key of ``campaign.toml``, in its units; keys without a range and None are skipped.
-        where: file and table or run, for messages.
-
-    Raises:
-        TunnelError: for the first value outside its range.
+    Keys without a range and values that are None are skipped.
     """
     for key, value in values.items():
         allowed = RANGES.get(key)
@@ -119,7 +111,6 @@ def checked_record(
         time_s: sample times, shape (n,), s.
         reading: shape (n,), rad, rad/s or rad/s².
         column: that the readings are from, for messages.
-        sensor: what is stated of the sensor.
         release_angle: as stated, rad.
         driven: whether the run has an input: it need not oscillate at a frequency of its own.
 
@@ -142,14 +133,12 @@ def checked_record(
 
 
 def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = True) -> None:
-    """Refuse a record that appears to be in a wrong unit, or that is sampled too slowly.
+    """Refuse a record of a number of cycles that appears to be in a wrong unit, or that is sampled too slowly.
+
+    Rates and accelerations, unlike an angle, may swing by any size.
 
     Args:
         cycles: number of cycles in the record.
-        angle: whether the reading is an angle; rates and accelerations may have any size.
-
-    Raises:
-        TunnelError: a swing, time step or period outside its range, or fewer than ten samples per cycle.
     """
     step, per_cycle = record.sample_interval, record.yaw_rad.size / cycles
     plausible_sampling(record, where, angle=angle)
@@ -164,14 +153,7 @@ def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = Tr
 
 
 def plausible_sampling(record: Record, where: str, *, angle: bool = True) -> None:
-    """Refuse a record whose swing or time step appears to be in a wrong unit.
-
-    Args:
-        angle: whether the reading is an angle; rates and accelerations may have any size.
-
-    Raises:
-        TunnelError: a swing or time step outside its range.
-    """
+    """Refuse a record whose swing (of an angle) or time step appears to be in a wrong unit."""
     step, swing = record.sample_interval, 0.5 * float(np.ptp(record.yaw_rad))
     if angle:
         _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
@@ -197,14 +179,11 @@ _SLIP_RATIO = (50.0, 75.0)
 
 
 def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> None:
-    """Check the times of a run file. Steps may differ, and samples may be missing.
+    """Refuse times that do not increase, or are not in s. Steps may differ, and samples may be missing.
 
     Args:
         time_s: sample times, shape (n,), s.
         sample_rate: as stated in the campaign, Hz; None where it is not stated.
-
-    Raises:
-        TunnelError: a step back, a repeated time, or times in a unit other than s.
     """
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
@@ -236,11 +215,7 @@ def same_unit(angle: Array, column: str, release_angle: float | None, where: str
 
     Args:
         angle: the reading, shape (n,), rad.
-        column: ``yaw_rad`` or ``yaw_deg``, for messages.
         release_angle: nominal, rad; None where the campaign does not state it.
-
-    Raises:
-        TunnelError: a factor of about 57.3 between reading and release angle.
     """
     half_span = 0.5 * (float(angle.max()) - float(angle.min()))
     if not release_angle or half_span == 0.0:
@@ -264,20 +239,11 @@ def same_unit(angle: Array, column: str, release_angle: float | None, where: str
 
 
 def enough_cycles(record: Record, where: str) -> float:
-    """Refuse a record with fewer than three cycles of oscillation.
-
-    Returns:
-        Number of cycles in the record.
-
-    Raises:
-        TunnelError: fewer than three cycles, or no oscillation.
-    """
+    """The number of cycles in a record; fewer than three cycles of oscillation are refused."""
     cycles = count_cycles(record)
     if cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
         return cycles
-    what = (
-        f"about {cycles:.1f} cycles of oscillation, fewer than three"
-        if cycles > 0.0
-        else "no oscillation is visible in the record, so it has fewer than three cycles"
-    )
+    what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
+    if not cycles > 0.0:
+        what = "no oscillation is visible in the record, so it has fewer than three cycles"
     raise TunnelError(what, where=where, remedy="record for longer after the release, or leave the run out")

@@ -38,7 +38,6 @@ class FileTable:
 
     Args:
         frame: at least those of `USED_COLUMNS` that the file has.
-        names: of all columns.
         text: whether values are still texts, below a line of headings.
     """
 
@@ -52,7 +51,6 @@ class Reader:
     """How one format is read. Its functions raise `TunnelError` for content of another format, or too large.
 
     Args:
-        kind: name of the format, with its article.
         limit: largest file, bytes.
         magic: how such a file begins; empty where anything will do.
         read_run: the table of a campaign's run file, from its content, its name for messages, and the greatest
@@ -87,25 +85,12 @@ RUN_ENDINGS = (".csv", ".parquet")
 
 
 def reader_place(ending: str) -> str | None:
-    """Where the reader of an ending is, ``module:name``.
-
-    Args:
-        ending: with its dot, in small letters.
-
-    Returns:
-        None where there is none.
-    """
+    """Where the reader of an ending (with its dot, in small letters) is, ``module:name``; None: nowhere."""
     return READERS.get(ending) or _added_places().get(ending)
 
 
 def load_reader(ending: str) -> Reader | None:
-    """The reader of files with an ending.
-
-    Args:
-        ending: with its dot, in small letters.
-
-    Returns:
-        None where there is none.
+    """The reader of files with an ending, as for `reader_place`; None where there is none.
 
     Raises:
         TunnelError: when an installed package states something that is not a reader.
@@ -125,11 +110,8 @@ def load_reader(ending: str) -> Reader | None:
 
 def run_endings() -> list[str]:
     """The endings of a campaign's run files, with their dots, those of installed packages included."""
-    endings = (*READERS, *(ending for ending in _added_places() if ending not in READERS))
-    readers = {ending: load_reader(ending) for ending in endings}
-    return [
-        ending for ending, reader in readers.items() if reader is not None and reader.read_run is not None
-    ]
+    readers = ((ending, load_reader(ending)) for ending in {**READERS, **_added_places()})
+    return [ending for ending, reader in readers if reader is not None and reader.read_run is not None]
 
 
 @functools.cache
@@ -140,14 +122,7 @@ def _added_places() -> dict[str, str]:
 
 @contextmanager
 def faults(kind: str, where: str) -> Iterator[None]:
-    """Convert whatever a library raises on a malformed file, except `MemoryError`, to a `TunnelError`.
-
-    Args:
-        kind: what the file is not, with its article.
-
-    Raises:
-        TunnelError: instead of any other exception.
-    """
+    """Convert whatever a library raises on a malformed file, except `MemoryError`, to a `TunnelError`."""
     try:
         yield
     except (TunnelError, MemoryError):  # the guard reports memory

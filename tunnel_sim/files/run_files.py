@@ -61,125 +61,29 @@ def read_table(
 ) -> RunTableValues:
     """Read times, readings and the input of a driven run from a run file; other columns are ignored.
 
+    All values are finite.
+
     Args:
-        path: a file with one of the endings of run files.
         timed: whether times are required because no ``sample_rate`` is stated.
-        quantity: what the sensor measures, which names the column.
-        most: greatest number of samples.
-
-    Returns:
-        What the file holds. All values are finite.
-
-    Raises:
-        TunnelError: no such file, not a regular file, too large, not a table, a missing or repeated column, a
-            value that is missing or not a number.
     """
     missing = "put the file there or correct 'file' in campaign.toml"
-    holds = f"give it {_named(quantity)}, and time_s unless [sensor] sample_rate is given"
-    return _columns(_held(path, where, missing, most, holds), where, timed=timed, quantity=quantity)
-
-
-def _held(
-    path: Path, where: str, missing: str, most: int, holds: str = "give it a header line and samples"
-) -> FileTable:
-    reader = load_reader(path.suffix.lower())
-    if reader is None or reader.read_run is None:
-        kinds = " or ".join(run_endings())
-        raise TunnelError(
-            f"unsupported file type '{one_line(path.suffix)}'", where=where, remedy=f"use {kinds}"
-        )
-    content = read_regular(
-        path,
-        reader.limit,
-        where=where,
-        missing=missing,
-        readable=f"name a readable {' or '.join(RUN_ENDINGS)} file",
-    )
-    if not content.strip():
-        raise TunnelError("the file is empty", where=where, remedy=holds)
-    return reader.read_run(content, where, most)
-
-
-def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
-    """Read the input of a driven run from a file that need not hold a reading.
-
-    Args:
-        path: a file with one of the endings of run files.
-
-    Returns:
-        Times, shape (n,), s, increasing; the input's column; its values, shape (n,), in the unit of that column.
-
-    Raises:
-        TunnelError: as `read_table`, a missing column, or times that do not increase.
-    """
-    held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
-    column = _input_column(held.names, where)
-    if column is None or "time_s" not in held.names:
-        raise TunnelError(
-            f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}",
-            where=where,
-            remedy="give it time_s in s and one input column",
-        )
-    time, values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
-    if time.size < 2 or not np.all(np.diff(time) > 0.0):
-        raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
-    return time, column, values
-
-
-def table_bytes(
-    record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
-) -> bytes:
-    """The content of a run file with times and readings in radians; reading it gives the same numbers.
-
-    Args:
-        path: the ``.csv`` or ``.parquet`` file, for the format and for messages.
-        quantity: what the readings are, which names their column.
-        drive: the input of a driven run.
-
-    Raises:
-        TunnelError: when the table cannot be encoded.
-    """
-    given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
-    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
-    # CSV values have the fewest digits that read back as the same float.
-    return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
-
-
-def _named(quantity: Quantity) -> str:
-    return f"a column {' or '.join(COLUMNS[quantity])}"
-
-
-def _reading_column(names: Sequence[str], quantity: Quantity, where: str) -> str:
-    """The column that holds the reading."""
-    found = [name for name in COLUMNS[quantity] if name in names]
-    if len(found) > 1:
-        raise TunnelError(f"both {' and '.join(found)}", where=where, remedy="leave one of them out")
-    if found:
-        return found[0]
-    other = next((kind for kind, columns in COLUMNS.items() if not set(columns).isdisjoint(names)), None)
-    raise TunnelError(
-        f"no column {' or '.join(COLUMNS[quantity])} (columns found: {one_line(', '.join(names) or 'none', 60)})",
-        where=where,
-        remedy=f"name the {quantity}'s column {' or '.join(COLUMNS[quantity])}"
-        + (f", or state quantity = '{other}' under [sensor]" if other else ""),
-    )
-
-
-def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
-    found = [name for name in INPUT_COLUMNS if name in names]
-    if len(found) > 1:
-        raise TunnelError(
-            f"{len(found)} input columns: {' and '.join(found)}",
-            where=where,
-            remedy="a run has one input: keep its column and rename the others",
-        )
-    return found[0] if found else None
-
-
-def _columns(held: FileTable, where: str, *, timed: bool, quantity: Quantity) -> RunTableValues:
+    known = COLUMNS[quantity]
+    holds = f"give it a column {' or '.join(known)}, and time_s unless [sensor] sample_rate is given"
+    held = _held(path, where, missing, most, holds)
     names = held.names
     driven = _input_column(names, where)
-    column = _reading_column(names, quantity, where)
+    found = [name for name in known if name in names]
+    if len(found) > 1:
+        raise TunnelError(f"both {' and '.join(found)}", where=where, remedy="leave one of them out")
+    if not found:
+        other = next((kind for kind, columns in COLUMNS.items() if not set(columns).isdisjoint(names)), None)
+        raise TunnelError(
+            f"no column {' or '.join(known)} (columns found: {one_line(', '.join(names) or 'none', 60)})",
+            where=where,
+            remedy=f"name the {quantity}'s column {' or '.join(known)}"
+            + (f", or state quantity = '{other}' under [sensor]" if other else ""),
+        )
+    column = found[0]
     stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
     if timed and "time_s" not in names and stray is not None:
         raise TunnelError(
@@ -204,6 +108,64 @@ def _columns(held: FileTable, where: str, *, timed: bool, quantity: Quantity) ->
     return RunTableValues(values.get("time_s"), reading, column, driven, given)
 
 
+def _held(
+    path: Path, where: str, missing: str, most: int, holds: str = "give it a header line and samples"
+) -> FileTable:
+    reader = load_reader(path.suffix.lower())
+    if reader is None or reader.read_run is None:
+        what = f"unsupported file type '{one_line(path.suffix)}'"
+        raise TunnelError(what, where=where, remedy=f"use {' or '.join(run_endings())}")
+    readable = f"name a readable {' or '.join(RUN_ENDINGS)} file"
+    content = read_regular(path, reader.limit, where=where, missing=missing, readable=readable)
+    if not content.strip():
+        raise TunnelError("the file is empty", where=where, remedy=holds)
+    return reader.read_run(content, where, most)
+
+
+def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
+    """Read the input of a driven run from a file that need not hold a reading.
+
+    Returns:
+        Times, shape (n,), s, increasing; the input's column; its values, shape (n,), in the unit of that column.
+    """
+    held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
+    column = _input_column(held.names, where)
+    if column is None or "time_s" not in held.names:
+        raise TunnelError(
+            f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}",
+            where=where,
+            remedy="give it time_s in s and one input column",
+        )
+    time, values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
+    if time.size < 2 or not np.all(np.diff(time) > 0.0):
+        raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
+    return time, column, values
+
+
+def table_bytes(
+    record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
+) -> bytes:
+    """The content of a run file with times and readings in radians; reading it gives the same numbers.
+
+    The path is for the format and for messages, the quantity names the column of the readings.
+    """
+    given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
+    table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
+    # CSV values have the fewest digits that read back as the same float.
+    return encoded(path, table.write_csv if path.suffix == ".csv" else table.write_parquet)
+
+
+def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
+    found = [name for name in INPUT_COLUMNS if name in names]
+    if len(found) > 1:
+        raise TunnelError(
+            f"{len(found)} input columns: {' and '.join(found)}",
+            where=where,
+            remedy="a run has one input: keep its column and rename the others",
+        )
+    return found[0] if found else None
+
+
 def _numbers(series: pl.Series, text: bool, where: str) -> Array:
     """The values of a column as finite floats, or a message naming the first that is not."""
     if series.dtype == pl.String and text:
@@ -226,7 +188,7 @@ def _numbers(series: pl.Series, text: bool, where: str) -> Array:
 
 
 def _read_csv(content: bytes, where: str, most: int) -> FileTable:
-    """A table as text; arguments as in `Reader`. Columns without a name of their own are under their position."""
+    """A table as text. Columns without a name of their own are under their position."""
     if not content.isascii():  # which needs no second copy of a large file
         decoded(content, where)
     columns = content.partition(b"\n")[0].count(b",") + 1
@@ -242,9 +204,8 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
         ) from None
     names = [str(name or "").strip().strip('"').strip() for name in rows.row(0)]
     if any(_is_number(name) for name in names):
-        raise TunnelError(
-            "no header line", where=where, remedy="name the columns in the first line, such as time_s,yaw_rad"
-        )
+        remedy = "name the columns in the first line, such as time_s,yaw_rad"
+        raise TunnelError("no header line", where=where, remedy=remedy)
     if len(names) == 1 and re.search(r"[;\t]", names[0]):
         raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
     twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
