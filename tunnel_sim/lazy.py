@@ -12,13 +12,8 @@ def lazy_names(
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """The functions ``__getattr__`` and ``__dir__`` of a package.
 
-    Args:
-        package: its ``__name__``.
-        homes: names it offers, separated by blanks, by the module that defines them, relative to the package
-            (``.estimate``).
-
-    Returns:
-        Both functions. The first raises AttributeError for a name that is not offered.
+    ``homes`` holds the names it offers, separated by blanks, by the module that defines them, relative to the
+    package (``.estimate``).
     """
     home_of = {name: home for home, names in homes.items() for name in names.split()}
 

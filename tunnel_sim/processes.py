@@ -57,16 +57,12 @@ def in_processes(
 ) -> Iterator[tuple[ItemT, ResultT]]:
     """Do work in processes of one thread each, few items in flight at a time, which bounds the memory.
 
+    Items come with their results, in the order in which they finish.
+
     Args:
         work: what to do; it and its results must be picklable.
         items: on which.
         jobs: number of processes; 0 works in this one.
-
-    Yields:
-        Items with their results, in the order in which they finish.
-
-    Raises:
-        BrokenProcessPool: when a process dies.
     """
     if jobs == 0 or not items:
         yield from ((item, work(item)) for item in items)
@@ -103,11 +99,7 @@ class Worker:
     def submit(
         self, work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs
     ) -> Future[ResultT]:
-        """Do work after what was submitted before.
-
-        Args:
-            work: what to do; it, its arguments and its result must be picklable.
-        """
+        """Do work after what was submitted before; it, its arguments and its result must be picklable."""
         with _one_thread_each():  # the process is started by the first work
             return self._pool.submit(work, *given, **named)
 
@@ -123,14 +115,9 @@ def in_limited_process(
     """Do work on untrusted input in a process of its own, which can open no file. Bytes go in and out, no pickles.
 
     Args:
-        work: a function of a module, known by its name.
-        given: its argument.
         prepare: another one, called before the limits hold: it loads all that the work needs.
         seconds: of the processor that the work may take, s; the clock allows four times as long.
         memory: that the work may take, bytes.
-
-    Raises:
-        LimitReached: when the work takes too long or too much memory, or its process dies.
     """
     header = {
         "path": sys.path,

@@ -13,8 +13,7 @@ from pkgutil import iter_modules
 from typing import TypeVar, get_args
 
 from tunnel_sim.effects.base import Channel, Condition, Effect, make_effect
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
-from tunnel_sim.vocabulary.plugins import added_to, loading
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
 from tunnel_sim.vocabulary.units import dimension
 
 ENTRY_POINTS = "tunnel.effects"

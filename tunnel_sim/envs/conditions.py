@@ -81,7 +81,12 @@ class FreeDecayConfig:
             raise EnvError(f"unknown preset {self.preset!r}", remedy=did_you_mean(str(self.preset), PRESETS))
         for item in fields(self):
             if item.type == "float":
-                _check_number(item.name, getattr(self, item.name))
+                name, value = item.name, getattr(self, item.name)
+                number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+                if not number or value < 0.0 or (value == 0.0 and name not in _MAY_BE_ZERO):
+                    least = "0 or more" if name in _MAY_BE_ZERO else "above 0"
+                    remedy = f"give a finite number {least} (SI)"
+                    raise EnvError(f"{name} = {value!r} is out of range", remedy=remedy)
         if self.effect_probability > 1.0:
             raise EnvError("effect_probability is above 1", remedy="give a probability")
         if self.reading_variance < LEAST_DEVIATION**2:
@@ -130,25 +135,13 @@ def angle_limit(rig: Rig) -> float:
 
 
 def free_decay_config(arguments: Mapping[str, Any]) -> FreeDecayConfig:
-    """The configuration of an environment from its keyword arguments.
-
-    Raises:
-        EnvError: when a name is unknown or a value out of range.
-    """
+    """The configuration of an environment from its keyword arguments."""
     known = [item.name for item in fields(FreeDecayConfig)]
     for name in arguments:
         if name not in known:
-            raise EnvError(
-                f"unknown argument {name!r}", where="FreeDecay-v0", remedy=did_you_mean(name, known)
-            )
+            remedy = did_you_mean(name, known)
+            raise EnvError(f"unknown argument {name!r}", where="FreeDecay-v0", remedy=remedy)
     return FreeDecayConfig(**arguments)
-
-
-def _check_number(name: str, value: object) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-    if not number or value < 0.0 or (value == 0.0 and name not in _MAY_BE_ZERO):  # type: ignore[operator]
-        least = "0 or more" if name in _MAY_BE_ZERO else "above 0"
-        raise EnvError(f"{name} = {value!r} is out of range", remedy=f"give a finite number {least} (SI)")
 
 
 def _whole(name: str, count: float, of: str) -> None:
@@ -173,13 +166,7 @@ STIFFNESS_MARGIN = 1.3  # least ratio of a drawn spring's stiffness to the great
 
 @dataclass(frozen=True)
 class RunPlan:
-    """One run before it is simulated: its stated conditions and its truth.
-
-    Args:
-        condition: spring, wind, release and duration, as a campaign states them.
-        sensor: the potentiometer with its true zero.
-        effects: effects beyond the nominal model.
-    """
+    """One run before it is simulated: stated conditions, truth, sensor with its true zero, and effects."""
 
     condition: Condition
     truth: Truth
@@ -191,11 +178,7 @@ class RunPlan:
         return run_settings(self.truth, self.condition)
 
     def run(self, record: Record) -> Run:
-        """The run as a campaign lists it.
-
-        Args:
-            record: the sensor's reading.
-        """
+        """The run as a campaign lists it."""
         return stated_run(self.condition, record)
 
     def statement(self) -> dict[str, float]:
@@ -215,19 +198,42 @@ def plan_run(
     """The run of one episode.
 
     Args:
-        options: of ``reset``; see docs/reference/envs/free-decay.md.
         rng: draws what the options do not give, in the order spring, wind speed, release angle, truth in the
             order of `TRUTH`, effects. Nothing is drawn for given options.
-
-    Raises:
-        EnvError: for the first option that is unknown or out of range.
     """
     given = _checked(options or {}, OPTIONS, "reset options")
-    stiffness = _stiffness(given, rig, rng)
+    if given.get("spring") is not None and given.get("spring_stiffness") is not None:
+        raise EnvError("spring and spring_stiffness are both given", remedy="give one of them")
+    if given.get("spring") is not None:
+        try:
+            stiffness = rig.spring(given["spring"])
+        except (TunnelError, TypeError) as error:
+            remedy = f"use one of {', '.join(map(str, rig.springs))}"
+            what = f"there is no spring {given['spring']!r}"
+            raise EnvError(what, where="option spring", remedy=remedy) from error
+    elif given.get("spring_stiffness") is not None:
+        stiffness = _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
+    else:
+        springs = drawn_springs(rig)
+        stiffness = springs[int(rng.integers(len(springs)))]
     wind = _number(given, "wind_speed", WIND_SPEED, rng, least=0.0, most=config.wind_limit)
     density = _number(given, "air_density", (rig.air.density, rig.air.density), None, least=0.0)
-    angle = _release_angle(given, rig, rng)
-    truth, zero = _truth(_checked(given.get("truth") or {}, TRUTH, "option truth"), rig, rng)
+    if given.get("release_angle") is not None:
+        limit = 0.99 * angle_limit(rig)
+        angle = _number(given, "release_angle", (0.0, 0.0), None, least=-limit, most=limit)
+    else:
+        angle = float(rng.choice((-1.0, 1.0)) * rng.uniform(*RELEASE_ANGLE))
+    own = _checked(given.get("truth") or {}, TRUTH, "option truth")
+    nominal = rig.dynamics
+    inertia = (INERTIA_SHARE[0] * nominal.yaw_inertia, INERTIA_SHARE[1] * nominal.yaw_inertia)
+    damping = (DAMPING_SHARE[0] * nominal.mechanical_damping, DAMPING_SHARE[1] * nominal.mechanical_damping)
+    truth = Truth(
+        cn_beta=_number(own, "cn_beta", CN_BETA, rng),
+        cn_r=_number(own, "cn_r", CN_R, rng),
+        yaw_inertia=_number(own, "yaw_inertia", inertia, rng, least=1e-6),
+        mechanical_damping=_number(own, "mechanical_damping", damping, rng),
+    )
+    zero = _number(own, "sensor_zero", SENSOR_ZERO, rng, least=-1.0, most=1.0)
     condition = Condition(
         id=f"k{stiffness:g}-v{wind:g}-a{np.rad2deg(angle):.3g}",
         spring_stiffness=stiffness,
@@ -236,10 +242,10 @@ def plan_run(
         release_angle=angle,
         duration=config.duration,
     )
-    plan = RunPlan(condition, truth, config.sensor(zero))
-    settings = _effects(given, config, plan, rng)
+    sensor = config.sensor(zero)
+    settings = _effects(given.get("effects"), config, condition, rng)
     try:
-        one_run = CampaignPlan("episode", 0, truth, (condition,), plan.sensor, tuple(settings))
+        one_run = CampaignPlan("episode", 0, truth, (condition,), sensor, tuple(settings))
         effects = plan_effects(one_run)
         for effect in effects:
             # An episode reads the motion as it goes: none of it can be passed over.
@@ -249,7 +255,7 @@ def plan_run(
                     where=f"effect {effect.name}",
                     remedy="inject it with tunnel simulate, which makes whole records",
                 )
-        return RunPlan(condition, truth, plan.sensor, effects)
+        return RunPlan(condition, truth, sensor, effects)
     except TunnelError as error:
         raise as_env_error(error, "option effects") from error
 
@@ -286,61 +292,27 @@ def _number(
     return float(value)
 
 
-def _stiffness(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> float:
-    if given.get("spring") is not None and given.get("spring_stiffness") is not None:
-        raise EnvError("spring and spring_stiffness are both given", remedy="give one of them")
-    if given.get("spring") is not None:
-        try:
-            return rig.spring(given["spring"])
-        except (TunnelError, TypeError) as error:
-            remedy = f"use one of {', '.join(map(str, rig.springs))}"
-            raise EnvError(
-                f"there is no spring {given['spring']!r}", where="option spring", remedy=remedy
-            ) from error
-    if given.get("spring_stiffness") is not None:
-        return _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
-    springs = drawn_springs(rig)
-    return springs[int(rng.integers(len(springs)))]
-
-
 def drawn_springs(rig: Rig) -> list[float]:
-    """The stiffnesses from which episodes draw: those that exceed the aerodynamic stiffness at any drawn speed.
-
-    Returns:
-        N m/rad; all springs where none is stiff enough.
-    """
+    """The stiffnesses from which episodes draw, N m/rad: those that exceed Ka at any drawn speed, or all."""
     flow = rig.body.flow(rig.air.density, WIND_SPEED[1])
     needed = STIFFNESS_MARGIN * aerodynamic_stiffness(CN_BETA[1], **flow)
     return [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
 
 
-def _release_angle(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> float:
-    limit = angle_limit(rig)
-    if given.get("release_angle") is not None:
-        return _number(given, "release_angle", (0.0, 0.0), None, least=-0.99 * limit, most=0.99 * limit)
-    return float(rng.choice((-1.0, 1.0)) * rng.uniform(*RELEASE_ANGLE))
-
-
-def _truth(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> tuple[Truth, float]:
-    nominal = rig.dynamics
-    inertia = tuple(share * nominal.yaw_inertia for share in INERTIA_SHARE)
-    damping = tuple(share * nominal.mechanical_damping for share in DAMPING_SHARE)
-    truth = Truth(
-        cn_beta=_number(given, "cn_beta", CN_BETA, rng),
-        cn_r=_number(given, "cn_r", CN_R, rng),
-        yaw_inertia=_number(given, "yaw_inertia", (inertia[0], inertia[1]), rng, least=1e-6),
-        mechanical_damping=_number(given, "mechanical_damping", (damping[0], damping[1]), rng),
-    )
-    return truth, _number(given, "sensor_zero", SENSOR_ZERO, rng, least=-1.0, most=1.0)
-
-
 def _effects(
-    given: Mapping[str, Any], config: FreeDecayConfig, plan: RunPlan, rng: np.random.Generator
+    stated: Any, config: FreeDecayConfig, condition: Condition, rng: np.random.Generator
 ) -> list[EffectSetting]:
-    stated = given.get("effects")
+    """The stated effects, or one of half to twice its typical severity, drawn with the stated probability."""
     if stated is None:
-        drawn = config.effect_probability > 0.0 and rng.random() < config.effect_probability
-        return [_drawn_effect(plan, rng)] if drawn else []
+        if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
+            return []
+        kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven)]
+        kind = kinds[int(rng.integers(len(kinds)))]
+        severity = kind.parameters()[0]
+        value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
+        spring = kind.chosen_spring()
+        chosen = {} if spring is None else {spring: condition.spring_stiffness}
+        return [EffectSetting(kind.name, {severity.name: value, **chosen})]
     if isinstance(stated, Mapping):
         pairs = [(name, _checked(values, values, f"effect {name}")) for name, values in stated.items()]
         return [EffectSetting(str(name), dict(values)) for name, values in pairs]
@@ -353,16 +325,3 @@ def _effects(
         where="option effects",
         remedy="give {name: {parameter: value}}, or a list of tunnel_sim.effects",
     )
-
-
-def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
-    """An effect of half to twice its typical severity."""
-    kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven)]
-    kind = kinds[int(rng.integers(len(kinds)))]
-    severity = kind.parameters()[0]
-    value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
-    values = {severity.name: value}
-    spring = kind.chosen_spring()
-    if spring is not None:
-        values[spring] = plan.condition.spring_stiffness
-    return EffectSetting(kind.name, values)

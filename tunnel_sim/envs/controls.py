@@ -31,11 +31,7 @@ class OperatorLog:
 
 
 def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
-    """The space of one environment's actions.
-
-    Returns:
-        ``Discrete(1)`` in the plain preset; else a box of two numbers from −1 to 1.
-    """
+    """The space of one environment's actions: ``Discrete(1)`` in the plain preset, else a box from −1 to 1."""
     if config.preset == "plain":
         return spaces.Discrete(1)
     return spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -44,17 +40,11 @@ def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
 def operator_action(
     config: FreeDecayConfig, *, wind_speed: float, moment: float = 0.0
 ) -> np.ndarray[Any, Any]:
-    """The action of the operator preset from values in SI units.
+    """The action of the operator preset, shape (2,), from values in SI units within their limits.
 
     Args:
         wind_speed: set-point, m/s, from 0 to the limit.
         moment: applied yaw moment, N m, within the limit to either side.
-
-    Returns:
-        The action, shape (2,), from −1 to 1.
-
-    Raises:
-        EnvError: when one is beyond its limit.
     """
     action = np.array([2.0 * wind_speed / config.wind_limit - 1.0, moment / config.moment_limit], np.float32)
     decode(config, action[None])
@@ -62,17 +52,7 @@ def operator_action(
 
 
 def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Array, Array]:
-    """Convert the actions of many runs to SI units.
-
-    Args:
-        actions: shape (runs, 2), from −1 to 1.
-
-    Returns:
-        Wind-speed set-points (m/s) and moments (N m), each of shape (runs,).
-
-    Raises:
-        EnvError: when the shape is wrong, or a number is not finite or outside the space.
-    """
+    """Actions, shape (runs, 2), as wind-speed set-points (m/s) and moments (N m), each of shape (runs,)."""
     values = np.asarray(actions, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != 2:
         raise EnvError(
@@ -92,14 +72,7 @@ def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Arra
 
 
 def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
-    """Refuse all actions except 0, the only action of the plain preset.
-
-    Args:
-        actions: as given to ``step``.
-
-    Raises:
-        EnvError: when an action is not 0, or there are too many or too few.
-    """
+    """Refuse all actions except 0, the only action of the plain preset."""
     values = np.asarray(actions)
     if values.size != count or values.dtype.kind not in "iu" or np.any(values != 0):
         raise EnvError(

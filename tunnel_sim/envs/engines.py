@@ -43,11 +43,7 @@ class Models:
         self._compiled: dict[tuple[object, ...], Model] = {}
 
     def of(self, settings: RunSettings) -> tuple[tuple[object, ...], int, Model]:
-        """The model of a run.
-
-        Returns:
-            Layout, number of steps between two samples, model.
-        """
+        """The layout of a run, its number of steps between two samples, and its model."""
         settings = follow_fastest(self._rig, settings)
         _, steps = sampling(settings, self._sample_rate)
         layout = settings.layout()
@@ -71,21 +67,14 @@ class OneRun:
         self._steps = 1
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Start a run at its release.
-
-        Returns:
-            Angle of the rod's upper end, rad.
-        """
+        """Start a run at its release; the angle of the rod's upper end, rad."""
         del row
         _, self._steps, self._model = self._models.of(settings)
         self._data = self._model.release_state()
         return float(self._data.qpos[self._model.yaw_address])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Integrate one control period.
-
-        Args:
-            operation: the operator's actions; None: nothing acts.
+        """Integrate one control period, without control where no operation is given.
 
         Returns:
             Angle (rad) and rate (rad/s) of the rod's upper end at the samples and at the period's end, each of
@@ -105,11 +94,7 @@ class OneRun:
         return angle, rate
 
     def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run.
-
-        Returns:
-            The result of ``mj_getState`` for `STATE`, shape (n,).
-        """
+        """MuJoCo's state of a run, as ``mj_getState`` gives it for `STATE`, shape (n,)."""
         del row
         assert self._model is not None
         state = np.empty(mujoco.mj_stateSize(self._model.mj, STATE))
@@ -165,20 +150,17 @@ class ManyRuns:
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
         """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
         if not self._members:
-            layouts = dict.fromkeys(self._layout)
-            self._members = {
-                layout: np.flatnonzero([other == layout for other in self._layout]) for layout in layouts
-            }
+            for layout in dict.fromkeys(self._layout):
+                self._members[layout] = np.flatnonzero([other == layout for other in self._layout])
+        control = None if operation is None else (operation.wind_departure, operation.moment)
         if len(self._members) == 1:
             (layout,) = self._members
-            control = None if operation is None else (operation.wind_departure, operation.moment)
             angle, rate = self._batches[layout].advance(self._samples, self._last, None, control)
         else:
             angle, rate = (np.empty((self._count, self._samples + 1)) for _ in range(2))
             for layout, rows in self._members.items():
-                control = (
-                    None if operation is None else (operation.wind_departure[rows], operation.moment[rows])
-                )
+                if operation is not None:
+                    control = operation.wind_departure[rows], operation.moment[rows]
                 first = self._last[:, rows]
                 angle[rows], rate[rows] = self._batches[layout].advance(self._samples, first, rows, control)
         self._last = np.stack((angle[:, -1], rate[:, -1]))

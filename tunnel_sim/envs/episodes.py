@@ -1,7 +1,4 @@
-"""Parallel episodes: readings, information, end, and the campaign they give.
-
-An environment has one episode, a vector environment many.
-"""
+"""Parallel episodes: readings, information, end, and the campaign they give; a vector environment has many."""
 
 from __future__ import annotations
 
@@ -69,11 +66,7 @@ class EpisodeState:
 
 
 def observation_space(config: FreeDecayConfig) -> spaces.Box:
-    """The space of one environment's observations.
-
-    Returns:
-        Readings (rad), then time (s) and wind speed (m/s).
-    """
+    """The space of one environment's observations: readings (rad), then time (s) and wind speed (m/s)."""
     low = np.array([-READING_BOUND] * config.samples_per_step + [0.0, 0.0])
     high = np.array([READING_BOUND] * config.samples_per_step + [config.duration, config.wind_limit])
     return spaces.Box(low, high, dtype=np.float64)
@@ -103,11 +96,7 @@ class Episodes:
     def start(
         self, row: int, options: Mapping[str, Any] | None, rng: np.random.Generator
     ) -> tuple[Array, dict[str, Any]]:
-        """Start an episode.
-
-        Raises:
-            EnvError: when an option is refused.
-        """
+        """Start an episode."""
         plan = plan_run(options, self._config, self._rig, rng)
         stated = plan.stated()
         try:
@@ -151,13 +140,19 @@ class Episodes:
         Returns:
             Observations of shape (runs, samples + 2), rewards (nats), terminations and truncations of shape
             (runs,).
-
-        Raises:
-            EnvError: when an action is refused.
         """
-        speeds, moment = self._operate(actions)
         operation = None
-        if self._config.preset == "operator":
+        if self._config.preset == "plain":
+            check_plain(actions, self._count)
+            speeds = np.broadcast_to(self._speed[:, None], (self._count, self._config.samples_per_step))
+            moment = np.zeros(self._count)
+        else:
+            set_point, moment = decode(self._config, actions)
+            if len(moment) != self._count:
+                raise EnvError(f"{len(moment)} actions for {self._count} runs", remedy="give one per run")
+            speeds, self._speed = self._wind.speeds(self._speed, set_point)
+            at = np.minimum(self.step_count, self._config.steps - 1)
+            self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
             operation = Operation(speeds - self._stated_speed[:, None], moment)
         angle, rate = self._engine.advance(operation)
         wild = ~(np.max(np.abs(angle), axis=1) <= self._limit)
@@ -174,25 +169,10 @@ class Episodes:
         self.ended |= wild | truncated
         return observations, rewards, wild, truncated
 
-    def _operate(self, actions: Any) -> tuple[Array, Array]:
-        """Wind speeds in the sample intervals, and moments; also writes the log."""
-        if self._config.preset == "plain":
-            check_plain(actions, self._count)
-            still = np.broadcast_to(self._speed[:, None], (self._count, self._config.samples_per_step))
-            return still, np.zeros(self._count)
-        set_point, moment = decode(self._config, actions)
-        if len(moment) != self._count:
-            raise EnvError(f"{len(moment)} actions for {self._count} runs", remedy="give one per run")
-        speeds, self._speed = self._wind.speeds(self._speed, set_point)
-        at = np.minimum(self.step_count, self._config.steps - 1)
-        self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
-        return speeds, moment
-
     def outcome(self, row: int) -> dict[str, Any]:
         """The content of ``info`` at the end of an episode.
 
-        Returns:
-            ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
+        ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
         """
         plan, record = self._plan(row), self.record(row)
         info: dict[str, Any] = {"record": record}
@@ -207,14 +187,7 @@ class Episodes:
         return info
 
     def record(self, row: int) -> Record:
-        """The record of a run so far.
-
-        Returns:
-            The record, complete where the run has ended.
-
-        Raises:
-            EnvError: before the first step.
-        """
+        """The record of a run so far."""
         return self._readings.record(row, int(self.step_count[row]))
 
     def _plan(self, row: int) -> RunPlan:
@@ -243,14 +216,7 @@ class Episodes:
         return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
-        """Continue an episode from a state of an environment with the same configuration.
-
-        Returns:
-            The generator that the episode uses from now on.
-
-        Raises:
-            EnvError: when the state belongs to a different configuration.
-        """
+        """Continue an episode from a state of the same configuration; the generator that it uses from now on."""
         rng = self._readings.restore(row, state.arrays["readings"], state.sensor, state.rng)
         self._engine.start(row, state.physics)
         self._engine.set_state(row, state.mujoco)
@@ -270,17 +236,10 @@ class _HasRig(Protocol):
 
 
 def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") -> Campaign:
-    """The runs of finished episodes as one campaign.
+    """The runs (``info["run"]``) of finished episodes in the plain preset as one campaign.
 
-    Args:
-        runs: ``info["run"]`` of each, in the plain preset.
-
-    Returns:
-        The campaign. It states the rig's nominal inertia and the configured sensor, and contains no trace of the
-        truth. Runs with equal conditions are numbered.
-
-    Raises:
-        EnvError: when no run is given.
+    It states the rig's nominal inertia and the configured sensor, and contains no trace of the truth. Runs
+    with equal conditions are numbered.
     """
     listed = list(runs)
     if not listed:

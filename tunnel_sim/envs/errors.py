@@ -6,19 +6,9 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 class EnvError(TunnelError, ValueError):
-    """A bad argument, option or action of an environment, described in one line.
-
-    Args:
-        what: what is wrong, as a short clause.
-        where: the argument, option or action concerned; empty when there is none.
-        remedy: what to do about it.
-    """
+    """A bad argument, option or action of an environment, described in one line."""
 
 
 def as_env_error(error: TunnelError, where: str) -> EnvError:
-    """Convert an error of a lower layer to an `EnvError`.
-
-    Args:
-        where: used where the error itself does not say what it concerns.
-    """
+    """Convert an error of a lower layer to an `EnvError`, which concerns ``where`` if it does not say itself."""
     return EnvError(error.what, where=error.where or where, remedy=error.remedy)

@@ -29,9 +29,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         height: of a picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
         **arguments: fields of `FreeDecayConfig`.
-
-    Raises:
-        EnvError: when an argument is unknown or out of range.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # type: ignore[misc]
@@ -66,15 +63,11 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         """Start a run.
 
         Args:
-            seed: of all random draws, as in Gymnasium.
             options: properties of the run; the others are drawn. See the environment's page.
 
         Returns:
             The observation (readings before the release, time 0 and wind speed), and the stated conditions of the
             run.
-
-        Raises:
-            EnvError: when an option is unknown or out of range.
         """
         super().reset(seed=seed)
         observation, info = self._episodes.start(0, options, self.np_random)
@@ -91,9 +84,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         Returns:
             Observation, information gained (nats), whether the angle left the sensor's range, whether the run
             has ended, and info.
-
-        Raises:
-            EnvError: when the action is outside the space, or no run is in progress.
         """
         if self._episodes.ended[0]:
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
@@ -105,63 +95,35 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return observation, float(reward), bool(terminated), bool(truncated), info
 
     def operator_action(self, *, wind_speed: float, moment: float = 0.0) -> np.ndarray[Any, Any]:
-        """The action of the operator preset from values in SI units.
+        """The action of the operator preset, shape (2,), from values in SI units within their limits.
 
         Args:
             wind_speed: set-point, m/s.
             moment: applied yaw moment, N m.
-
-        Returns:
-            The action, shape (2,).
-
-        Raises:
-            EnvError: when one is beyond its limit.
         """
         return operator_action(self.config, wind_speed=wind_speed, moment=moment)
 
     def information(self) -> Array:
-        """The Fisher information so far, including the prior.
+        """The Fisher information so far, including the prior, shape (7, 7), in the order of `UNKNOWNS`.
 
         It is computed at the true coefficients, so an agent must not observe it.
-
-        Returns:
-            Shape (7, 7), in the order of ``tunnel_sim.envs.information.UNKNOWNS``.
         """
         return self._episodes.matrix(0)
 
     def record(self) -> Record:
-        """The record so far, for example of a run ended by ``TimeLimit``.
-
-        Raises:
-            EnvError: before the first step.
-        """
+        """The record so far, for example of a run ended by ``TimeLimit``."""
         return self._episodes.record(0)
 
     def get_state(self) -> EpisodeState:
-        """The complete state of the episode in progress, including the states of MuJoCo and the plugin.
-
-        Raises:
-            EnvError: when no episode has begun.
-        """
+        """The complete state of the episode in progress, including the states of MuJoCo and the plugin."""
         return self._episodes.get_state(0)
 
     def set_state(self, state: EpisodeState) -> None:
-        """Continue from a saved state of this environment, or of one with the same configuration.
-
-        Raises:
-            EnvError: when the state belongs to a different configuration.
-        """
+        """Continue from a saved state of this environment, or of one with the same configuration."""
         self.np_random = self._episodes.set_state(0, state)
 
     def render(self) -> Any:
-        """Draw the rig in its present position.
-
-        Returns:
-            A picture of shape (height, width, 3), uint8, in mode ``rgb_array``; None otherwise.
-
-        Raises:
-            EnvError: when rendering does not work on this machine, with the remedy.
-        """
+        """Draw the rig in its present position: a picture, shape (height, width, 3), in mode ``rgb_array``."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() is called without a render_mode; give one to gymnasium.make")
             return None
@@ -173,13 +135,10 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
 
 def render_fps(control_period: float) -> float | int:
-    """Pictures per second of real time, 1/dt.
+    """Pictures per second of real time, 1/dt, Hz; an integer where possible.
 
     Args:
         control_period: s.
-
-    Returns:
-        Hz, as an integer where possible.
     """
     rate = 1.0 / control_period
     return round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate
@@ -197,9 +156,6 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
         width, height, camera: as in `FreeDecayEnv`.
         **arguments: fields of `FreeDecayConfig`.
-
-    Raises:
-        EnvError: when an argument is unknown or out of range.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -251,14 +207,27 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
 
         Returns:
             Observations of all runs (zeros where the mask excludes a run), and infos.
-
-        Raises:
-            EnvError: when an option, mask or seed is refused.
         """
         common = dict(options or {})
-        mask = self._mask(common.pop("reset_mask", None))
-        each = self._each(common.pop("runs", None))
-        seeds = self._seeds(seed)
+        mask, each = common.pop("reset_mask", None), common.pop("runs", None)
+        mask = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise EnvError(
+                f"reset_mask is not a boolean array of length {self.num_envs} with at least one True",
+                where="option reset_mask",
+                remedy="give one boolean per run",
+            )
+        each = [{}] * self.num_envs if each is None else each
+        if not isinstance(each, Sequence) or len(each) != self.num_envs:
+            what = f"runs is not a sequence of length {self.num_envs}"
+            raise EnvError(what, where="option runs", remedy="give one mapping per run")
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + row for row in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            what = f"{len(seeds)} seeds for {self.num_envs} runs"
+            raise EnvError(what, where="seed", remedy="give one per run")
         observations = np.zeros(self.observation_space.shape or ())
         infos: dict[str, Any] = {}
         for row in np.flatnonzero(mask).tolist():
@@ -275,51 +244,10 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         observation, info = self._episodes.start(row, options, rng)
         return observation, self._add_info(infos, info, row)
 
-    def _mask(self, mask: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        if mask is None:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        values = np.asarray(mask)
-        if values.shape != (self.num_envs,) or values.dtype != np.bool_ or not values.any():
-            raise EnvError(
-                f"reset_mask is not a boolean array of length {self.num_envs} with at least one True",
-                where="option reset_mask",
-                remedy="give one boolean per run",
-            )
-        return values
-
-    def _each(self, runs: Any) -> Sequence[Mapping[str, Any]]:
-        if runs is None:
-            return [{}] * self.num_envs
-        if not isinstance(runs, Sequence) or len(runs) != self.num_envs:
-            raise EnvError(
-                f"runs is not a sequence of length {self.num_envs}",
-                where="option runs",
-                remedy="give one mapping per run",
-            )
-        return runs
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + row for row in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise EnvError(
-                f"{len(seed)} seeds for {self.num_envs} runs", where="seed", remedy="give one per run"
-            )
-        return seed
-
     def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Advance all runs by one control period; runs that ended in the previous step are restarted instead.
 
-        Args:
-            actions: from ``action_space``; the action of a run that is restarted is ignored.
-
-        Returns:
-            Observations, information gained (nats), terminations, truncations and infos.
-
-        Raises:
-            EnvError: when an action is outside the space, or before the first reset.
+        Their actions are ignored. The results are as in `FreeDecayEnv.step`, for all runs.
         """
         if any(rng is None for rng in self._rngs):
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
@@ -341,22 +269,11 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return self._episodes.get_state(index)
 
     def set_state(self, index: int, state: EpisodeState) -> None:
-        """Put one run into a state.
-
-        Args:
-            state: from an environment of the same configuration.
-
-        Raises:
-            EnvError: when the state belongs to a different configuration.
-        """
+        """Put one run into a state of an environment of the same configuration."""
         self._rngs[index] = self._episodes.set_state(index, state)
 
     def information(self, index: int) -> Array:
-        """The Fisher information of one run so far.
-
-        Returns:
-            Shape (7, 7), as `FreeDecayEnv.information`.
-        """
+        """The Fisher information of one run so far, shape (7, 7), as `FreeDecayEnv.information`."""
         return self._episodes.matrix(index)
 
     def render(self) -> tuple[Any, ...] | None:
@@ -366,11 +283,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return tuple(self._view.draw(*self._engine.pose(row)) for row in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the rendering context.
-
-        Args:
-            **kwargs: not used.
-        """
+        """Close the rendering context."""
         del kwargs
         if hasattr(self, "_view"):  # Gymnasium before 1.3 closes also what could not be made
             self._view.close()

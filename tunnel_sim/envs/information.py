@@ -118,8 +118,7 @@ class Sensitivities:
     def advance(self, angle: Array, rate: Array, wind_speed: Array, moment: Array) -> Array:
         """Propagate the sensitivities through one step; arguments as in `Information.advance`.
 
-        Returns:
-            Sensitivities of the readings at the samples, shape (runs, 7, samples), in the order of `UNKNOWNS`.
+        They are those of the readings at the samples, shape (runs, 7, samples), in the order of `UNKNOWNS`.
         """
         if not np.array_equal(wind_speed, self._speed):
             stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
@@ -214,33 +213,19 @@ class Prior:
 
     @staticmethod
     def changed(changes: Mapping[str, float]) -> Prior:
-        """The prior with some of its numbers changed.
-
-        Args:
-            changes: standard deviations by name, in the units above.
-
-        Raises:
-            EnvError: when a name is unknown or a number out of range.
-        """
+        """The prior with some of its standard deviations changed."""
         known = [item.name for item in fields(Prior)]
         for name, value in changes.items():
             if name not in known:
                 raise EnvError(f"unknown prior {name!r}", where="prior", remedy=did_you_mean(name, known))
             least = 0.0 if name not in ("cn_beta", "cn_r") else 1e-300
             if not isinstance(value, int | float) or not isfinite(value) or value < least:
-                raise EnvError(
-                    f"{name} = {value!r} is not a standard deviation",
-                    where="prior",
-                    remedy="give it, SI units",
-                )
+                what = f"{name} = {value!r} is not a standard deviation"
+                raise EnvError(what, where="prior", remedy="give it, SI units")
         return replace(Prior(), **changes)
 
     def scales(self, run: NominalRun) -> Array:
-        """The standard deviations in the units of the unknowns.
-
-        Returns:
-            Shape (7,), in the order of `UNKNOWNS`.
-        """
+        """The standard deviations in the units of the unknowns, shape (7,), in the order of `UNKNOWNS`."""
         own = {"yaw_inertia": run.yaw_inertia, "mechanical_damping": abs(run.mechanical_damping)}
         return np.array([getattr(self, name) * own.get(name, 1.0) for name in UNKNOWNS])
 
@@ -252,7 +237,6 @@ class Information:
         samples: number of samples in one step.
         interval: between samples, s.
         variance: of a reading, rad².
-        prior: what is known before a run.
     """
 
     def __init__(self, count: int, samples: int, interval: float, variance: float, prior: Prior) -> None:
@@ -307,22 +291,12 @@ class Information:
     def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
         """Restore a run from a snapshot."""
         self._sensitivities.restore(row, run, state)
-        self._scale[row], self.scaled[row], self.known[row] = (
-            state["scale"],
-            state["scaled"],
-            state["known"],
-        )
+        self._scale[row], self.scaled[row] = state["scale"], state["scaled"]
+        self.known[row] = state["known"]
 
 
 def half_log_det(information: Array) -> Array:
-    """½ log det of the information about the last two unknowns, with all others eliminated.
-
-    Args:
-        information: positive definite, shape (n, m, m).
-
-    Returns:
-        Shape (n,), nats.
-    """
+    """½ log det of information, shape (n, m, m), about the last two unknowns: shape (n,), nats."""
     rest = information
     for _ in range(information.shape[-1] - 2):
         column = rest[:, 1:, 0]

@@ -45,9 +45,6 @@ class RunningSensor:
         Args:
             angle: of the rod's upper end, shape (n,), rad.
             time_s: shape (n,), s; continues from the previous call.
-
-        Returns:
-            Shape (n,), rad.
         """
         if not self._remembers:
             return self._chain.angle(angle, time_s)
@@ -80,23 +77,18 @@ class Readings:
         self._values = np.zeros((count, config.steps * config.samples_per_step))
 
     def start(self, row: int, chain: RunningSensor, rng: np.random.Generator) -> None:
-        """Start a run.
-
-        Args:
-            chain: the run's effects on the reading.
-        """
+        """Start a run with its effects on the reading."""
         self._chains[row], self._rngs[row] = chain, rng
         self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
         (self._altered.discard if chain.is_plain else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
-        """Readings of the control period before the release, with noise that is not drawn from the run's generator.
+        """Readings (rad) of the control period before the release, shape (samples,).
+
+        Their noise is not drawn from the run's generator.
 
         Args:
             angle: at which the rod's upper end is held, rad.
-
-        Returns:
-            Shape (samples,), rad.
         """
         chain = self._chain(row)
         sensor = chain.sensor
@@ -106,15 +98,12 @@ class Readings:
         return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
 
     def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
-        """The next readings of all runs, bit-identical to `tunnel_sim.effects.chain.read_motion`.
+        """The next readings of all runs, shape (runs, samples), rad.
 
         Args:
             angle: of the rod's upper end at the samples, shape (runs, samples), rad.
             step: number of the control period, shape (runs,).
             running: which runs are in progress, shape (runs,); the generators of the others are not used.
-
-        Returns:
-            Shape (runs, samples), rad.
         """
         noise = np.zeros_like(angle)
         for row in np.flatnonzero(running).tolist():
@@ -139,14 +128,7 @@ class Readings:
         return readings
 
     def record(self, row: int, steps: int) -> Record:
-        """The record of a run so far.
-
-        Args:
-            steps: number of control periods so far.
-
-        Raises:
-            EnvError: before the second reading.
-        """
+        """The record of a run over its first control periods."""
         count = steps * self._samples
         if count < 2:
             raise EnvError("there is no reading yet", where="record", remedy="call step() first")
@@ -159,18 +141,10 @@ class Readings:
     def restore(
         self, row: int, values: Array, chain: RunningSensor, rng: np.random.Generator
     ) -> np.random.Generator:
-        """Restore a run from a snapshot.
+        """Restore a run from a snapshot, with copies; the generator that it uses from now on.
 
         Args:
             values: readings from `snapshot`, shape (n,), rad.
-            chain: effects from `snapshot`.
-            rng: generator from `snapshot`.
-
-        Returns:
-            The generator that the run uses from now on, a copy.
-
-        Raises:
-            EnvError: when the readings belong to a different configuration.
         """
         if np.shape(values) != self._values[row].shape:
             raise EnvError("the state belongs to a different configuration", remedy="use the same arguments")

@@ -11,9 +11,9 @@ from pydantic import Field
 
 from tunnel_sim.files.run_files import read_input
 from tunnel_sim.files.toml_input import OneLine, StrictModel
-from tunnel_sim.vocabulary import excitation
 from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 from tunnel_sim.vocabulary.record import Array
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -120,7 +120,7 @@ def _check_band(table: DriveTable, samples: int, sample_rate: float, where: str)
     low, high = table.from_hz, table.to_hz
     if table.kind not in _BANDS or low is None or high is None:
         return
-    if low > high or not excitation.lines_in_band(samples, 1.0 / sample_rate, low, high).size:
+    if low > high or not lines_in_band(samples, 1.0 / sample_rate, low, high).size:
         raise TunnelError(
             f"no multiple of {sample_rate / samples:.4g} Hz, one over the duration, lies between from_hz = {low:g} "
             f"and to_hz = {high:g}",
@@ -147,15 +147,15 @@ def _waveform(table: DriveTable, time: Array, number: int) -> Array:
     rng = np.random.default_rng([table.seed or 0, number])
     match table.kind:
         case "square":
-            return excitation.square(time, table.frequency_hz or 0.0)
+            return square(time, table.frequency_hz or 0.0)
         case "chirp":
-            return excitation.chirp(time, low, high)
+            return chirp(time, low, high)
         case "multisine":
-            return excitation.multisine(time, low, high, None if table.seed is None else rng)
+            return multisine(time, low, high, None if table.seed is None else rng)
         case "random":
-            return excitation.band_noise(time, low, high, rng)
+            return band_noise(time, low, high, rng)
         case _:
-            return excitation.stepped_sine(time, table.frequencies_hz or [table.frequency_hz or 0.0])
+            return stepped_sine(time, table.frequencies_hz or [table.frequency_hz or 0.0])
 
 
 def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:

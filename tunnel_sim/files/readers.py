@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 
 from tunnel_sim.vocabulary.drive import INPUT_COLUMNS
-from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.plugins import added_to, loading
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, loading, one_line
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.tables import Table

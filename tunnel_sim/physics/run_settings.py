@@ -1,8 +1,7 @@
-"""The physics of one run as numbers, its release and its motion.
+"""The physics of one run as numbers, its release and its motion; MuJoCo and the forward integrator use them.
 
-The MuJoCo model and the forward integrator are both built from these numbers. At the release the body is held at
-its angle, at rest, and its rod is in balance with the spring. With a rod of compliance c and a spring Kr, the
-body's angle is 1 + Kr c times that of the spring's end.
+At the release the body is held at its angle, at rest, and its rod is in balance with the spring. With a rod
+of compliance c and a spring Kr, the body's angle is 1 + Kr c times that of the spring's end.
 """
 
 from __future__ import annotations
@@ -58,11 +57,7 @@ class Series:
     interval: float
 
     def __post_init__(self) -> None:
-        """Check the samples.
-
-        Raises:
-            TunnelError: when there are none, one is not finite, or the interval is not positive.
-        """
+        """Check the samples."""
         if not self.values or not all(map(isfinite, self.values)):
             raise TunnelError(
                 "a series needs at least one sample, and all samples must be finite",
@@ -86,11 +81,7 @@ class RodTwist:
     damping_ratio: float = 0.01
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            TunnelError: when one is out of range.
-        """
+        """Check the numbers."""
         _check("compliance of the rod", self.compliance, above=0.0)
         _check("inertia_share of the rod", self.inertia_share, above=0.0)
         _check("inertia share of the body", 1.0 - self.inertia_share, above=0.0)
@@ -102,26 +93,16 @@ class RodTwist:
         return 2.0 * self.damping_ratio * sqrt(yaw_inertia * share * (1.0 - share) / self.compliance)
 
     def free_frequency(self, yaw_inertia: float) -> float:
-        """Angular frequency of the twist with both ends free, below that of the rod on its spring.
-
-        Args:
-            yaw_inertia: the whole Izz, kg m².
-
-        Returns:
-            rad/s.
-        """
+        """Angular frequency of the twist with both ends free, rad/s; the total Izz is in kg m²."""
         share = self.inertia_share
         return sqrt(1.0 / (self.compliance * yaw_inertia * share * (1.0 - share)))
 
     def frequency(self, yaw_inertia: float, spring_stiffness: float) -> float:
-        """An upper bound on the natural frequency of the rod's twist.
+        """An upper bound on the natural frequency of the rod's twist, rad/s.
 
         Args:
             yaw_inertia: the total Izz, kg m².
             spring_stiffness: Kr, N m/rad.
-
-        Returns:
-            rad/s.
         """
         share = self.inertia_share
         return sqrt((1.0 / (self.compliance * (1.0 - share)) + spring_stiffness) / (yaw_inertia * share))
@@ -148,11 +129,7 @@ class DriveMoment:
     on_body: bool = True
 
     def __post_init__(self) -> None:
-        """Copy and check the samples.
-
-        Raises:
-            TunnelError: when they do not match, or one is not finite.
-        """
+        """Copy and check the samples."""
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay]])
@@ -203,11 +180,7 @@ class RunSettings:
     drive: DriveMoment | None = None
 
     def __post_init__(self) -> None:
-        """Check names and numbers. The plugin checks the bounds of the law's parameters.
-
-        Raises:
-            TunnelError: when a name is unknown or belongs to another field, or a number is out of range.
-        """
+        """Check names and numbers. The plugin checks the bounds of the law's parameters."""
         for name in ("yaw_inertia", "duration", "timestep"):
             _check(name, getattr(self, name), above=0.0)
         for name in ("spring_stiffness", "wind_speed", "air_density"):
@@ -224,23 +197,12 @@ class RunSettings:
             )
 
     def with_moment(self, program: tuple[float, ...]) -> RunSettings:
-        """A copy with a moment on the rod's upper end added.
-
-        Args:
-            program: of the moment, as for ``program``.
-        """
+        """A copy with a moment on the rod's upper end added, by its program."""
         add = (float(operation_names().index("add")),) if self.program else ()
         return replace(self, program=(*self.program, *program, *add))
 
     def with_parameters(self, values: Mapping[str, float]) -> RunSettings:
-        """A copy with parameters of the moment law added or replaced.
-
-        Args:
-            values: by name.
-
-        Raises:
-            TunnelError: when a name is unknown or belongs to a field.
-        """
+        """A copy with parameters of the moment law added or replaced."""
         parameters = {**self.parameters, **values}
         if not values.keys() <= _further():
             return replace(self, parameters=parameters)  # which says what is wrong
@@ -249,26 +211,14 @@ class RunSettings:
         return copy
 
     def layout(self) -> tuple[object, ...]:
-        """What runs must have in common to share one compiled model.
-
-        Returns:
-            Timestep, names and lengths of the series, lengths of program and drive, the drive's delay, and whether
-            the rod is rigid.
-        """
+        """What runs must have in common to share one compiled model."""
         series = tuple((name, len(series.values)) for name, series in self.series.items())
         drive = self.drive  # a delayed one is given by its means over the steps
         driven = drive and (drive.values.size, drive.delay, float(drive.time_s[-1]) if drive.delay else 0.0)
         return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:
-        """Every parameter of the moment law.
-
-        Args:
-            rig: gives frontal area, reference length and width.
-
-        Returns:
-            Value by name, in the law's order and units.
-        """
+        """Every parameter of the moment law by name, in the law's order and units; the rig gives its sizes."""
         given = {
             "air_density": self.air_density,
             "frontal_area": rig.body.frontal_area,
@@ -285,26 +235,12 @@ class RunSettings:
 
 
 def spring_end_angle(run: RunSettings) -> float:
-    """Angle of the spring's and sensor's end at the release.
-
-    Args:
-        run: its release angle is the body's.
-
-    Returns:
-        rad; the body's own angle where the rod is rigid.
-    """
+    """Angle of the spring's and sensor's end at the release, rad: the body's own where the rod is rigid."""
     return run.release_angle / _body_per_end(run)
 
 
 def released_by_spring_end(run: RunSettings) -> RunSettings:
-    """The run with the body's release angle, given that of the spring's and sensor's end.
-
-    Args:
-        run: its release angle is that of the spring's end, which is what a record shows.
-
-    Returns:
-        The same run, its release angle that of the body.
-    """
+    """The run with the body's release angle, given one with that of the spring's end, which a record shows."""
     if run.rod_twist is None:
         return run
     return dataclasses.replace(run, release_angle=run.release_angle * _body_per_end(run))
@@ -339,16 +275,11 @@ class Motion:
 def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
     """The number of samples in a run, and of integration steps between two samples.
 
+    Refused where the sample interval is not a whole number of timesteps, or the sample rate is outside its
+    limits.
+
     Args:
-        settings: duration and timestep, s.
         sample_rate: Hz.
-
-    Returns:
-        (samples, steps between samples).
-
-    Raises:
-        TunnelError: when the sample rate is outside its limits, or the sample interval is not a whole number of
-            timesteps.
     """
     if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
         raise TunnelError(

@@ -121,11 +121,7 @@ class Run:
         return known[self.drive.column]
 
     def to_xarray(self) -> Dataset:
-        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
-
-        Raises:
-            TunnelError: where xarray, of the extra ``frames``, is not installed.
-        """
+        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes."""
         try:
             from xarray import Dataset  # only here: an extra
         except ModuleNotFoundError as error:
@@ -151,11 +147,9 @@ def needs_density(wind_speed: float, *scales: float | None) -> bool:
 
 @dataclass(frozen=True)
 class Campaign:
-    """The runs of one rig with one sensor; the sensor's zero is unknown.
+    """The runs (at least one, with unique ids) of one rig with one sensor; the sensor's zero is unknown.
 
     Args:
-        name: short name, also of the folder.
-        runs: at least one run, with unique ids.
         law: of the joint in a model of one's own; None: spring and damper.
     """
 

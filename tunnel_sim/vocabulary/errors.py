@@ -1,12 +1,16 @@
-"""The error shown to users: what is wrong, where, and the remedy; and the libraries that may be missing."""
+"""The error shown to users: what is wrong, where, and the remedy; packages that are missing, or add to this."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 _LONGEST = 4096  # characters in one part of a message: the longest path
 
@@ -51,11 +55,7 @@ def shown(path: Path) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known name, or the list of all.
-
-    Returns:
-        A clause such as ``did you mean 'output_error'?``.
-    """
+    """The remedy for an unknown name: the closest known name, or the list of all."""
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1)
     return f"did you mean '{close[0]}'?" if close else f"use one of {', '.join(names)}"
@@ -74,21 +74,30 @@ EXTRAS = {
 
 
 def library(name: str, use: str, extra: str, where: str = "") -> Any:
-    """A library of an extra.
-
-    Args:
-        name: of its module.
-        use: what needs it, for the message.
-        extra: one of `EXTRAS`.
-
-    Raises:
-        TunnelError: when it is not installed; the remedy is the command that installs it.
-    """
+    """A library of an extra, by the name of its module and what needs it; one of `EXTRAS`."""
     try:
         return import_module(name)
     except ImportError:
+        what, remedy = f"{use} needs the package {name.partition('.')[0]}", f"virtual-wind-tunnel[{extra}]"
+        raise TunnelError(what, where=where, remedy=f"run: pip install '{remedy}'") from None
+
+
+def added_to(group: str) -> dict[str, EntryPoint]:
+    """The entry points of a group, such as ``tunnel.effects``, by name."""
+    from importlib.metadata import entry_points  # only here: every command would wait for it
+
+    return {point.name: point for point in entry_points(group=group)}
+
+
+@contextmanager
+def loading(group: str, name: str) -> Iterator[None]:
+    """Say in one line whatever a foreign package does wrong while its entry point is loaded within the block."""
+    try:
+        yield
+    except Exception as error:
+        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
         raise TunnelError(
-            f"{use} needs the package {name.partition('.')[0]}",
-            where=where,
-            remedy=f"run: pip install 'virtual-wind-tunnel[{extra}]'",
-        ) from None
+            f"cannot be loaded ({one_line(said)})",
+            where=f"entry point {group}: {name}",
+            remedy="correct or uninstall its package",
+        ) from error

@@ -25,7 +25,6 @@ class Term:
     """A part of the moment that a linear spring and damper leave out: minus the coefficient times the expression.
 
     Args:
-        expression: of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s).
         coefficient: in the unit.
         unit: such that the product is in N m.
     """
@@ -65,12 +64,7 @@ class JointLaw:
     @property
     def held(self) -> dict[str, float]:
         """Value of every parameter that is not fitted, by its name in a fit."""
-        known = {
-            "inertia": self.inertia,
-            "damping": self.damping,
-            "stiffness": 0.0,
-            "rest": self.rest,
-        }
+        known = {"inertia": self.inertia, "damping": self.damping, "stiffness": 0.0, "rest": self.rest}
         return {FREE_PARAMETERS[name]: value for name, value in known.items() if name not in self.free}
 
 
@@ -81,15 +75,20 @@ _STEPS = 8  # facets of a quarter round
 
 
 def davis_vertices(body: Body) -> Array:
-    """Vertices whose convex hull is the body, in its own frame.
+    """Vertices whose convex hull is the body, in its own frame: shape (n, 3), m.
 
-    Args:
-        body: dimensions, m, and slant, degrees.
-
-    Returns:
-        Array of shape (n, 3), m: x forward, y to the left, z up, origin at the middle of the bounding box.
+    x is forward, y to the left, z up; the origin is the middle of the bounding box.
     """
-    profile = np.array(_side_profile(body))
+    nose, tail = body.length / 2, -body.length / 2
+    top, bottom = body.height / 2, -body.height / 2
+    drop = _SLANT_DROP * body.height if body.rear_slant_deg > 0 else 0.0
+    run = drop / tan(radians(body.rear_slant_deg)) if drop else 0.0
+    radius = _NOSE_RADIUS * body.height
+    points = [(tail, bottom), (tail, top - drop), (min(tail + run, nose), top)]
+    for angle in np.linspace(0.0, pi / 2, _STEPS + 1):  # both front edges are quarter rounds
+        points.append((nose - radius * (1 - sin(angle)), top - radius * (1 - cos(angle))))
+        points.append((nose - radius / 2 * (1 - sin(angle)), bottom + radius / 2 * (1 - cos(angle))))
+    profile = np.array(points)
     radius = _EDGE_RADIUS * body.height
     layers = []
     for angle in np.linspace(0.0, pi / 2, _STEPS + 1):
@@ -100,19 +99,6 @@ def davis_vertices(body: Body) -> Array:
         layers += [np.insert(shrunk, 1, side * offset, axis=1) for side in (-1.0, 1.0)]
     # angle 0: full profile at reduced width; angle pi/2: shrunk profile at full width
     return np.concatenate(layers)
-
-
-def _side_profile(body: Body) -> list[tuple[float, float]]:
-    nose, tail = body.length / 2, -body.length / 2
-    top, bottom = body.height / 2, -body.height / 2
-    drop = _SLANT_DROP * body.height if body.rear_slant_deg > 0 else 0.0
-    run = drop / tan(radians(body.rear_slant_deg)) if drop else 0.0
-    radius = _NOSE_RADIUS * body.height
-    points = [(tail, bottom), (tail, top - drop), (min(tail + run, nose), top)]
-    for angle in np.linspace(0.0, pi / 2, _STEPS + 1):  # both front edges are quarter rounds
-        points.append((nose - radius * (1 - sin(angle)), top - radius * (1 - cos(angle))))
-        points.append((nose - radius / 2 * (1 - sin(angle)), bottom + radius / 2 * (1 - cos(angle))))
-    return points
 
 
 @dataclass(frozen=True)
@@ -228,11 +214,7 @@ class Potentiometer:
 
 @dataclass(frozen=True)
 class Rig:
-    """The whole rig.
-
-    Args:
-        springs: torsional stiffness by spring number, N m/rad (paper, Table II).
-    """
+    """The whole rig; springs are torsional stiffnesses (N m/rad) by spring number (paper, Table II)."""
 
     working_section: WorkingSection
     body: Body
@@ -243,17 +225,7 @@ class Rig:
     springs: Mapping[int, float]
 
     def spring(self, number: int) -> float:
-        """The stiffness of a numbered spring.
-
-        Args:
-            number: as in Table II.
-
-        Returns:
-            Kr, N m/rad.
-
-        Raises:
-            TunnelError: when there is no such spring.
-        """
+        """The stiffness of a numbered spring of Table II, Kr, N m/rad."""
         if number not in self.springs:
             known = ", ".join(str(n) for n in self.springs)
             raise TunnelError(f"there is no spring {number}", remedy=f"use one of {known}")
