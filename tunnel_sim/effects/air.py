@@ -26,12 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class NonlinearYawMoment(Effect):
-    """An aerodynamic yaw moment that is not linear in the yaw angle.
-
-    Args:
-        coefficient: relative change of Ka per squared angle, 1/rad2.
-        exponent: power of the angle in the factor (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
-    """
+    """An aerodynamic yaw moment that is not linear in the yaw angle."""
 
     name = "nonlinear_yaw_moment"
     place = 9
@@ -63,12 +58,7 @@ class NonlinearYawMoment(Effect):
 
 @dataclass(frozen=True)
 class NonlinearYawDamping(Effect):
-    """Aerodynamic damping that depends on the yaw angle.
-
-    Args:
-        coefficient: relative change of Ca per squared angle, 1/rad2.
-        exponent: power of the angle in the factor (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
-    """
+    """Aerodynamic damping that depends on the yaw angle."""
 
     name = "nonlinear_yaw_damping"
     place = 11
@@ -106,11 +96,7 @@ _UNSEEN_SHARE = 0.2
 
 @dataclass(frozen=True)
 class UnsteadyAeroLag(Effect):
-    """An aerodynamic moment that lags or leads the yaw angle.
-
-    Args:
-        lag: time constant in units of l/V, l/V.
-    """
+    """An aerodynamic moment that lags or leads the yaw angle."""
 
     name = "unsteady_aero_lag"
     place = 12
@@ -161,12 +147,7 @@ class UnsteadyAeroLag(Effect):
 
 @dataclass(frozen=True)
 class FlowMisalignment(Effect):
-    """Flow at an angle to the rig's axis, which gives a steady yaw moment.
-
-    Args:
-        angle: angle of the flow against the rig's zero (at 20 m/s where it depends on the speed), rad.
-        exponent: power of the speed in the angle, dimensionless; 0 in the textbook form.
-    """
+    """Flow at an angle to the rig's axis, which gives a steady yaw moment."""
 
     name = "flow_misalignment"
     place = 15
@@ -198,12 +179,7 @@ class FlowMisalignment(Effect):
 
 @dataclass(frozen=True)
 class WindSpeedOffset(Effect):
-    """A constant error of the stated wind speed.
-
-    Args:
-        offset: true minus stated speed (at 20 m/s where it depends on the speed), m/s.
-        exponent: power of the stated speed in the offset, dimensionless; 0 in the textbook form.
-    """
+    """A constant error of the stated wind speed."""
 
     name = "wind_speed_offset"
     place = 23
@@ -245,12 +221,7 @@ _SAMPLES = 201  # of an exponential drift, linear in between: within 1e-4 of the
 
 @dataclass(frozen=True)
 class WindSpeedDrift(Effect):
-    """A wind speed that drifts during the run.
-
-    Args:
-        drift: relative gain of speed over the run, dimensionless.
-        settling: length of the run over the drift's time constant, dimensionless; 0: linear (textbook form).
-    """
+    """A wind speed that drifts during the run."""
 
     name = "wind_speed_drift"
     place = 10
@@ -289,12 +260,7 @@ _INTERVAL = 1e-3  # s between samples of the random moment
 
 @dataclass(frozen=True)
 class Buffeting(Effect):
-    """A random moment from the turbulence of the stream.
-
-    Args:
-        intensity: standard deviation of the moment coefficient, dimensionless.
-        bandwidth: corner frequency of the moment's spectrum, Hz.
-    """
+    """A random moment from the turbulence of the stream."""
 
     name = "buffeting"
     place = 13
@@ -360,12 +326,7 @@ class Buffeting(Effect):
 
 @dataclass(frozen=True)
 class VortexShedding(Effect):
-    """A periodic moment from vortices shed by the body.
-
-    Args:
-        amplitude: coefficient of the moment, dimensionless.
-        strouhal_number: Strouhal number based on the body's width, dimensionless.
-    """
+    """A periodic moment from vortices shed by the body."""
 
     name = "vortex_shedding"
     place = 14

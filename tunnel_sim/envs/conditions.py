@@ -12,7 +12,7 @@ import numpy as np
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, stated_run
-from tunnel_sim.envs.errors import EnvError, as_env_error
+from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings

@@ -11,11 +11,10 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.conditions import free_decay_config
-from tunnel_sim.envs.controls import action_space, operator_action
-from tunnel_sim.envs.engines import ManyRuns, Models, OneRun
+from tunnel_sim.envs.engines import ManyRuns, Models, OneRun, action_space, operator_action
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
-from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView, render_modes
 from tunnel_sim.vocabulary.record import Array, Record
 

@@ -35,7 +35,7 @@ from math import isfinite
 
 import numpy as np
 
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.record import Array
 

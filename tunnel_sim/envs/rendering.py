@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.engine.model import build_model
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives

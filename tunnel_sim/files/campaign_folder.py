@@ -15,8 +15,8 @@ from tunnel_sim.files.plausible import (
     checked_record,
     plausible_values,
 )
+from tunnel_sim.files.readers import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
-from tunnel_sim.files.run_files import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.toml_input import (
     OneLine,
     SampleRate,

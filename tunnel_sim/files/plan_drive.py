@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from tunnel_sim.files.run_files import read_input
+from tunnel_sim.files.readers import read_input
 from tunnel_sim.files.toml_input import OneLine, StrictModel
 from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -1,4 +1,4 @@
-"""The plan of a campaign: the tables of its TOML file, and reading them.
+"""The plan of a campaign: the tables of its TOML file, and reading them; and the tables of an effects file.
 
 The packaged ``data/paper-campaign.toml`` is an example with a comment on every key.
 """
@@ -10,7 +10,7 @@ from importlib import resources
 from itertools import count
 from math import radians
 from pathlib import Path
-from typing import Annotated, Protocol, TypeVar
+from typing import Annotated, Literal, Protocol, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -295,3 +295,53 @@ def paper_plan() -> CampaignPlan:
 def _short(value: float) -> str:
     """The shortest text that represents a number uniquely: ``15``, ``16.12``."""
     return repr(value + 0.0).removesuffix(".0")  # + 0.0: minus zero is zero
+
+
+Formula = Annotated[OneLine, Field(max_length=limits.EXPRESSION_CHARACTERS)]
+
+
+class ParameterTable(StrictModel):
+    """``[effects.parameters.NAME]``."""
+
+    unit: OneLine = Field(description='a unit in quotes, such as "N m/rad", or "1" for a number')
+    scale: float = Field(description="a typical value, a number in its unit")
+    lower: float = Field(description="the least value, a number in its unit")
+    upper: float = Field(description="the greatest value, a number in its unit")
+    default: float | None = Field(default=None, description="a number in its unit")
+    meaning: OneLine | None = Field(default=None, description="a clause in quotes")
+
+
+class OwnEffectTable(StrictModel):
+    """``[[effects]]``."""
+
+    name: Annotated[OneLine, Field(pattern="^[a-z][a-z0-9_]{0,63}$")] = Field(
+        description="a name of lower-case letters, digits and _"
+    )
+    channel: Literal["stiffness", "damping", "forcing", "sensor", "calibration"] = Field(
+        description="stiffness, damping, forcing, sensor or calibration"
+    )
+    condition: Literal["always", "wind_on"] = Field(default="always", description="always or wind_on")
+    moment: Formula | None = Field(default=None, description="an expression in quotes, N m")
+    reading: Formula | None = Field(default=None, description="an expression in quotes, rad")
+    summary: OneLine = Field(default="An effect by expression.", description="a sentence in quotes")
+    parameters: Annotated[
+        dict[str, ParameterTable], Field(min_length=1, max_length=limits.OWN_PARAMETERS)
+    ] = Field(description="tables [effects.parameters.NAME], the severity first")
+
+
+class EffectsDocument(StrictModel):
+    """The whole of an effects file."""
+
+    effects: Annotated[list[OwnEffectTable], Field(min_length=1, max_length=limits.OWN_EFFECTS)] = Field(
+        description="tables [[effects]]"
+    )
+
+
+def read_effect_tables(path: Path) -> list[OwnEffectTable]:
+    """The tables of an effects file (TOML), their expressions not yet parsed.
+
+    Args:
+        path: a TOML file.
+    """
+    document = load_toml(path, missing="name an effects file; docs/how-to/add-an-effect.md has an example")
+    return validate(EffectsDocument, document, path).effects
