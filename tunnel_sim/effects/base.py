@@ -109,11 +109,9 @@ class Effect:
             value = getattr(self, info.name)
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not (number and info.lower <= value <= info.upper and abs(value) < math.inf):
-                raise TunnelError(
-                    f"{info.name} = {value!r} is out of range",
-                    where=f"effect {self.name}",
-                    remedy=f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}",
-                )
+                what = f"{info.name} = {value!r} is out of range"
+                remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
+                raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
@@ -280,9 +278,8 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
     known = [info.name for info in kind.parameters()]
     for name in parameters:
         if name not in known:
-            raise TunnelError(
-                f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=did_you_mean(name, known)
-            )
+            remedy = did_you_mean(name, known)
+            raise TunnelError(f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=remedy)
     return kind(**parameters)
 
 

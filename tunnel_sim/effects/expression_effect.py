@@ -149,10 +149,8 @@ def expression_effect(
     units = _UNITS | {own: quantity.unit for own, quantity in parameters.items()}
     found = formula.dimension({own: dimension(unit) for own, unit in units.items()})
     if found != dimension(expected):
-        raise TunnelError(
-            f"{text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})",
-            remedy="correct the expression or the units of its parameters",
-        )
+        what = f"{text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})"
+        raise TunnelError(what, remedy="correct the expression or the units of its parameters")
     unused = [own for own in parameters if own not in formula.names]
     if unused:
         raise TunnelError(f"parameter {unused[0]} is not in {text!r}", remedy="use it or leave it out")
@@ -183,9 +181,8 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
         if not (name.isidentifier() and name.isascii()) or keyword.iskeyword(name):
             raise TunnelError(f"{name!r} is not a parameter's name", remedy="use letters, digits and _")
         if name in _WORDS or hasattr(ExpressionEffect, name):
-            raise TunnelError(
-                f"a parameter cannot be named {name!r}", remedy="choose a name that has no other meaning"
-            )
+            remedy = "choose a name that has no other meaning"
+            raise TunnelError(f"a parameter cannot be named {name!r}", remedy=remedy)
         if not all(quantity.lower <= value <= quantity.upper for value in (quantity.default, quantity.scale)):
             raise TunnelError(
                 f"parameter {name}: the default {quantity.default:g} or the scale {quantity.scale:g} is not from "
@@ -193,15 +190,12 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
                 remedy="correct lower, upper, scale or default",
             )
         if quantity.scale == 0.0:
-            raise TunnelError(
-                f"parameter {name}: the scale is 0", remedy="state a typical value as the scale"
-            )
+            remedy = "state a typical value as the scale"
+            raise TunnelError(f"parameter {name}: the scale is 0", remedy=remedy)
     severity = next(iter(parameters.values()), None)
     if severity is None or severity.default != 0.0:
-        raise TunnelError(
-            "the first parameter is not a severity",
-            remedy="give it the default 0, which removes the effect",
-        )
+        remedy = "give it the default 0, which removes the effect"
+        raise TunnelError("the first parameter is not a severity", remedy=remedy)
 
 
 def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null: str) -> None:
@@ -216,15 +210,11 @@ def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null:
     without = tried["y"] if null == "y" else 0.0
     at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
     if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
-        raise TunnelError(
-            f"{formula.text!r} has no finite value somewhere in the motion of a rig",
-            remedy="avoid division by zero, and roots and logarithms of negative numbers",
-        )
+        what = f"{formula.text!r} has no finite value somewhere in the motion of a rig"
+        raise TunnelError(what, remedy="avoid division by zero, and roots and logarithms of negative numbers")
     if np.any(np.abs(at_null - without) > 1e-12):
-        raise TunnelError(
-            f"{formula.text!r} is not {null} at {severity} = 0",
-            remedy="write it so that the first parameter, the severity, removes the effect",
-        )
+        remedy = "write it so that the first parameter, the severity, removes the effect"
+        raise TunnelError(f"{formula.text!r} is not {null} at {severity} = 0", remedy=remedy)
     if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
 

@@ -88,11 +88,9 @@ def check_kind(kind: object) -> None:
     except (TypeError, IndexError):  # not described, or none
         has_null = False
     if not has_null:
-        raise TunnelError(
-            "the first parameter is its severity, whose default must be 0 within its bounds",
-            where=where,
-            remedy="declare its parameters with tunnel_sim.effects.parameters.parameter",
-        )
+        what = "the first parameter is its severity, whose default must be 0 within its bounds"
+        remedy = "declare its parameters with tunnel_sim.effects.parameters.parameter"
+        raise TunnelError(what, where=where, remedy=remedy)
     for info in kind.parameters():  # the answer is converted from its unit
         try:
             dimension(info.unit)
@@ -137,9 +135,8 @@ def effect_class(name: str) -> type[Effect]:
     for kind in known_effects():
         if kind.name == name:
             return kind
-    raise TunnelError(
-        f"unknown effect {name!r}", remedy=did_you_mean(name, [kind.name for kind in known_effects()])
-    )
+    remedy = did_you_mean(name, [kind.name for kind in known_effects()])
+    raise TunnelError(f"unknown effect {name!r}", remedy=remedy)
 
 
 def the_effect(**traits: object) -> type[Effect]:

@@ -153,11 +153,9 @@ class _Reader:
         if path.is_dir():  # a name that is put together from a folder of other files
             return None
         if not any(real.is_relative_to(root) for root in self._roots):
-            raise TunnelError(
-                f"names {one_line(place)!r}, which is outside the model's folder",
-                where=shown(self._path),
-                remedy="move it there, or name its folder with --asset-dir",
-            )
+            what = f"names {one_line(place)!r}, which is outside the model's folder"
+            remedy = "move it there, or name its folder with --asset-dir"
+            raise TunnelError(what, where=shown(self._path), remedy=remedy)
         return read_regular(path, limit)
 
     def _check_size(self, files: Mapping[str, bytes], limit: int, what: str) -> None:
@@ -296,9 +294,8 @@ def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
             the model cannot be simulated.
     """
     if not model.opt.timestep > 0.0:
-        raise TunnelError(
-            f"its timestep of {model.opt.timestep} s is not above zero", remedy="correct the model's option"
-        )
+        remedy = "correct the model's option"
+        raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)
     names = [model.joint(i).name for i in range(model.njnt)]
     if joint not in names:
         known = [name for name in names if name]
@@ -306,15 +303,11 @@ def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
         raise TunnelError("there is no such joint", remedy=remedy)
     others = [name or "without a name" for name in names if name != joint]
     if others:
-        raise TunnelError(
-            f"other joints move too: {one_line(', '.join(others), 200)}",
-            remedy="remove them, so that the bodies are welded; one joint is recorded",
-        )
+        remedy = "remove them, so that the bodies are welded; one joint is recorded"
+        raise TunnelError(f"other joints move too: {one_line(', '.join(others), 200)}", remedy=remedy)
     if model.neq or model.nflex or model.na:
-        raise TunnelError(
-            "equality constraints, deformable bodies and actuators with states cannot be part of the law",
-            remedy="remove them",
-        )
+        what = "equality constraints, deformable bodies and actuators with states cannot be part of the law"
+        raise TunnelError(what, remedy="remove them")
     kind = _TYPES.get(int(model.jnt_type[0]))
     if kind is None:
         raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
@@ -333,9 +326,8 @@ class _Engine:
         mujoco.mj_forward(self.model, self.data)
         moment = float(self.data.qfrc_passive[0] + self.data.qfrc_actuator[0] - self.data.qfrc_bias[0])
         if not abs(moment) <= limits.LARGEST_NUMBER:
-            raise TunnelError(
-                "its moment overflows", remedy="correct gravity, masses and stiffness, in SI units"
-            )
+            remedy = "correct gravity, masses and stiffness, in SI units"
+            raise TunnelError("its moment overflows", remedy=remedy)
         return moment
 
     def inertia(self) -> float:
@@ -346,18 +338,30 @@ class _Engine:
 
 
 def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
+    from scipy.optimize import brentq  # only here: slow to load
+
     engine = _Engine(model)
     centre = float(model.qpos0[0])
-    rest = _rest(engine, centre, 10.0 * reach if slide else math.pi)
+    # The stable rest position closest to the model's own configuration.
+    around = 10.0 * reach if slide else math.pi
+    grid = centre + np.linspace(-around, around, _GRID) * (1.0 + 1e-9)
+    moments = np.array([engine.moment(x) for x in grid])
+    moments[np.abs(moments) < 1e-12 * np.max(np.abs(moments))] = 0.0
+    falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
+    if falls.size == 0:
+        what = "does not oscillate: it has no stable rest position nearby"
+        raise TunnelError(what, remedy="add the spring, or gravity, that restores it")
+    at = falls[np.argmin(np.abs(grid[falls] - centre))]
+    rest = float(grid[at])
+    if engine.moment(rest) > 0.0:  # rest lies between the grid's positions
+        rest = float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
     span = 2.0 * reach if slide else math.pi
     b = np.linspace(-span, span, _GRID)
     restoring = np.array([-engine.moment(rest + x) for x in b])
     terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
     if terms is None:
-        raise TunnelError(
-            "its restoring moment is not that of gravity and of springs up to the third power",
-            remedy="write tendons, dead bands and actuators as the joint's own stiffness",
-        )
+        what = "its restoring moment is not that of gravity and of springs up to the third power"
+        raise TunnelError(what, remedy="write tendons, dead bands and actuators as the joint's own stiffness")
     stiffness = terms.pop("b", 0.0)
     own = int(model.dof_frictionloss[0] > 0.0)
     for x in np.linspace(-reach, reach, _GRID // 4):  # nothing else may act within the records' reach
@@ -369,15 +373,12 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
                 remedy="exclude the contact, or set contype and conaffinity to 0",
             )
         if engine.data.nefc > own:
-            raise TunnelError(
-                f"a limit or another constraint acts at {rest + x:.3g} rad, within the records' reach",
-                remedy="widen the joint's range, or check the units of range and records",
-            )
+            what = f"a limit or another constraint acts at {rest + x:.3g} rad, within the records' reach"
+            raise TunnelError(what, remedy="widen the joint's range, or check the units of range and records")
     inertias = [(engine.moment(rest + x), engine.inertia())[1] for x in (0.0, 0.4 * span, -0.7 * span)]
     if not limits.SMALLEST_NUMBER <= inertias[0] <= limits.LARGEST_NUMBER:
-        raise TunnelError(
-            f"its inertia is {inertias[0]:g} kg m2", remedy="correct its axis and the masses, in SI units"
-        )
+        remedy = "correct its axis and the masses, in SI units"
+        raise TunnelError(f"its inertia is {inertias[0]:g} kg m2", remedy=remedy)
     if np.ptp(inertias) > _EXACT * inertias[0]:
         raise TunnelError("its inertia changes with its position", remedy="remove the tendon's armature")
     if not stiffness > 0.0:
@@ -402,25 +403,6 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
         tuple(Term(text, value, units[text]) for text, value in {**terms, **damping}.items()),
         slide=slide,
     )
-
-
-def _rest(engine: _Engine, centre: float, span: float) -> float:
-    """The stable rest position closest to the model's own configuration."""
-    from scipy.optimize import brentq  # only here: slow to load
-
-    grid = centre + np.linspace(-span, span, _GRID) * (1.0 + 1e-9)
-    moments = np.array([engine.moment(x) for x in grid])
-    moments[np.abs(moments) < 1e-12 * np.max(np.abs(moments))] = 0.0
-    falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
-    if falls.size == 0:
-        raise TunnelError(
-            "does not oscillate: it has no stable rest position nearby",
-            remedy="add the spring, or gravity, that restores it",
-        )
-    at = falls[np.argmin(np.abs(grid[falls] - centre))]
-    if engine.moment(grid[at]) <= 0.0:  # rest lies on the grid
-        return float(grid[at])
-    return float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
 
 
 def _fitted(

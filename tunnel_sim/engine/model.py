@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from math import cos, pi, radians, sin
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import native_library, state_vector
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings, spring_end_angle
+from tunnel_sim.physics.run_settings import RunSettings, spring_end_angle
 from tunnel_sim.physics.steps import check_stable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
@@ -327,36 +327,32 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
     drive = settings.drive
     if drive is None:
         return values
-    drive = drive if drive.delay == 0.0 else _mean_by_step(drive, settings.timestep)
-    times = drive.time_s
+    times, given, held, step = drive.time_s, drive.values, drive.held, settings.timestep
+    if drive.delay != 0.0:
+        # As its mean over every step: its impulse is kept, and what is lost is of second order.
+        ends = step * np.arange(round((times[-1] + max(drive.delay, 0.0)) / step) + 2) - drive.delay
+        before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
+        now = given[before] if held else np.interp(ends, times, given)
+        until = np.diff(times) * (given[:-1] if held else 0.5 * (given[:-1] + given[1:]))
+        integral = np.append(0.0, np.cumsum(until))[before]
+        integral += 0.5 * (given[before] + now) * (ends - times[before])
+        given, held = np.diff(integral) / step, True
+        times = step * np.arange(given.size, dtype=np.float64)
     interval = float(times[-1]) / max(1, times.size - 1)
     at = interval * np.arange(times.size)
     even = times.size > 1 and np.allclose(times, at, rtol=0.0, atol=1e-6 * interval)
-    steps = interval / settings.timestep
+    steps = interval / step
     if not even or abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise TunnelError(
             "the samples of the drive are not at even times from 0 on, a whole number of steps apart",
             remedy="give it at the times of the record, and a timestep that divides their interval",
         )
     return values | {
-        "drive": tuple((drive.scale * drive.values).tolist()),
+        "drive": tuple((drive.scale * given).tolist()),
         "drive_interval": (interval,),
-        "drive_held": (float(drive.held),),
+        "drive_held": (float(held),),
         "drive_on_end": (float(not drive.on_body),),
     }
-
-
-def _mean_by_step(drive: DriveMoment, timestep: float) -> DriveMoment:
-    """A delayed drive as its mean over every step: its impulse is kept, and what is lost is of second order."""
-    at, values = drive.time_s, drive.values
-    ends = timestep * np.arange(round((at[-1] + max(drive.delay, 0.0)) / timestep) + 2) - drive.delay
-    before = np.clip(np.searchsorted(at, ends, side="right") - 1, 0, at.size - 1)
-    now = values[before] if drive.held else np.interp(ends, at, values)
-    until = np.diff(at) * (values[:-1] if drive.held else 0.5 * (values[:-1] + values[1:]))
-    integral = np.append(0.0, np.cumsum(until))[before] + 0.5 * (values[before] + now) * (ends - at[before])
-    means = np.diff(integral) / timestep
-    starts = timestep * np.arange(means.size, dtype=np.float64)
-    return replace(drive, time_s=starts, values=means, delay=0.0, held=True)
 
 
 def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:

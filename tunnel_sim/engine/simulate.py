@@ -222,8 +222,5 @@ def _no_clock() -> Callable[[], float]:
 
 def _check_finite(angle: Array, where: str) -> None:
     if not np.all(np.isfinite(angle)) or np.max(np.abs(angle)) > 1e3:
-        raise TunnelError(
-            "the motion grows without bound",
-            where=where,
-            remedy="check the sign of the damping, and that the total stiffness is positive (Kr > Ka)",
-        )
+        remedy = "check the sign of the damping, and that the total stiffness is positive (Kr > Ka)"
+        raise TunnelError("the motion grows without bound", where=where, remedy=remedy)

@@ -54,9 +54,8 @@ def simulate_campaigns(
     rig = load_rig() if rig is None else rig
     rates = {plan.sensor.sample_rate for plan in plans}
     if len(rates) != 1:
-        raise TunnelError(
-            f"the plans have {len(rates)} different sample rates", remedy="simulate each rate separately"
-        )
+        remedy = "simulate each rate separately"
+        raise TunnelError(f"the plans have {len(rates)} different sample rates", remedy=remedy)
     drawn = []  # of every run in the plans' order
     for plan in plans:
         effects = plan_effects(plan)
@@ -143,48 +142,35 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
             raise TunnelError(f"{severity.name} is missing", where=f"effect {effect.name}", remedy=remedy)
         effects.append(effect)
     names = [effect.name for effect in effects]
+    springs = sorted({condition.spring_stiffness for condition in plan.conditions})
+    drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
     for effect in effects:
         where = f"effect {effect.name}"
         if names.count(effect.name) > 1:
             remedy = "give it once, with all its parameters"
             raise TunnelError("is given twice", where=where, remedy=remedy)
-        if not effect.is_null:
-            _check_spring(effect, plan, where)
-            _check_driven(effect, plan, where)
+        if effect.is_null:
+            continue
+        parameter = effect.chosen_spring()
+        chosen = None if parameter is None else getattr(effect, parameter)
+        if chosen is not None and not any(isclose(k, chosen, rel_tol=SPRING_TOLERANCE) for k in springs):
+            what = f"no run has a spring_stiffness of {chosen:g} N m/rad"  # so it would do nothing
+            remedy = f"give one of {', '.join(f'{spring:g}' for spring in springs)}"
+            raise TunnelError(what, where=where, remedy=remedy)
+        if effect.driven and not drives:
+            what = "acts on driven runs only, and all runs of the plan are free decays"
+            raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
+        if effect.skips and drives:
+            what = "leaves samples out, which is not simulated for driven runs"
+            raise TunnelError(what, where=where, remedy="leave out the effect or [drive]")
+        if (effect.channel, effect.condition) == ("stiffness", "always") and not all(
+            d.on_body for d in drives
+        ):
+            what = "changes the spring, which is not simulated where its root moves"
+            remedy = "leave out the effect, or drive the body by amplitudes_nm"
+            raise TunnelError(what, where=where, remedy=remedy)
     known = known_effects()
     return tuple(sorted(effects, key=lambda effect: (not effect.ahead_of_sensor, known.index(type(effect)))))
-
-
-def _check_spring(effect: Effect, plan: CampaignPlan, where: str) -> None:
-    """Refuse an effect on a spring that no run has: it would do nothing."""
-    springs = sorted({condition.spring_stiffness for condition in plan.conditions})
-    parameter = effect.chosen_spring()
-    if parameter is None:
-        return
-    chosen = getattr(effect, parameter)
-    if not any(isclose(spring, chosen, rel_tol=SPRING_TOLERANCE) for spring in springs):
-        raise TunnelError(
-            f"no run has a spring_stiffness of {chosen:g} N m/rad",
-            where=where,
-            remedy=f"give one of {', '.join(f'{spring:g}' for spring in springs)}",
-        )
-
-
-def _check_driven(effect: Effect, plan: CampaignPlan, where: str) -> None:
-    """Refuse effects whose meaning with an input is not defined."""
-    drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
-    if effect.driven and not drives:
-        what = "acts on driven runs only, and all runs of the plan are free decays"
-        raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
-    if effect.skips and drives:
-        what = "leaves samples out, which is not simulated for driven runs"
-        raise TunnelError(what, where=where, remedy="leave out the effect or [drive]")
-    if (effect.channel, effect.condition) == ("stiffness", "always") and not all(d.on_body for d in drives):
-        raise TunnelError(
-            "changes the spring, which is not simulated where its root moves",
-            where=where,
-            remedy="leave out the effect, or drive the body by amplitudes_nm",
-        )
 
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:

@@ -250,11 +250,9 @@ def plan_run(
         for effect in effects:
             # An episode reads the motion as it goes: none of it can be passed over.
             if effect.skips and not effect.is_null:
-                raise TunnelError(
-                    "an episode cannot drop samples",
-                    where=f"effect {effect.name}",
-                    remedy="inject it with tunnel simulate, which makes whole records",
-                )
+                what = "an episode cannot drop samples"
+                remedy = "inject it with tunnel simulate, which makes whole records"
+                raise TunnelError(what, where=f"effect {effect.name}", remedy=remedy)
         return RunPlan(condition, truth, sensor, effects)
     except TunnelError as error:
         raise as_env_error(error, "option effects") from error
@@ -284,11 +282,8 @@ def _number(
     value = given[name]
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not (number and isfinite(value) and least <= value <= most):
-        raise EnvError(
-            f"{value!r} is out of range",
-            where=f"option {name}",
-            remedy=f"give a number from {least:g} to {most:g} in SI units",
-        )
+        remedy = f"give a number from {least:g} to {most:g} in SI units"
+        raise EnvError(f"{value!r} is out of range", where=f"option {name}", remedy=remedy)
     return float(value)
 
 
@@ -320,8 +315,5 @@ def _effects(
         listed = list(stated)
         if all(isinstance(effect, Effect) for effect in listed):
             return [EffectSetting(effect.name, effect.to_json_dict()["parameters"]) for effect in listed]
-    raise EnvError(
-        f"{stated!r} names no effects",
-        where="option effects",
-        remedy="give {name: {parameter: value}}, or a list of tunnel_sim.effects",
-    )
+    remedy = "give {name: {parameter: value}}, or a list of tunnel_sim.effects"
+    raise EnvError(f"{stated!r} names no effects", where="option effects", remedy=remedy)

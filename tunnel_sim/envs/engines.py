@@ -233,19 +233,13 @@ def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Arra
     """Actions, shape (runs, 2), as wind-speed set-points (m/s) and moments (N m), each of shape (runs,)."""
     values = np.asarray(actions, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != 2:
-        raise EnvError(
-            f"an action has shape {values.shape[1:]}, not (2,)",
-            where="action",
-            remedy="give set-point and moment",
-        )
+        remedy = "give set-point and moment"
+        raise EnvError(f"an action has shape {values.shape[1:]}, not (2,)", where="action", remedy=remedy)
     bad = ~(np.abs(values) <= 1.0)
     if bad.any():
         value = values[bad][0]
-        raise EnvError(
-            f"{value:g} is outside the space",
-            where="action",
-            remedy="give numbers from -1 to 1 (operator_action)",
-        )
+        remedy = "give numbers from -1 to 1 (operator_action)"
+        raise EnvError(f"{value:g} is outside the space", where="action", remedy=remedy)
     return 0.5 * config.wind_limit * (values[:, 0] + 1.0), config.moment_limit * values[:, 1]
 
 
@@ -253,11 +247,8 @@ def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
     """Refuse all actions except 0, the only action of the plain preset."""
     values = np.asarray(actions)
     if values.size != count or values.dtype.kind not in "iu" or np.any(values != 0):
-        raise EnvError(
-            f"{actions!r} is not an action of the plain preset",
-            where="action",
-            remedy="give 0, or make the environment with preset='operator'",
-        )
+        remedy = "give 0, or make the environment with preset='operator'"
+        raise EnvError(f"{actions!r} is not an action of the plain preset", where="action", remedy=remedy)
 
 
 @dataclass(frozen=True)

@@ -211,11 +211,8 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         mask, each = common.pop("reset_mask", None), common.pop("runs", None)
         mask = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask)
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
-            raise EnvError(
-                f"reset_mask is not a boolean array of length {self.num_envs} with at least one True",
-                where="option reset_mask",
-                remedy="give one boolean per run",
-            )
+            what = f"reset_mask is not a boolean array of length {self.num_envs} with at least one True"
+            raise EnvError(what, where="option reset_mask", remedy="give one boolean per run")
         each = [{}] * self.num_envs if each is None else each
         if not isinstance(each, Sequence) or len(each) != self.num_envs:
             what = f"runs is not a sequence of length {self.num_envs}"

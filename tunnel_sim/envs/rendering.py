@@ -82,7 +82,14 @@ class RigView:
         self._data.qpos[:] = end, twist
         mujoco.mj_forward(self._model, self._data)
         if self._mode == "human":
-            self._show()
+            if self._window is None:
+                self._window = _open_window(self._model, self._data)
+                self._shown = time.monotonic()
+            self._window.sync()
+            wait = self._period - (time.monotonic() - self._shown)  # real time
+            if wait > 0.0:
+                time.sleep(wait)
+            self._shown = time.monotonic()
             return None
         if self._canvas is None:
             self._canvas = _Canvas(self._model, self._width, self._height)
@@ -95,17 +102,6 @@ class RigView:
         if self._canvas is not None:
             self._canvas.close()
         self._window = self._canvas = None
-
-    def _show(self) -> None:
-        """Update the window, in real time."""
-        if self._window is None:
-            self._window = _open_window(self._model, self._data)
-            self._shown = time.monotonic()
-        self._window.sync()
-        wait = self._period - (time.monotonic() - self._shown)
-        if wait > 0.0:
-            time.sleep(wait)
-        self._shown = time.monotonic()
 
 
 def render_modes() -> list[str]:

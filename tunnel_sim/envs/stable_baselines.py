@@ -19,9 +19,8 @@ from tunnel_sim.vocabulary.record import Array
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise EnvError(
-        "stable-baselines3 is missing", remedy="install it with pip install 'virtual-wind-tunnel[train]'"
-    ) from error
+    remedy = "install it with pip install 'virtual-wind-tunnel[train]'"
+    raise EnvError("stable-baselines3 is missing", remedy=remedy) from error
 
 
 class BaselinesVecEnv(VecEnv):

@@ -23,6 +23,7 @@ from tunnel_sim.files.toml_input import (
     StrictModel,
     check_version,
     load_toml,
+    optional,
     shown,
     validate,
 )
@@ -58,23 +59,21 @@ class CampaignTable(StrictModel):
 class RigTable(StrictModel):
     """``[rig]``."""
 
-    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
-    frontal_area: Positive | None = Field(default=None, description="a positive number in m2")
-    reference_length: Positive | None = Field(default=None, description="a positive number in m")
-    width: Positive | None = Field(default=None, description="a positive number in m")
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    frontal_area: Positive | None = optional("a positive number in m2")
+    reference_length: Positive | None = optional("a positive number in m")
+    width: Positive | None = optional("a positive number in m")
 
 
 class SensorTable(StrictModel):
     """``[sensor]``."""
 
-    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
-    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
-    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
-    plausible: bool | None = Field(
-        default=None, description="false to accept values that look like a wrong unit, or leave it out"
-    )
-    quantity: Quantity | None = Field(default=None, description="'angle', 'rate' or 'acceleration'")
-    zero: Zero | None = Field(default=None, description="'common', 'per_run' or 'auto'")
+    sample_rate: SampleRate | None = optional("a positive number in Hz")
+    resolution: NotNegative | None = optional("a number in rad, zero or more")
+    noise_std: NotNegative | None = optional("a number in rad, zero or more")
+    plausible: bool | None = optional("false to accept values that look like a wrong unit, or leave it out")
+    quantity: Quantity | None = optional("'angle', 'rate' or 'acceleration'")
+    zero: Zero | None = optional("'common', 'per_run' or 'auto'")
 
 
 class RunTable(StrictModel):
@@ -82,20 +81,15 @@ class RunTable(StrictModel):
 
     id: OneLine = Field(description="a short unique name in quotes")
     file: OneLine = Field(description="a path inside the campaign's folder, such as 'runs/r01.csv'")
-    spring_stiffness: NotNegative | None = Field(
-        default=None,
-        description="a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
+    spring_stiffness: NotNegative | None = optional(
+        "a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
         "normalised form",
     )
     wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
-    release_angle: float | None = Field(default=None, description="a number in rad")
-    drive_hold: Hold | None = Field(
-        default=None, description="'zero' or 'linear', between the samples of a driven run's input"
-    )
-    drive_gain: float | None = Field(
-        default=None, description="a number other than 0 in N m per unit of the column drive"
-    )
+    air_density: Positive | None = optional("a positive number in kg/m3")
+    release_angle: float | None = optional("a number in rad")
+    drive_hold: Hold | None = optional("'zero' or 'linear', between the samples of a driven run's input")
+    drive_gain: float | None = optional("a number other than 0 in N m per unit of the column drive")
 
 
 class CampaignDocument(StrictModel):
@@ -123,24 +117,18 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     for run in parsed.runs:
         where = run_place(path, run.id)
         if run.id in seen:
-            raise TunnelError(
-                f"the id '{run.id}' is used twice", where=where, remedy="give every run its own id"
-            )
+            remedy = "give every run its own id"
+            raise TunnelError(f"the id '{run.id}' is used twice", where=where, remedy=remedy)
         seen.add(run.id)
         scales = run.spring_stiffness, parsed.rig.frontal_area, parsed.rig.reference_length
         if run.air_density is None and needs_density(run.wind_speed, *scales):
-            raise TunnelError(
-                f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
-                where=where,
-                remedy="give air_density in kg/m3 (about 1.2 for air)",
-            )
+            what = f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density"
+            raise TunnelError(what, where=where, remedy="give air_density in kg/m3 (about 1.2 for air)")
         windows, posix = PureWindowsPath(run.file), PurePosixPath(run.file)
         if windows.drive or windows.root or posix.is_absolute() or ".." in windows.parts + posix.parts:
-            raise TunnelError(
-                f"the path '{run.file}' may lead outside the campaign's folder",
-                where=where,
-                remedy="put the file inside the folder and name it without '..' or a leading '/'",
-            )
+            what = f"the path '{run.file}' may lead outside the campaign's folder"
+            remedy = "put the file inside the folder and name it without '..' or a leading '/'"
+            raise TunnelError(what, where=where, remedy=remedy)
     if parsed.sensor.plausible is not False:
         plausible_values(parsed.rig.model_dump(), f"{shown(path)}, [rig]")
         for run in parsed.runs:
@@ -277,9 +265,8 @@ def write_campaign(
         where = run_place(folder, run.id)
         time_s, yaw = run.record.time_s, run.record.yaw_rad
         if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
-            raise TunnelError(
-                "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
-            )
+            remedy = "shorten the run or leave it out"
+            raise TunnelError("the record holds NaN or an infinity", where=where, remedy=remedy)
         _record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, run.drive, where)
         without_spring_needs_drive(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)
@@ -313,27 +300,20 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
     time_s = held.time_s
     if time_s is None:
         if sample_rate is None:
-            raise TunnelError(
-                "no column time_s and no sample_rate",
-                where=where,
-                remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
-            )
+            remedy = "add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml"
+            raise TunnelError("no column time_s and no sample_rate", where=where, remedy=remedy)
         time_s = np.arange(held.reading.size) / sample_rate
     drive = None
     if held.input is not None and held.input_column is not None:
         if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
-            raise TunnelError(
-                f"drive_gain = {run.drive_gain:g} of the column {held.input_column}",
-                where=where,
-                remedy="give drive_gain of a column drive only, in N m per unit, not zero",
-            )
+            what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
+            remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
+            raise TunnelError(what, where=where, remedy=remedy)
         drive = Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
     elif run.drive_hold is not None or run.drive_gain is not None:
-        raise TunnelError(
-            f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column",
-            where=where,
-            remedy="add a column moment_nm, drive or base_rad to the run file, or leave the key out",
-        )
+        what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
+        remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"
+        raise TunnelError(what, where=where, remedy=remedy)
     record = _record(time_s, held.reading, held.column, sensor, run.release_angle, drive, where)
     without_spring_needs_drive(run.spring_stiffness, drive, where)
     conditions = run.spring_stiffness, run.air_density, run.release_angle
@@ -363,14 +343,12 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
             raise TunnelError("this is not a folder", where=where, remedy="choose another name")
         return
     if not overwrite:
-        raise TunnelError(
-            "the folder exists", where=where, remedy="choose another one, or ask to overwrite it"
-        )
+        remedy = "choose another one, or ask to overwrite it"
+        raise TunnelError("the folder exists", where=where, remedy=remedy)
     entries = list(folder.iterdir())
     if entries and not (folder / CAMPAIGN_FILE).is_file():
-        raise TunnelError(
-            "the folder holds no campaign", where=where, remedy="choose another one, or empty it"
-        )
+        remedy = "choose another one, or empty it"
+        raise TunnelError("the folder holds no campaign", where=where, remedy=remedy)
     # Files that the writer did not create belong to somebody: replacing the folder would delete them.
     own = (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER, IMPORT_RECIPE, IMPORT_PICTURE)
     strange = [p for p in entries if p.name not in own]
@@ -378,8 +356,5 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
     if runs.is_dir() and not runs.is_symlink():
         strange += [p for p in runs.iterdir() if p.is_dir() or p.suffix.lower()[1:] not in RUN_FORMATS]
     if strange:
-        raise TunnelError(
-            f"the folder holds more than a campaign ({strange[0].name})",
-            where=where,
-            remedy="move that away, or choose another folder",
-        )
+        what = f"the folder holds more than a campaign ({strange[0].name})"
+        raise TunnelError(what, where=where, remedy="move that away, or choose another folder")

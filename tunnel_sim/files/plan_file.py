@@ -18,7 +18,7 @@ from pydantic import AfterValidator, Field
 from tunnel_sim.files.plan_drive import DriveTable, check_drive, drive_of_file, drive_of_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, load_toml, shown, validate
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, load_toml, optional, shown, validate
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -71,19 +71,17 @@ class TruthTable(StrictModel):
 
     cn_beta: float = Field(description="a number, 1/rad")
     cn_r: float = Field(description="a number, 1/rad")
-    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
-    mechanical_damping: NotNegative | None = Field(
-        default=None, description="a number in N m s/rad, zero or more"
-    )
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    mechanical_damping: NotNegative | None = optional("a number in N m s/rad, zero or more")
 
 
 class SensorModelTable(StrictModel):
     """``[sensor]``; omitted keys take the defaults of ``SensorModel``."""
 
-    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
-    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
-    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero for none")
-    zero: float | None = Field(default=None, description="a number in rad")
+    sample_rate: SampleRate | None = optional("a positive number in Hz")
+    noise_std: NotNegative | None = optional("a number in rad, zero or more")
+    resolution: NotNegative | None = optional("a number in rad, zero for none")
+    zero: float | None = optional("a number in rad")
 
 
 class EffectTable(StrictModel):
@@ -105,10 +103,10 @@ class PlanDocument(StrictModel):
     release_angles_deg: FreeDecays = Field(default=[])
     repeats: Repeats = 1
     duration: Positive = Field(description="a positive number in s")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+    air_density: Positive | None = optional("a positive number in kg/m3")
     truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")
     sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
-    drive: DriveTable | None = Field(default=None, description="a [drive] table with kind and amplitudes")
+    drive: DriveTable | None = optional("a [drive] table with kind and amplitudes")
     effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
 
     @property
@@ -129,11 +127,8 @@ def read_plan(path: Path) -> PlanDocument:
     check_conditions(plan, shown(path))
     driven = 0 if plan.drive is None else len(plan.drive.amplitudes)
     if not plan.release_angles_deg and plan.drive is None:
-        raise TunnelError(
-            "'release_angles_deg' is empty or missing",
-            where=shown(path),
-            remedy="give release_angles_deg as a list of angles in degrees, such as [20], or a [drive]",
-        )
+        remedy = "give release_angles_deg as a list of angles in degrees, such as [20], or a [drive]"
+        raise TunnelError("'release_angles_deg' is empty or missing", where=shown(path), remedy=remedy)
     check_size(run_count(plan, driven), plan.duration, plan.sample_rate, shown(path))
     if plan.drive is not None:
         check_drive(plan.drive, plan.samples, plan.sample_rate, f"{shown(path)}, [drive]")
@@ -238,11 +233,8 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
         given = drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
     for number in document.springs:
         if number not in rig.springs:
-            raise TunnelError(
-                f"there is no spring {number}",
-                where=where,
-                remedy=f"use one of {', '.join(map(str, rig.springs))}, or give spring_stiffness in N m/rad",
-            )
+            remedy = f"use one of {', '.join(map(str, rig.springs))}, or give spring_stiffness in N m/rad"
+            raise TunnelError(f"there is no spring {number}", where=where, remedy=remedy)
     springs = [(f"s{number}", rig.springs[number]) for number in document.springs]
     springs += [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
 
@@ -307,8 +299,8 @@ class ParameterTable(StrictModel):
     scale: float = Field(description="a typical value, a number in its unit")
     lower: float = Field(description="the least value, a number in its unit")
     upper: float = Field(description="the greatest value, a number in its unit")
-    default: float | None = Field(default=None, description="a number in its unit")
-    meaning: OneLine | None = Field(default=None, description="a clause in quotes")
+    default: float | None = optional("a number in its unit")
+    meaning: OneLine | None = optional("a clause in quotes")
 
 
 class OwnEffectTable(StrictModel):
@@ -321,8 +313,8 @@ class OwnEffectTable(StrictModel):
         description="stiffness, damping, forcing, sensor or calibration"
     )
     condition: Literal["always", "wind_on"] = Field(default="always", description="always or wind_on")
-    moment: Formula | None = Field(default=None, description="an expression in quotes, N m")
-    reading: Formula | None = Field(default=None, description="an expression in quotes, rad")
+    moment: Formula | None = optional("an expression in quotes, N m")
+    reading: Formula | None = optional("an expression in quotes, rad")
     summary: OneLine = Field(default="An effect by expression.", description="a sentence in quotes")
     parameters: Annotated[
         dict[str, ParameterTable], Field(min_length=1, max_length=limits.OWN_PARAMETERS)

@@ -6,7 +6,7 @@ import functools
 import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -139,11 +139,8 @@ def faults(kind: str, where: str) -> Iterator[None]:
         # A panic of a library in Rust is not a subclass of Exception, and has no name to import.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
-        raise TunnelError(
-            f"is not {kind} that can be read ({one_line(error, 60)})",
-            where=where,
-            remedy="export it again, or as text",
-        ) from None
+        what = f"is not {kind} that can be read ({one_line(error, 60)})"
+        raise TunnelError(what, where=where, remedy="export it again, or as text") from None
 
 
 RUN_FORMATS = ("parquet", "csv")
@@ -204,11 +201,9 @@ def read_table(
     column = found[0]
     stray = next((name for name in names if name != "time_s" and re.match(r"(?i)t$|time", name)), None)
     if timed and "time_s" not in names and stray is not None:
-        raise TunnelError(
-            f"no column time_s and no sample_rate, but a column '{one_line(stray, 40)}'",
-            where=where,
-            remedy="did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]",
-        )
+        what = f"no column time_s and no sample_rate, but a column '{one_line(stray, 40)}'"
+        remedy = "did you mean 'time_s' (in seconds)? Otherwise state sample_rate in Hz under [sensor]"
+        raise TunnelError(what, where=where, remedy=remedy)
     used = [name for name in ("time_s", column, driven) if name in names and name is not None]
     table = held.frame.select(used)
     if held.text:
@@ -217,9 +212,8 @@ def read_table(
         filled = np.flatnonzero(~blank)
         table = table.head(int(filled[-1]) + 1 if filled.size else 0)
     if table.height == 0:
-        raise TunnelError(
-            "the file has no samples", where=where, remedy="record the run again or leave it out"
-        )
+        remedy = "record the run again or leave it out"
+        raise TunnelError("the file has no samples", where=where, remedy=remedy)
     values = {name: _numbers(table.get_column(name), held.text, where) for name in used}
     reading = np.deg2rad(values[column]) if "_deg" in column else values[column]
     given = None if driven is None else values[driven]
@@ -249,11 +243,8 @@ def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
     held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
     column = _input_column(held.names, where)
     if column is None or "time_s" not in held.names:
-        raise TunnelError(
-            f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}",
-            where=where,
-            remedy="give it time_s in s and one input column",
-        )
+        what = f"no column {'time_s' if column else ' or '.join(INPUT_COLUMNS)}"
+        raise TunnelError(what, where=where, remedy="give it time_s in s and one input column")
     time, values = (_numbers(held.frame.get_column(name), held.text, where) for name in ("time_s", column))
     if time.size < 2 or not np.all(np.diff(time) > 0.0):
         raise TunnelError("time_s does not increase", where=where, remedy="give two or more increasing times")
@@ -276,11 +267,8 @@ def table_bytes(
 def _input_column(names: Sequence[str], where: str) -> InputColumn | None:
     found = [name for name in INPUT_COLUMNS if name in names]
     if len(found) > 1:
-        raise TunnelError(
-            f"{len(found)} input columns: {' and '.join(found)}",
-            where=where,
-            remedy="a run has one input: keep its column and rename the others",
-        )
+        remedy = "a run has one input: keep its column and rename the others"
+        raise TunnelError(f"{len(found)} input columns: {' and '.join(found)}", where=where, remedy=remedy)
     return found[0] if found else None
 
 
@@ -315,15 +303,15 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     try:
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
     except pl.exceptions.PolarsError as error:
-        raise TunnelError(
-            f"not a comma-separated table ({one_line(error, 60)})",
-            where=where,
-            remedy="give every line one value for each column, with commas between and decimal points",
-        ) from None
+        what = f"not a comma-separated table ({one_line(error, 60)})"
+        remedy = "give every line one value for each column, with commas between and decimal points"
+        raise TunnelError(what, where=where, remedy=remedy) from None
     names = [str(name or "").strip().strip('"').strip() for name in rows.row(0)]
-    if any(_is_number(name) for name in names):
-        remedy = "name the columns in the first line, such as time_s,yaw_rad"
-        raise TunnelError("no header line", where=where, remedy=remedy)
+    for name in names:
+        with suppress(ValueError):
+            float(name)
+            remedy = "name the columns in the first line, such as time_s,yaw_rad"
+            raise TunnelError("no header line", where=where, remedy=remedy)
     if len(names) == 1 and re.search(r"[;\t]", names[0]):
         raise TunnelError("not comma-separated", where=where, remedy="put commas between the columns")
     twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
@@ -334,14 +322,6 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
         name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
     ]
     return FileTable(rows.slice(1), rows.columns, text=True)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 CSV = Reader("a comma-separated table", limits.CSV_BYTES, read_run=_read_csv)

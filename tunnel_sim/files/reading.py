@@ -137,9 +137,17 @@ def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
     `limits.INTEGER_BITS`.
     """
     text = content if isinstance(content, str) else decoded(content, where)
+
+    def refused(number: str) -> float:
+        raise ValueError(f"{number} is not a JSON number")
+
+    def finite(number: str) -> float:  # the parser reads a number such as 1e999 as an infinity
+        if not abs(float(number)) < float("inf"):
+            raise ValueError(f"{one_line(number, 20)} is too large for a floating-point number")
+        return float(number)
+
     try:
-        # The parser reads a number such as 1e999 as an infinity; parse_float refuses it.
-        found = json.loads(text, parse_constant=_no_constant, parse_float=_finite)
+        found = json.loads(text, parse_constant=refused, parse_float=finite)
     except (ValueError, RecursionError) as error:
         raise TunnelError(f"is not JSON ({one_line(error, 80)})", where=where, remedy=remedy) from None
     if not isinstance(found, dict):
@@ -232,14 +240,3 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
 def _unreadable(error: Exception, where: str, remedy: str) -> TunnelError:
     reason = getattr(error, "strerror", None) or error
     return TunnelError(f"cannot be read ({one_line(reason)})", where=where, remedy=remedy)
-
-
-def _no_constant(text: str) -> float:
-    raise ValueError(f"{text} is not a JSON number")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not abs(value) < float("inf"):
-        raise ValueError(f"{one_line(text, 20)} is too large for a floating-point number")
-    return value

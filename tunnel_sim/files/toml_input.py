@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -27,6 +27,11 @@ class StrictModel(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def optional(description: str) -> Any:
+    """A field that may be left out: None."""
+    return Field(default=None, description=description)
 
 
 ModelT = TypeVar("ModelT", bound=StrictModel)
@@ -114,8 +119,18 @@ def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> Mo
         problems = error.errors(include_url=False)
         problem = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
         loc, kind = problem["loc"], problem["type"]
-        place = _place(document, loc)
-        where = f"{shown(path)}, {place}" if place else shown(path)
+        # Where it is: run 'r01', [[effects]] number 2, [rig], or nothing for the top level.
+        first, number = loc[0], loc[1] if len(loc) >= 2 else None
+        where = shown(path)
+        if first == "runs" and isinstance(number, int):
+            entry = document["runs"][number]
+            name = entry.get("id") if isinstance(entry, Mapping) else None
+            named = isinstance(name, str) and bool(name.strip())
+            where += f", run '{one_line(name)}'" if named else f", run number {number + 1}"
+        elif isinstance(number, int) and isinstance(document.get(str(first)), list):
+            where += f", [[{first}]] number {number + 1}"
+        elif number is not None:
+            where += f", [{first}]"
         key_at = max((i for i, part in enumerate(loc) if isinstance(part, str)), default=0)
         key = str(loc[key_at])
         table: type[StrictModel] | None = model  # that contains the key
@@ -148,19 +163,6 @@ _REASONS = {
     "model_type": "is not a table",
     "dict_type": "is not a table",
 }
-
-
-def _place(document: Mapping[str, Any], loc: Sequence[str | int]) -> str:
-    """A location as text: ``run 'r01'``, ``[rig]``, or nothing for the top level."""
-    if len(loc) >= 2 and loc[0] == "runs" and isinstance(loc[1], int):
-        entry = document["runs"][loc[1]]
-        name = entry.get("id") if isinstance(entry, Mapping) else None
-        named = isinstance(name, str) and bool(name.strip())
-        return f"run '{one_line(name)}'" if named else f"run number {loc[1] + 1}"
-    several = isinstance(document.get(str(loc[0])), list)
-    if len(loc) >= 2 and isinstance(loc[0], str) and isinstance(loc[1], int) and several:
-        return f"[[{loc[0]}]] number {loc[1] + 1}"
-    return f"[{loc[0]}]" if len(loc) >= 2 else ""
 
 
 def _model_in(annotation: Any) -> type[StrictModel] | None:

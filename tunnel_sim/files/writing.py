@@ -306,9 +306,8 @@ def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException
         reason = error.strerror if isinstance(error, OSError) else None
         said = reason.lower() if reason else f"{type(error).__name__}: {error}".rstrip(": ")
         remedy = "name a file or folder that can be written"
-        raise TunnelError(
-            f"cannot be written ({one_line(said)})", where=shown(path), remedy=remedy
-        ) from error
+        what = f"cannot be written ({one_line(said)})"
+        raise TunnelError(what, where=shown(path), remedy=remedy) from error
 
 
 def _target(path: Path) -> Path:

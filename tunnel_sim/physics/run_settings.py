@@ -33,9 +33,8 @@ _OWNED = frozenset(
 def _check(name: str, value: float, *, above: float = -inf, least: float = -inf) -> None:
     if not (isfinite(value) and value > above and value >= least):
         bound = f" above {above:g}" if above > -inf else f" of {least:g} or more" if least > -inf else ""
-        raise TunnelError(
-            f"{name} = {value!r} must be a finite number{bound}", remedy="correct the run's settings"
-        )
+        remedy = "correct the run's settings"
+        raise TunnelError(f"{name} = {value!r} must be a finite number{bound}", remedy=remedy)
 
 
 @cache
@@ -59,10 +58,8 @@ class Series:
     def __post_init__(self) -> None:
         """Check the samples."""
         if not self.values or not all(map(isfinite, self.values)):
-            raise TunnelError(
-                "a series needs at least one sample, and all samples must be finite",
-                remedy="correct the sampled input",
-            )
+            what = "a series needs at least one sample, and all samples must be finite"
+            raise TunnelError(what, remedy="correct the sampled input")
         _check("interval of a series", self.interval, above=0.0)
 
 
@@ -134,10 +131,8 @@ class DriveMoment:
             object.__setattr__(self, name, read_only(getattr(self, name)))
         numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay]])
         if self.time_s.shape != self.values.shape or not self.time_s.size or not np.isfinite(numbers).all():
-            raise TunnelError(
-                "a drive needs as many finite values as times, and at least one",
-                remedy="correct the sampled input",
-            )
+            remedy = "correct the sampled input"
+            raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -192,9 +187,8 @@ class RunSettings:
             _check("least wind_speed of the series", min(wind.values), least=0.0)
         if not self.parameters.keys() <= _further():
             name = next(name for name in self.parameters if name not in _further())
-            raise TunnelError(
-                f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, sorted(_further()))
-            )
+            remedy = did_you_mean(name, sorted(_further()))
+            raise TunnelError(f"unknown parameter {name!r} of the moment law", remedy=remedy)
 
     def with_moment(self, program: tuple[float, ...]) -> RunSettings:
         """A copy with a moment on the rod's upper end added, by its program."""

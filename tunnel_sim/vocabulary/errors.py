@@ -96,8 +96,6 @@ def loading(group: str, name: str) -> Iterator[None]:
         yield
     except Exception as error:
         said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
-        raise TunnelError(
-            f"cannot be loaded ({one_line(said)})",
-            where=f"entry point {group}: {name}",
-            remedy="correct or uninstall its package",
-        ) from error
+        what = f"cannot be loaded ({one_line(said)})"
+        remedy = "correct or uninstall its package"
+        raise TunnelError(what, where=f"entry point {group}: {name}", remedy=remedy) from error

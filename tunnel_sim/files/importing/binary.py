@@ -38,11 +38,8 @@ def _read_run(content: bytes, where: str, most: int) -> FileTable:
     used = [name for name in schema if name in USED_COLUMNS]
     for name in used:
         if not schema[name].is_numeric():
-            raise TunnelError(
-                f"the column {name} holds {one_line(schema[name], 30)}, not numbers",
-                where=where,
-                remedy=f"write {name} as floating-point numbers",
-            )
+            what = f"the column {name} holds {one_line(schema[name], 30)}, not numbers"
+            raise TunnelError(what, where=where, remedy=f"write {name} as floating-point numbers")
     return FileTable(read_frame(content, where, remedy, used), tuple(schema))
 
 
@@ -70,7 +67,6 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
 
 
 PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
-"""Parquet files."""
 
 
 _HEAD = 400
@@ -136,15 +132,11 @@ def _check_archive(content: bytes, where: str) -> None:
         raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
     for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
         if any(part in name for name in names):
-            raise TunnelError(
-                f"the workbook holds {what}",
-                where=where,
-                remedy="save a copy with values only, as .xlsx or as text",
-            )
+            remedy = "save a copy with values only, as .xlsx or as text"
+            raise TunnelError(f"the workbook holds {what}", where=where, remedy=remedy)
 
 
 WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)
-"""Excel workbooks."""
 
 
 RUN_IDS = ("id", "run", "run_id")
@@ -359,7 +351,6 @@ def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
 
 
 HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)
-"""HDF5 files."""
 
 MAT = Reader(
     "a MAT file",
@@ -368,7 +359,5 @@ MAT = Reader(
     (b"MATLAB", b"\x89HDF", b"\x00\x00\x00\x00", b"\x0a\x00\x00\x00"),
     read_tables=_read_mat,
 )
-"""MAT files of versions 4 to 7.3."""
 
 TDMS = Reader("a TDMS file", limits.DATA_BYTES, (b"TDSm",), read_tables=_read_tdms)
-"""TDMS files of LabVIEW."""

@@ -297,11 +297,8 @@ def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str)
     slack = 0.5 * float(np.median(np.diff(time_s)))
     first, last = (int(place) for place in np.searchsorted(time_s, [start - slack, end + slack]))
     if last - first < 2:
-        raise TunnelError(
-            f"no samples from {start:g} to {end:g} s",
-            where=where,
-            remedy="state a start before the end, within the record",
-        )
+        remedy = "state a start before the end, within the record"
+        raise TunnelError(f"no samples from {start:g} to {end:g} s", where=where, remedy=remedy)
     return RecordPiece(first, last)
 
 

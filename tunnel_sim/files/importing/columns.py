@@ -76,18 +76,28 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
     pairs = []
     for block in blocks:
         said: list[str] = []
-        time = _time(block, choices, said, where, headed=table.headed)
+        named = [channel for channel in block if is_time(channel)]
+        time = None  # where the samples follow at a stated rate
+        if choices.time is not None:
+            time = _chosen(block, choices.time, "--time", where)[0]
+        elif named:
+            time = named[0]
+            if len(named) > 1:
+                said.append(f"times from '{time.name}', the first of {len(named)} columns of times")
+        elif choices.rate is None:
+            free = [c for c in _unconditional(block) if c.unit == "" and not _OTHER.search(c.name)]
+            time = next((c for c in free if _is_clock(c.values)), None)
+            if time is not None:
+                why = "evenly stepped numbers" + ("" if table.headed else ", and the file names no columns")
+                said.append(f"times from '{time.name}': {why}")
         readings = _readings(block, time, choices, said, where)
         for reading in readings:
             mark = RUN_MARK.search(reading.name)
             run = f"run-{mark[1]}" if mark else reading.name if len(readings) > 1 else ""
             pairs.append(ColumnPair(run, time, reading, tuple(said)))
     if not pairs:
-        raise TunnelError(
-            f"no column of angles (columns found: {_listed(table.channels)})",
-            where=where,
-            remedy="give --angle NAME and its --unit",
-        )
+        what = f"no column of angles (columns found: {_listed(table.channels)})"
+        raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
     return pairs
 
 
@@ -111,32 +121,10 @@ def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> l
     if not found and wanted.isdigit() and 1 <= int(wanted) <= len(block):
         found = [block[int(wanted) - 1]]
     if not found:
-        raise TunnelError(
-            f"no column '{one_line(wanted, 40)}' (columns found: {_listed(block)})",
-            where=where,
-            remedy=f"{option}: {did_you_mean(wanted, {channel.name for channel in block})}",
-        )
+        what = f"no column '{one_line(wanted, 40)}' (columns found: {_listed(block)})"
+        remedy = f"{option}: {did_you_mean(wanted, {channel.name for channel in block})}"
+        raise TunnelError(what, where=where, remedy=remedy)
     return found
-
-
-def _time(
-    block: Sequence[Channel], choices: ImportChoices, said: list[str], where: str, *, headed: bool
-) -> Channel | None:
-    if choices.time is not None:
-        return _chosen(block, choices.time, "--time", where)[0]
-    named = [channel for channel in block if is_time(channel)]
-    if named:
-        if len(named) > 1:
-            said.append(f"times from '{named[0].name}', the first of {len(named)} columns of times")
-        return named[0]
-    if choices.rate is not None:
-        return None
-    free = [c for c in _unconditional(block) if c.unit == "" and not _OTHER.search(c.name)]
-    guessed = next((c for c in free if _is_clock(c.values)), None)
-    if guessed is not None:
-        why = "evenly stepped numbers" + ("" if headed else ", and the file names no columns")
-        said.append(f"times from '{guessed.name}': {why}")
-    return guessed
 
 
 def _is_clock(values: np.ndarray) -> bool:
@@ -185,11 +173,8 @@ def _readings(
         found.remove(rate)
     of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
     if len(found) > 1 and not of_runs:
-        raise TunnelError(
-            f"{len(found)} columns may be the angle: {_listed(found)}",
-            where=where,
-            remedy=f'give --angle "{found[0].name}", or another of them',
-        )
+        what = f"{len(found)} columns may be the angle: {_listed(found)}"
+        raise TunnelError(what, where=where, remedy=f'give --angle "{found[0].name}", or another of them')
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
 
@@ -296,11 +281,9 @@ def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: st
     """
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or time.unit
     if unit and kind_of(unit) != "time":
-        raise TunnelError(
-            f"'{one_line(time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time",
-            where=where,
-            remedy="give --time-unit, or --time with the name of another column",
-        )
+        what = f"'{one_line(time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
+        remedy = "give --time-unit, or --time with the name of another column"
+        raise TunnelError(what, where=where, remedy=remedy)
     if not unit:
         unit, step = guessed_time_unit(time.values)
         said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
@@ -358,11 +341,9 @@ def in_radians(
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     # A disc between springs swings as far, but counts look like degrees.
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
-        raise TunnelError(
-            f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn",
-            where=where,
-            remedy="give --unit deg if it does; of an encoder --counts-per-turn N",
-        )
+        what = f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn"
+        remedy = "give --unit deg if it does; of an encoder --counts-per-turn N"
+        raise TunnelError(what, where=where, remedy=remedy)
     return values, quantity, unit
 
 

@@ -14,7 +14,7 @@ from pydantic import Field
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.tables import UNITS, Channel, kind_of, split_unit
 from tunnel_sim.files.importing.text import read_cells
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, validate
+from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, optional, read_document, validate
 from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
@@ -25,14 +25,14 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 class Conditions(StrictModel):
     """Conditions of runs, and sizes of the rig, as in ``campaign.toml``."""
 
-    wind_speed: NotNegative | None = Field(default=None, description="a number in m/s, 0 for wind-off")
-    spring_stiffness: Positive | None = Field(default=None, description="a positive number in N m/rad")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
-    release_angle: float | None = Field(default=None, description="a number in rad")
-    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
-    frontal_area: Positive | None = Field(default=None, description="a positive number in m2")
-    reference_length: Positive | None = Field(default=None, description="a positive number in m")
-    width: Positive | None = Field(default=None, description="a positive number in m")
+    wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
+    spring_stiffness: Positive | None = optional("a positive number in N m/rad")
+    air_density: Positive | None = optional("a positive number in kg/m3")
+    release_angle: float | None = optional("a number in rad")
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    frontal_area: Positive | None = optional("a positive number in m2")
+    reference_length: Positive | None = optional("a positive number in m")
+    width: Positive | None = optional("a positive number in m")
 
 
 RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
@@ -44,53 +44,39 @@ class Stretch(StrictModel):
 
     file: OneLine = Field(description="the name of the file")
     run: OneLine = Field(description="the name of the run")
-    start: NotNegative | None = Field(
-        default=None, description="the time of the release in s from the record's first sample"
-    )
-    end: Positive | None = Field(
-        default=None, description="the time in s from the record's first sample at which the run ends"
-    )
-    rest: float | None = Field(default=None, description="the reading at rest in rad, to be subtracted")
+    start: NotNegative | None = optional("the time of the release in s from the record's first sample")
+    end: Positive | None = optional("the time in s from the record's first sample at which the run ends")
+    rest: float | None = optional("the reading at rest in rad, to be subtracted")
 
 
 class ImportChoices(StrictModel):
     """How files are to be read; what is None is found from the files."""
 
-    time: OneLine | None = Field(default=None, description="the name or number of the column of times")
+    time: OneLine | None = optional("the name or number of the column of times")
     angle: tuple[OneLine, ...] = Field(
         default=(), strict=False, description="a list of names or numbers of columns"
     )
-    unit: OneLine | None = Field(default=None, description="the unit of the angle, such as 'deg'")
-    time_unit: OneLine | None = Field(default=None, description="the unit of the times, such as 'ms'")
-    rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
-    counts_per_turn: Positive | None = Field(default=None, description="a positive number")
-    calibration: OneLine | None = Field(
-        default=None, description="a formula such as '0.1 + 20*V', or the name of a table of two columns"
+    unit: OneLine | None = optional("the unit of the angle, such as 'deg'")
+    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'")
+    rate: SampleRate | None = optional("a positive number in Hz")
+    counts_per_turn: Positive | None = optional("a positive number")
+    calibration: OneLine | None = optional(
+        "a formula such as '0.1 + 20*V', or the name of a table of two columns"
     )
-    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = Field(
-        default=None, description="'tab', ';', ',', '|' or 'blank'"
-    )
-    decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
-    start: float | None = Field(
-        default=None, description="a time of the file in s: earlier samples are left out"
-    )
-    end: float | None = Field(default=None, description="a time of the file in s: later samples are left out")
-    rest: float | None = Field(
-        default=None, description="the reading at rest in rad, to be subtracted from every run"
-    )
-    input: OneLine | None = Field(
-        default=None, description="the name of the input's column of a driven run, or 'none'"
-    )
-    input_as: InputColumn | None = Field(default=None, description="'moment_nm', 'drive' or 'base_rad'")
+    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional("'tab', ';', ',', '|' or 'blank'")
+    decimal: Literal[".", ","] | None = optional("'.' or ','")
+    start: float | None = optional("a time of the file in s: earlier samples are left out")
+    end: float | None = optional("a time of the file in s: later samples are left out")
+    rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
+    input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
+    input_as: InputColumn | None = optional("'moment_nm', 'drive' or 'base_rad'")
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
         default=(),
         strict=False,
         description="[[choices.stretches]] tables with file, run, start, end and rest",
     )
-    name: OneLine | None = Field(
-        default=None, description="a pattern of file names such as 'S{spring}_V{wind_speed}_*'"
-    )
+    name: OneLine | None = optional("a pattern of file names such as 'S{spring}_V{wind_speed}_*'")
     conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
 
     def stretch_of(self, file: str, run: str) -> Stretch:
@@ -131,11 +117,9 @@ def parse_setting(text: str, where: str) -> Conditions:
         try:
             values[key.strip()] = float(value)
         except ValueError:
-            raise TunnelError(
-                f"'{part.strip()}' is not of the form key=number",
-                where=where,
-                remedy=f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}",
-            ) from None
+            what = f"'{part.strip()}' is not of the form key=number"
+            remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
+            raise TunnelError(what, where=where, remedy=remedy) from None
     return validate(Conditions, values, Path(where))
 
 
@@ -240,11 +224,9 @@ def name_pattern(text: str) -> re.Pattern[str]:
         elif part.startswith("{"):
             known = _ALIASES.get(key, key)
             if known not in RUN_KEYS or f"<{known}>" in expression:
-                raise TunnelError(
-                    f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice",
-                    where=f"--name {one_line(text, 60)}",
-                    remedy=did_you_mean(key, (*_ALIASES, *RUN_KEYS)),
-                )
+                what = f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice"
+                remedy = did_you_mean(key, (*_ALIASES, *RUN_KEYS))
+                raise TunnelError(what, where=f"--name {one_line(text, 60)}", remedy=remedy)
             expression += f"(?P<{known}>{_NUMBER})"
         else:
             expression += re.escape(part)
@@ -257,11 +239,8 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
         return {}
     found = pattern.match(path.name)
     if found is None:
-        raise TunnelError(
-            "the name does not match --name",
-            where=shown(path),
-            remedy="correct the pattern, or rename the file",
-        )
+        remedy = "correct the pattern, or rename the file"
+        raise TunnelError("the name does not match --name", where=shown(path), remedy=remedy)
     return {key: float(re.sub("[,p]", ".", text)) for key, text in found.groupdict().items()}
 
 
@@ -280,19 +259,16 @@ class ConditionTable:
         used = {name: i for i, name in enumerate(keys) if name in RUN_KEYS}
         if self._key is None or not used:
             wanted = "file or run" if self._key is None else "of conditions"
-            raise TunnelError(
-                f"no column {wanted} (columns found: {one_line(', '.join(names), 80)})",
-                where=shown(path),
-                remedy=f"name the columns file (or run) and {', '.join(RUN_KEYS)}",
-            )
+            what = f"no column {wanted} (columns found: {one_line(', '.join(names), 80)})"
+            remedy = f"name the columns file (or run) and {', '.join(RUN_KEYS)}"
+            raise TunnelError(what, where=shown(path), remedy=remedy)
         self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and keys[i] not in used)
         self._rows: dict[str, dict[str, float]] = {}
         for row in rows:
             name = row[self._key].strip()
             if name.lower() in self._rows:
-                raise TunnelError(
-                    f"'{one_line(name)}' occurs twice", where=shown(path), remedy="leave one out"
-                )
+                remedy = "leave one out"
+                raise TunnelError(f"'{one_line(name)}' occurs twice", where=shown(path), remedy=remedy)
             values = {}
             for key, text in ((key, row[i]) for key, i in used.items() if row[i].strip()):
                 try:
@@ -311,8 +287,5 @@ class ConditionTable:
         for name in (run, path.name, path.stem):
             if name.lower() in self._rows:
                 return self._rows[name.lower()]
-        raise TunnelError(
-            f"no row for run '{one_line(run)}' of {one_line(path.name)}",
-            where=shown(self.path),
-            remedy="add a row with that run or file",
-        )
+        what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
+        raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")

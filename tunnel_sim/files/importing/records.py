@@ -141,10 +141,8 @@ def read_records(
         raise TunnelError("no files", remedy="name at least one")
     kinds = {raw.quantity for raw in raws}
     if len(kinds) > 1:
-        raise TunnelError(
-            f"the runs hold {' and '.join(sorted(kinds))}",
-            remedy="import one quantity at a time, with --angle",
-        )
+        remedy = "import one quantity at a time, with --angle"
+        raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
     ids = [raw.id for raw in raws]
     parts = []
     for at, raw in enumerate(raws):
@@ -208,20 +206,15 @@ def _part(
     plausible_values(stated | sizes, where)
     if "wind_speed" not in stated:
         if _WIND_ON.search(f"{raw.source.stem} {name}"):
-            raise TunnelError(
-                "the name says that the wind is on, but not how fast",
-                where=where,
-                remedy="give --set wind_speed=SPEED (m/s), --conditions or --name",
-            )
+            what = "the name says that the wind is on, but not how fast"
+            remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
+            raise TunnelError(what, where=where, remedy=remedy)
         said.append("wind_speed is not stated: wind-off is assumed")
     rig = choices.conditions
     scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
     if "air_density" not in stated and needs_density(stated.get("wind_speed", 0.0), *scales):
-        raise TunnelError(
-            f"wind-on ({stated['wind_speed']:g} m/s) without air_density",
-            where=where,
-            remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
-        )
+        what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
+        raise TunnelError(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
     drive = None
     if raw.input is not None:
         column, values = raw.input
@@ -231,28 +224,26 @@ def _part(
         said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
         said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
         drive = Drive(column, values[kept], hold, gain)
+    time = from_zero(time)
     try:
         if drive is None:
-            record = _judged(from_zero(time), reading, sensor, stated.get("release_angle"), where)
+            release, stride = stated.get("release_angle"), time.size // _JUDGED
+            record = None
+            if stride > 1:
+                # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+                with suppress(TunnelError):
+                    thin = time[::stride], reading[::stride]
+                    checked_record(*thin, "the reading", sensor, release, where)
+                    record = Record(time, reading)
+            if record is None:
+                record = checked_record(time, reading, "the reading", sensor, release, where)
         else:
-            record = checked_record(from_zero(time), reading, "the reading", sensor, None, where, driven=True)
+            record = checked_record(time, reading, "the reading", sensor, None, where, driven=True)
             checked_drive(drive, record, where)
     except TunnelError as error:
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
-
-
-def _judged(
-    time: Array, reading: Array, sensor: SensorProperties, release_angle: float | None, where: str
-) -> Record:
-    stride = time.size // _JUDGED
-    if stride > 1:
-        # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
-        with suppress(TunnelError):
-            checked_record(time[::stride], reading[::stride], "the reading", sensor, release_angle, where)
-            return Record(time, reading)
-    return checked_record(time, reading, "the reading", sensor, release_angle, where)
 
 
 def _campaign(
@@ -261,22 +252,18 @@ def _campaign(
     runs = tuple(part.run for part in parts if part.run is not None)
     if not runs:
         part = parts[0]
-        raise TunnelError(
-            f"no run can be used; the first one is {part.said[-1]}",
-            where=f"{shown(part.raw.source)}, run '{part.id}'",
-            remedy="check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut",
-        )
+        what = f"no run can be used; the first one is {part.said[-1]}"
+        remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
+        raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
     # The sizes of the rig, as stated or else from the files.
     rig = choices.conditions.model_dump(include=set(RIG_KEYS), exclude_none=True)
     plausible_values(rig, "--set")
     for part in parts:
         for key, value in part.sizes.items():
             if rig.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
-                raise TunnelError(
-                    f"{key} = {value:g}, and {rig[key]:g} in another run",
-                    where=f"{shown(part.raw.source)}, run '{part.id}'",
-                    remedy=f"give --set {key}=NUMBER, or import them separately",
-                )
+                what = f"{key} = {value:g}, and {rig[key]:g} in another run"
+                remedy = f"give --set {key}=NUMBER, or import them separately"
+                raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
     files = list(dict.fromkeys(part.raw.source.name for part in parts))
     used = [part for part in parts if part.run is not None]
     return Campaign(

@@ -118,11 +118,8 @@ class _Server:
             status = self._process.wait()
             too_long = late.is_set() or status == _OUT_OF_TIME
             ended = f"ends the program that reads it (exit status {status})"
-            raise TunnelError(
-                f"takes longer than {allowed:.3g} s to read" if too_long else ended,
-                where=where,
-                remedy=f"it may be damaged: {_DAMAGED}",
-            ) from None
+            what = f"takes longer than {allowed:.3g} s to read" if too_long else ended
+            raise TunnelError(what, where=where, remedy=f"it may be damaged: {_DAMAGED}") from None
         finally:
             watch.cancel()
         if "last" in answer:
@@ -246,35 +243,30 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
     if not reader.magic or not content.startswith(reader.magic):
         really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
         if really is not None or reader.magic:
-            raise TunnelError(
-                f"is not {reader.kind}" + (f": it begins like {really}" if really else ""),
-                where=where,
-                remedy="give the file the ending of its format, or export it again",
-            )
+            what = f"is not {reader.kind}" + (f": it begins like {really}" if really else "")
+            remedy = "give the file the ending of its format, or export it again"
+            raise TunnelError(what, where=where, remedy=remedy)
     known: dict[str, str] = {}
     if place is None:
         tables, known = read_text_tables(content, where, choices)
     else:
         tables = read_guarded(place, content, where)
-    tables = [
-        with_input_facts(part) for table in tables if table.channels for part in by_run(_computable(table))
-    ]
-    if not tables:
-        raise TunnelError(
-            "no column of numbers", where=where, remedy="name a file that holds times and angles"
-        )
-    count = sum(table.channels[0].values.size for table in tables)
+    found = []
+    for table in (table for table in tables if table.channels):
+        channels, said = [], [*table.said]
+        for channel in table.channels:
+            wild = np.abs(channel.values) > limits.LARGEST_NUMBER  # its powers would overflow
+            if wild.any():
+                said.append(
+                    f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing"
+                )
+                channel = replace(channel, values=np.where(wild, np.nan, channel.values))
+            channels.append(channel)
+        table = replace(table, channels=tuple(channels), said=tuple(said))
+        found += [with_input_facts(part) for part in by_run(table)]
+    if not found:
+        remedy = "name a file that holds times and angles"
+        raise TunnelError("no column of numbers", where=where, remedy=remedy)
+    count = sum(table.channels[0].values.size for table in found)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")
-    return Source(path, hashlib.sha256(content).hexdigest(), tuple(tables), known)
-
-
-def _computable(table: Table) -> Table:
-    """The table without infinities and numbers whose powers would overflow."""
-    channels, said = [], []
-    for channel in table.channels:
-        wild = np.abs(channel.values) > limits.LARGEST_NUMBER
-        if wild.any():
-            said.append(f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing")
-            channel = replace(channel, values=np.where(wild, np.nan, channel.values))
-        channels.append(channel)
-    return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
+    return Source(path, hashlib.sha256(content).hexdigest(), tuple(found), known)

@@ -114,44 +114,34 @@ def find_layout(
         if len(cells) <= width and 2 * len(texts) >= width and (width <= 1 or len(texts) > 1):
             above.append((index, cells + [""] * (width - len(cells))))
     units: list[str] = [""] * width
-    if len(above) > 1 and _are_units(above[-1][1]):
+    # A row of units: known ones or others in brackets, or more known ones than short texts.
+    stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
+    known = [cell for cell in stated if known_unit(cell) is not None]
+    bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
+    few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
+    if known and (not bare or few):
         units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
+    facts = {}  # such as "Sample rate: 1000 Hz" or "V = 54 km/h", in SI units where the unit is known
+    for line in lines[: above[-1][0] if above else first]:
+        for fact, number, text in _FACT.findall(line):
+            text = text.lstrip(";,\t ").strip("()[] ")
+            unit = known_unit(text) or ""
+            factor = _HERTZ.get(text.lower()) or UNITS.get(kind_of(unit), {}).get(unit, 1.0)
+            strange = text and not unit and text.lower() not in _HERTZ
+            heading = f"{fact.strip()} ({text})" if strange else fact.strip()
+            facts[heading] = float(number.replace(",", ".")) * factor
     if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
         named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
     return Layout(
         first,
         tuple(named) or tuple(f"column {i + 1}" for i in range(width)),
-        tuple(stated or own for (_, stated), own in zip(split or [("", "")] * width, units, strict=True)),
+        tuple(one or own for (_, one), own in zip(split or [("", "")] * width, units, strict=True)),
         bool(names),
-        _facts(lines[: above[-1][0] if above else first]),
+        facts,
     )
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a row holds units: known ones or others in brackets, or as many known ones as short texts."""
-    said = [cell for cell in cells if cell.strip("-")]
-    known = sum(known_unit(cell) is not None for cell in said)
-    others = [cell for cell in said if known_unit(cell) is None and not re.fullmatch(r"[\[({].*[\])}]", cell)]
-    return known > 0 and (
-        not others or (known > len(others) and all(len(cell) <= _LONG_UNIT for cell in others))
-    )
-
-
-def _facts(lines: Sequence[str]) -> dict[str, float]:
-    """Numbers such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, in SI units where the unit is known."""
-    found = {}
-    for line in lines:
-        for name, number, text in _FACT.findall(line):
-            text = text.lstrip(";,\t ").strip("()[] ")
-            unit = known_unit(text) or ""
-            factor = _HERTZ.get(text.lower()) or UNITS.get(kind_of(unit), {}).get(unit, 1.0)
-            value = float(number.replace(",", ".")) * factor
-            strange = text and not unit and text.lower() not in _HERTZ
-            found[f"{name.strip()} ({text})" if strange else name.strip()] = value
-    return found
 
 
 TEXT = Reader("a table of text", limits.CSV_BYTES)
@@ -220,7 +210,34 @@ def read_text_tables(
         "delimiter": next(name for name, sign in _NAMES.items() if sign == dialect.delimiter),
         "decimal": dialect.decimal,
     }
-    return _tables(content, dialect, layout, where, said), known
+    if dialect.delimiter == " ":
+        content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
+        content = re.sub(rb"[ \t]+", b" ", content)
+    options: dict[str, Any] = {
+        "separator": dialect.delimiter,
+        "has_header": False,
+        "skip_lines": layout.first,
+        "truncate_ragged_lines": True,
+    }
+    names = [f"column_{i + 1}" for i in range(dialect.width)]
+    missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
+    try:
+        labels = None
+        if (at := layout.runs) is not None:  # a name of a run is what it is, also where it is "nan"
+            schema = dict.fromkeys(names, pl.String)
+            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
+        try:
+            kinds = {name: pl.String if i == at else pl.Float64 for i, name in enumerate(names)}
+            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
+            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
+        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
+            texts = dict.fromkeys(names, pl.String)
+            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
+        table = Table((), said=(said,), facts=layout.facts)
+        return tables_of(frame, layout, dialect.decimal, labels, table), known
+    except pl.exceptions.PolarsError as error:
+        what = f"not a table of text ({one_line(error, 60)})"
+        raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
@@ -262,40 +279,6 @@ def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
         raise TunnelError("is not text: it contains NUL bytes", where=where, remedy=remedy)
     content = content.removeprefix(b"\xef\xbb\xbf")
     return (content if b"\n" in content else content.replace(b"\r", b"\n")), encoding
-
-
-def _tables(content: bytes, dialect: Dialect, layout: Layout, where: str, said: str) -> list[Table]:
-    """The columns of numbers, run by run where a column names the runs, with remarks on what is not a number."""
-    if dialect.delimiter == " ":
-        content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
-        content = re.sub(rb"[ \t]+", b" ", content)
-    options: dict[str, Any] = {
-        "separator": dialect.delimiter,
-        "has_header": False,
-        "skip_lines": layout.first,
-        "truncate_ragged_lines": True,
-    }
-    names = [f"column_{i + 1}" for i in range(dialect.width)]
-    missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
-    try:
-        labels = None
-        if (at := layout.runs) is not None:  # a name of a run is what it is, also where it is "nan"
-            schema = dict.fromkeys(names, pl.String)
-            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
-        try:
-            kinds = {name: pl.String if i == layout.runs else pl.Float64 for i, name in enumerate(names)}
-            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
-            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
-        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
-            texts = dict.fromkeys(names, pl.String)
-            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
-        return tables_of(frame, layout, dialect.decimal, labels, Table((), said=(said,), facts=layout.facts))
-    except pl.exceptions.PolarsError as error:
-        raise TunnelError(
-            f"not a table of text ({one_line(error, 60)})",
-            where=where,
-            remedy="give every line one value for each column",
-        ) from None
 
 
 def tables_of(
@@ -362,9 +345,7 @@ def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
     rows = [Dialect(delimiter, ".", 0).split(line) for line in lines]
     wrong = next((i for i, row in enumerate(rows) if len(row) != len(rows[0])), None)
     if wrong is not None:
-        raise TunnelError(
-            f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns",
-            where=where,
-            remedy=f"give every line one cell for each column, with {_SAID[delimiter]} between",
-        )
+        what = f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns"
+        remedy = f"give every line one cell for each column, with {_SAID[delimiter]} between"
+        raise TunnelError(what, where=where, remedy=remedy)
     return rows[0], rows[1:]
