@@ -9,7 +9,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, Law, with_law
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, with_law
 from tunnel_sim.effects.parameters import (
     EQUATION,
     Circumstances,
@@ -37,6 +37,7 @@ class NonlinearYawMoment(Effect):
     signature = "Like cubic stiffness, but proportional to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
     example = (3.0,)
+    law_terms = ("moment_cubic", "moment_cubic_exponent")
 
     coefficient: float = parameter(
         "κa",
@@ -48,12 +49,7 @@ class NonlinearYawMoment(Effect):
         fit_lower=-100.0,
         fit_upper=100.0,
     )
-
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"moment_cubic": self.coefficient, "moment_cubic_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
@@ -71,6 +67,7 @@ class NonlinearYawDamping(Effect):
     )
     references = ("van der Pol, Phil. Mag. 2 (1926) 978, doi 10.1080/14786442608564127",)
     example = (20.0,)
+    law_terms = ("damping_quadratic", "damping_quadratic_exponent")
 
     coefficient: float = parameter(
         "μa",
@@ -82,12 +79,7 @@ class NonlinearYawDamping(Effect):
         fit_lower=-500.0,
         fit_upper=500.0,
     )
-
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"damping_quadratic": self.coefficient, "damping_quadratic_exponent": self.exponent}
 
 
 #: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.
@@ -115,6 +107,7 @@ class UnsteadyAeroLag(Effect):
         "Jones, NACA Report 681 (1940)",
     )
     example = (1.5,)
+    law_terms = ("aero_lag",)
     tries = 2
     caveat = (
         "The Cnr after adding the lag describes the damping term alone; the lag damps the motion as well. In a "
@@ -139,10 +132,6 @@ class UnsteadyAeroLag(Effect):
         """
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"aero_lag": self.lag}
 
 
 @dataclass(frozen=True)

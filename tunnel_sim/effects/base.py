@@ -58,22 +58,18 @@ class Effect:
 
     Traits, with defaults that an effect overrides:
 
-    - ``random``: kind of spectrum of a random moment; empty where the effect is deterministic. Vortex shedding
-      has both a line and a spectrum, because its phase may be steady or wander.
+    - ``law_terms``: the moment law's parameters that the effect's own are, in their order; empty: none.
+    - ``random``: kind of spectrum of a random moment. Vortex shedding has a line too: its phase may wander or not.
     - ``line``: what sets the frequency of a periodic effect; its phase differs from run to run.
-    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run's
-      length), so that the motion is read at other times than stated.
-    - ``autonomous``: whether its moment and its reading depend on angle and rate alone, so that a stretch of a run
-      shows it as a whole run does.
-    - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
-      records (``line``, ``lattice``) or found from their spectrum (``random``).
-    - ``on_spring``: whether its moment is in proportion to the spring's stiffness, so that it vanishes without one.
+    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run).
+    - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
+    - ``fitted``: whether a fit of the deterministic motion can find it; else it is read off records or spectra.
+    - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
-    - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty where the
-      effect is not periodic in the angle.
+    - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
     - ``tries``: how many starting points of a fit are worth trying.
     - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own.
     - ``caveat``: how to read the coefficients that are reported with it.
@@ -88,6 +84,7 @@ class Effect:
     references: ClassVar[tuple[str, ...]]
     example: ClassVar[tuple[float, ...]]
 
+    law_terms: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
     line: ClassVar[Literal["", "mains", "shedding", "ringing"]] = ""
     skips: ClassVar[bool] = False
@@ -201,7 +198,8 @@ class Effect:
 
     def law(self) -> Law:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
-        return {}
+        values = (getattr(self, info.name) for info in self.parameters())
+        return dict(zip(self.law_terms, values, strict=False))
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Change the physics of a run; by default, set the effect's terms of the moment law.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isclose, log, pi, sqrt
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Law, with_law
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, with_law
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
@@ -27,6 +27,7 @@ class CubicStiffness(Effect):
     signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (1.0,)
+    law_terms = ("stiffness_cubic", "stiffness_cubic_exponent")
 
     coefficient: float = parameter(
         "κ",
@@ -38,12 +39,7 @@ class CubicStiffness(Effect):
         fit_lower=-10.0,
         fit_upper=50.0,
     )
-
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"stiffness_cubic": self.coefficient, "stiffness_cubic_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
@@ -63,6 +59,7 @@ class AsymmetricStiffness(Effect):
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.2,)
+    law_terms = ("stiffness_quadratic", "stiffness_quadratic_exponent")
 
     coefficient: float = parameter(
         "κ",
@@ -74,12 +71,7 @@ class AsymmetricStiffness(Effect):
         fit_lower=-2.0,
         fit_upper=2.0,
     )
-
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"stiffness_quadratic": self.coefficient, "stiffness_quadratic_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
@@ -96,14 +88,11 @@ class FreePlay(Effect):
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
     example = (0.01,)
+    law_terms = ("free_play",)
 
     half_width: float = parameter(
         "δ", "rad", "half width of the dead zone", scale=0.002, lower=0.0, upper=0.2
     )
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"free_play": self.half_width}
 
 
 @dataclass(frozen=True)
@@ -122,6 +111,7 @@ class GravityStiffness(Effect):
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.4, 0.2)
+    law_terms = ("gravity_stiffness", "gravity_angle")
     turns = "stiffness"
 
     stiffness: float = parameter(
@@ -148,10 +138,6 @@ class GravityStiffness(Effect):
         """
         (trial,) = super().trials(campaign)
         return (replace(trial, replaces="stiffness") if campaign.normalised else trial,)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"gravity_stiffness": self.stiffness, "gravity_angle": self.rest_angle}
 
     @property
     def stiffness_at_rest(self) -> float:
@@ -332,6 +318,7 @@ class QuadraticDamping(Effect):
     signature = "The damping ratio falls in proportion to the amplitude."
     references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
     example = (0.01,)
+    law_terms = ("quadratic_damping", "quadratic_damping_exponent")
 
     coefficient: float = parameter(
         "C2",
@@ -343,12 +330,7 @@ class QuadraticDamping(Effect):
         fit_lower=0.0,
         rate_exponent="exponent",
     )
-
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"quadratic_damping": self.coefficient, "quadratic_damping_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
@@ -367,6 +349,7 @@ class StructuralDamping(Effect):
     )
     references = ("Crandall, J. Sound Vib. 11 (1970) 3, doi 10.1016/S0022-460X(70)80105-5",)
     example = (0.02,)
+    law_terms = ("loss_factor",)
 
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0, fit_lower=0.0)
 
@@ -391,7 +374,3 @@ class StructuralDamping(Effect):
         ]
         cn_beta_std, cn_r_std = (abs(sum(s)) / len(s) / sqrt(3.0) for s in (stiffening, loss))
         return cn_beta_std, cn_r_std
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"loss_factor": self.loss_factor}

@@ -10,7 +10,7 @@ import copy
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -20,7 +20,7 @@ from tunnel_sim.effects import EffectChain
 from tunnel_sim.effects.base import quantise
 from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
-from tunnel_sim.envs.engines import Operation, OperatorLog, WindAnswer, check_plain, decode
+from tunnel_sim.envs.engines import ManyRuns, OneRun, Operation, OperatorLog, WindAnswer, check_plain, decode
 from tunnel_sim.envs.information import Information, NominalRun, Prior
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -34,21 +34,7 @@ Flags = NDArray[np.bool_]
 READING_BOUND = 2.0 * np.pi
 """Bound of a reading in the observation, rad; the record is not clipped."""
 
-
-class Engine(Protocol):
-    """The integrator of the runs; see `tunnel_sim.envs.engines`."""
-
-    def start(self, row: int, settings: RunSettings) -> float:
-        """Start a run at its release; result and arguments as in `OneRun.start`."""
-
-    def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
-
-    def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run; result and arguments as in `OneRun.get_state`."""
-
-    def set_state(self, row: int, state: Array) -> None:
-        """Put a run into a state; arguments as in `OneRun.set_state`."""
+Engine: TypeAlias = OneRun | ManyRuns
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,16 +249,11 @@ class RunningSensor:
     """The effects of one run on its reading."""
 
     def __init__(self, chain: EffectChain, sensor: SensorModel) -> None:
-        self._chain = chain
+        self.chain = chain
         self.sensor = chain.sensor(sensor)
         self._remembers = any(effect.remembers for effect in chain.effects)
         self._angles: list[Array] = []
         self._times: list[Array] = []
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether the reading differs from the angle by zero, noise and quantisation only."""
-        return self._chain.reads_plainly
 
     def copied(self) -> RunningSensor:
         """An independent copy at the same point of the run."""
@@ -288,19 +269,11 @@ class RunningSensor:
             time_s: shape (n,), s; continues from the previous call.
         """
         if not self._remembers:
-            return self._chain.angle(angle, time_s)
+            return self.chain.angle(angle, time_s)
         self._angles.append(angle.copy())
         self._times.append(time_s)
-        seen = self._chain.angle(np.concatenate(self._angles), np.concatenate(self._times))
+        seen = self.chain.angle(np.concatenate(self._angles), np.concatenate(self._times))
         return seen[-len(angle) :]
-
-    def held(self, angle: Array, time_s: Array) -> Array:
-        """The measured angle before the release, which later samples do not depend on; arguments as in `angle`."""
-        return self._chain.angle(angle, time_s)
-
-    def reading(self, reading: Array) -> Array:
-        """Apply the effects that act after the noise; rad, shape (n,) in and out."""
-        return self._chain.reading(reading)
 
 
 class Readings:
@@ -311,17 +284,18 @@ class Readings:
         self._steps = config.steps
         self._times = config.sample_times
         self._interval = 1.0 / config.sample_rate
-        self._chains: list[RunningSensor | None] = [None] * count
+        self._running: list[RunningSensor | None] = [None] * count
         self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
         self._altered: set[int] = set()  # runs with effects on the reading
         self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
         self._values = np.zeros((count, config.steps * config.samples_per_step))
 
-    def start(self, row: int, chain: RunningSensor, rng: np.random.Generator) -> None:
+    def start(self, row: int, running: RunningSensor, rng: np.random.Generator) -> None:
         """Start a run with its effects on the reading."""
-        self._chains[row], self._rngs[row] = chain, rng
-        self._sensor[:, row, 0] = chain.sensor.zero, chain.sensor.noise_std, chain.sensor.resolution
-        (self._altered.discard if chain.is_plain else self._altered.add)(row)
+        self._running[row], self._rngs[row] = running, rng
+        sensor = running.sensor
+        self._sensor[:, row, 0] = sensor.zero, sensor.noise_std, sensor.resolution
+        (self._altered.discard if running.chain.reads_plainly else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
         """Readings (rad) of the control period before the release, shape (samples,).
@@ -331,11 +305,10 @@ class Readings:
         Args:
             angle: at which the rod's upper end is held, rad.
         """
-        chain = self._chain(row)
-        sensor = chain.sensor
+        chain, sensor = self._of(row).chain, self._of(row).sensor
         time = np.arange(-self._samples, 0, dtype=np.float64) * self._interval
         noise = self._rngs[row].spawn(1)[0].standard_normal(self._samples)
-        held = chain.held(np.full(self._samples, angle), time)
+        held = chain.angle(np.full(self._samples, angle), time)  # later samples do not depend on it
         return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
 
     def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
@@ -354,11 +327,11 @@ class Readings:
             angle = angle.copy()
         for row in self._altered:
             times = self._times[first[row] : first[row] + self._samples]
-            angle[row] = self._chain(row).angle(angle[row], times)
+            angle[row] = self._of(row).angle(angle[row], times)
         zero, noise_std, resolution = self._sensor
         readings = angle + zero + noise_std * noise
         for row in self._altered:
-            readings[row] = self._chain(row).reading(readings[row])
+            readings[row] = self._of(row).chain.reading(readings[row])
         size = np.where(resolution > 0.0, resolution, 1.0)
         readings = np.where(resolution > 0.0, np.round(readings / size) * size, readings)
         if (first == first[0]).all():
@@ -377,10 +350,10 @@ class Readings:
 
     def snapshot(self, row: int) -> tuple[Array, RunningSensor, np.random.Generator]:
         """Copies of the state of a run."""
-        return self._values[row].copy(), self._chain(row).copied(), copy.deepcopy(self._rngs[row])
+        return self._values[row].copy(), self._of(row).copied(), copy.deepcopy(self._rngs[row])
 
     def restore(
-        self, row: int, values: Array, chain: RunningSensor, rng: np.random.Generator
+        self, row: int, values: Array, running: RunningSensor, rng: np.random.Generator
     ) -> np.random.Generator:
         """Restore a run from a snapshot, with copies; the generator that it uses from now on.
 
@@ -389,12 +362,12 @@ class Readings:
         """
         if np.shape(values) != self._values[row].shape:
             raise EnvError("the state belongs to a different configuration", remedy="use the same arguments")
-        self.start(row, chain.copied(), copy.deepcopy(rng))
+        self.start(row, running.copied(), copy.deepcopy(rng))
         self._values[row] = values
         return self._rngs[row]
 
-    def _chain(self, row: int) -> RunningSensor:
-        chain = self._chains[row]
-        if chain is None:
+    def _of(self, row: int) -> RunningSensor:
+        running = self._running[row]
+        if running is None:
             raise EnvError("no episode has begun", remedy="call reset() first")
-        return chain
+        return running

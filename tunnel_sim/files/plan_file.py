@@ -136,27 +136,13 @@ def read_plan(path: Path) -> PlanDocument:
 
 
 class ConditionKeys(Protocol):
-    """The keys whose values are combined into a campaign's runs."""
+    """The keys whose values are combined into a campaign's runs, in N m/rad, m/s and degrees."""
 
-    @property
-    def springs(self) -> list[int]:
-        """Numbers of springs."""
-
-    @property
-    def spring_stiffness(self) -> list[float]:
-        """Kr, N m/rad."""
-
-    @property
-    def wind_speeds(self) -> list[float]:
-        """V, m/s."""
-
-    @property
-    def release_angles_deg(self) -> list[float]:
-        """Degrees."""
-
-    @property
-    def repeats(self) -> int:
-        """Number of runs of each combination."""
+    springs: list[int]
+    spring_stiffness: list[float]
+    wind_speeds: list[float]
+    release_angles_deg: list[float]
+    repeats: int
 
 
 def run_count(keys: ConditionKeys, driven: int = 0) -> int:

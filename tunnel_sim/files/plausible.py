@@ -24,6 +24,15 @@ KEEP = "state plausible = false under [sensor] to keep it"
 LEAST_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
 _TWO_TURNS = 4.0 * np.pi
+# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Any
+# other difference is allowed: a run with times may have a rate of its own.
+_TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
+_SLIP_TOLERANCE = 0.1
+MINIMUM_CYCLES = 3.0
+# The count is uncertain, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
+CYCLE_TOLERANCE = 0.25
+# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
+_SLIP_RATIO = (50.0, 75.0)
 
 
 @dataclass(frozen=True)
@@ -119,29 +128,42 @@ def checked_record(
     """
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
-    if judged and angle:
-        same_unit(reading, column, release_angle, where)
+    swing = 0.5 * (float(reading.max()) - float(reading.min()))  # the sensor's zero is unknown
+    if judged and angle and release_angle and swing != 0.0:
+        ratio, (low, high) = abs(release_angle) / swing, _SLIP_RATIO
+        if column == "yaw_rad" and low <= 1.0 / ratio <= high:
+            raise TunnelError(
+                f"yaw_rad swings by ±{swing:.4g}, about 57 times the release_angle of "
+                f"{release_angle:.4g} rad: it looks like degrees",
+                where=where,
+                remedy=f"name the column yaw_deg, or convert it to radians; {KEEP}",
+            )
+        if low <= ratio <= high:
+            raise TunnelError(
+                f"{column} swings by ±{swing:.4g} rad, about 1/57 of the release_angle of "
+                f"{release_angle:.4g} rad: one of them is in the wrong unit",
+                where=where,
+                remedy="give release_angle in rad, name the column for its unit, or leave release_angle out; "
+                f"{KEEP}",
+            )
     record = Record(time_s, reading)
-    if driven:
-        if judged:
-            plausible_sampling(record, where, angle=angle)
+    cycles = 0.0 if driven else count_cycles(record)
+    if not driven and not cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
+        what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
+        if not cycles > 0.0:
+            what = "no oscillation is visible in the record, so it has fewer than three cycles"
+        raise TunnelError(
+            what, where=where, remedy="record for longer after the release, or leave the run out"
+        )
+    if not judged:
         return record
-    cycles = enough_cycles(record, where)
-    if judged:
-        plausible_run(record, cycles, where, angle=angle)
-    return record
-
-
-def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = True) -> None:
-    """Refuse a record of a number of cycles that appears to be in a wrong unit, or that is sampled too slowly.
-
-    Rates and accelerations, unlike an angle, may swing by any size.
-
-    Args:
-        cycles: number of cycles in the record.
-    """
-    step, per_cycle = record.sample_interval, record.yaw_rad.size / cycles
-    plausible_sampling(record, where, angle=angle)
+    step = record.sample_interval
+    if angle:  # rates and accelerations may have any size
+        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
+    _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
+    if driven:
+        return record
+    per_cycle = reading.size / cycles
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:
         raise TunnelError(
@@ -150,14 +172,7 @@ def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = Tr
             where=where,
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )
-
-
-def plausible_sampling(record: Record, where: str, *, angle: bool = True) -> None:
-    """Refuse a record whose swing (of an angle) or time step appears to be in a wrong unit."""
-    step, swing = record.sample_interval, 0.5 * float(np.ptp(record.yaw_rad))
-    if angle:
-        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
-    _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
+    return record
 
 
 def _check(said: str, value: float, allowed: Range, where: str) -> None:
@@ -165,17 +180,6 @@ def _check(said: str, value: float, allowed: Range, where: str) -> None:
         return
     slip = allowed.above if value > allowed.high else allowed.below
     raise TunnelError(f"{said}: {_LOOKS} {slip}", where=where, remedy=f"give it in {allowed.unit}; {KEEP}")
-
-
-# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Any
-# other difference is allowed: a run with times may have a rate of its own.
-_TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
-_SLIP_TOLERANCE = 0.1
-MINIMUM_CYCLES = 3.0
-# The count is uncertain, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
-CYCLE_TOLERANCE = 0.25
-# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
-_SLIP_RATIO = (50.0, 75.0)
 
 
 def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> None:
@@ -206,44 +210,3 @@ def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> No
             where=where,
             remedy="give time_s in seconds and sample_rate in Hz, or leave one of them out",
         )
-
-
-def same_unit(angle: Array, column: str, release_angle: float | None, where: str) -> None:
-    """Refuse a swing and a stated release angle of which one appears to be in degrees.
-
-    The sensor's zero is unknown, so half the span of the reading is compared.
-
-    Args:
-        angle: the reading, shape (n,), rad.
-        release_angle: nominal, rad; None where the campaign does not state it.
-    """
-    half_span = 0.5 * (float(angle.max()) - float(angle.min()))
-    if not release_angle or half_span == 0.0:
-        return
-    ratio = abs(release_angle) / half_span
-    low, high = _SLIP_RATIO
-    if column == "yaw_rad" and low <= 1.0 / ratio <= high:
-        raise TunnelError(
-            f"yaw_rad swings by ±{half_span:.4g}, about 57 times the release_angle of "
-            f"{release_angle:.4g} rad: it looks like degrees",
-            where=where,
-            remedy=f"name the column yaw_deg, or convert it to radians; {KEEP}",
-        )
-    if low <= ratio <= high:
-        raise TunnelError(
-            f"{column} swings by ±{half_span:.4g} rad, about 1/57 of the release_angle of "
-            f"{release_angle:.4g} rad: one of them is in the wrong unit",
-            where=where,
-            remedy=f"give release_angle in rad, name the column for its unit, or leave release_angle out; {KEEP}",
-        )
-
-
-def enough_cycles(record: Record, where: str) -> float:
-    """The number of cycles in a record; fewer than three cycles of oscillation are refused."""
-    cycles = count_cycles(record)
-    if cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
-        return cycles
-    what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
-    if not cycles > 0.0:
-        what = "no oscillation is visible in the record, so it has fewer than three cycles"
-    raise TunnelError(what, where=where, remedy="record for longer after the release, or leave the run out")

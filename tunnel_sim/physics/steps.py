@@ -1,19 +1,14 @@
-"""How long an integration step may be. No other module decides it.
+"""How long an integration step may be; no other module decides it.
 
-With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of angular
-frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120. This amounts to a spurious damping ratio
-of (ωh)⁵/144 and a relative frequency error of −(ωh)⁴/120. The phase angle per step, ωh in rad, is limited
+With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of
+angular frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120: a spurious damping ratio of
+(ωh)⁵/144 and a relative frequency error of −(ωh)⁴/120. The phase angle per step is limited for the body on
+its spring (`FREQUENCY_ERROR`), for a flexible rod's own mode to half a radian, and for any mode to
+`_UNSTABLE`.
 
-- for the body on its spring, with and without the wind, so that the frequency error is `FREQUENCY_ERROR`;
-- for a flexible rod's own mode to half a radian, which gives a relative frequency error of 5e-4 and a spurious
-  damping ratio of 2.2e-4 compared with its 1 %;
-- for any mode to `_UNSTABLE`, because the method diverges beyond it.
-
-Fits predict thousands of runs and may err up to the noise of a block mean: their steps are longer
-(`fit_substeps`) and make up for their own error (`compensated`). What is reported is predicted once more in steps
-of `REPORT_STEP` at most (`report_substeps`), a quarter of the longest of a fit.
-
-Steps are only divided by whole numbers, so that a sample interval remains a whole number of steps.
+Fits predict thousands of runs: their steps are longer (`fit_substeps`) and make up for their own error
+(`compensated`). What is reported is predicted once more in shorter steps (`report_substeps`). Steps are only
+divided by whole numbers, so that a sample interval remains a whole number of steps.
 """
 
 from __future__ import annotations
