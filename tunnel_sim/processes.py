@@ -61,7 +61,6 @@ def in_processes(
 
     Args:
         work: what to do; it and its results must be picklable.
-        items: on which.
         jobs: number of processes; 0 works in this one.
     """
     if jobs == 0 or not items:

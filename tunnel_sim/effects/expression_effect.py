@@ -157,8 +157,10 @@ def expression_effect(
     _check_values(formula, parameters, "0" if reading is None else "y")
     fields = []
     for own, q in parameters.items():
-        sizes = {"scale": q.scale, "lower": q.lower, "upper": q.upper, "default": q.default}
-        fields.append((own, float, parameter(own, q.unit, q.meaning, **sizes)))
+        field = parameter(
+            own, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
+        )
+        fields.append((own, float, field))
     first, *others = parameters.values()
     namespace: dict[str, Any] = {
         "name": name,
@@ -231,7 +233,7 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
         if names.count(table.name) > 1:
             raise TunnelError("is given twice", where=where, remedy="give every effect its own name")
         try:
-            quantities = {}
+            quantities: dict[str, Quantity] = {}
             for name, given in table.parameters.items():
                 usual = given.scale if quantities else 0.0  # the first one is the severity
                 default = usual if given.default is None else given.default

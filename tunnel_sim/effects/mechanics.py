@@ -219,12 +219,7 @@ class SpringMiscalibration(Effect):
     tries = 2
 
     error: float = parameter(
-        "x",
-        "1",
-        "true over stated stiffness, less one",
-        scale=0.02,
-        lower=-0.9,
-        upper=9.0,
+        "x", "1", "true over stated stiffness, less one", scale=0.02, lower=-0.9, upper=9.0
     )
     spring_stiffness: float = parameter(
         "Kr",

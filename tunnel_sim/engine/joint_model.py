@@ -78,88 +78,69 @@ class ModelFiles:
 
 def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
     """Read a model and the files that it names, from its own folder or the further one."""
-    text = read_text(path, limits.MODEL_BYTES, missing="name an MJCF or URDF file")
-    reader = _Reader(path, asset_dir)
+    text, where = read_text(path, limits.MODEL_BYTES, missing="name an MJCF or URDF file"), shown(path)
+    folders, stripped = {""}, False
+    names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
+    documents: dict[str, bytes] = {}
+    assets: dict[str, bytes] = {}
     left = [("", text)]
     while left:
-        left += reader.read_documents(*left.pop())
-    reader.read_assets()
-    return ModelFiles(text, reader.documents, reader.assets)
+        folder, document = left.pop()
+        first, *others = document.split("<!--")
+        document = first + "".join(one.partition("-->")[2] for one in others)
+        folders.update(_values(_FOLDER, document))
+        stripped |= _STRIPPED.search(document) is not None
+        inner = _values(_DOCUMENT, document)
+        names |= dict.fromkeys((folder, name) for name in _values(_FILE, document) if name not in inner)
+        count = len(names) + len(documents) + len(inner)
+        check_count(count, limits.MODEL_FILES, "names of files", where, _SMALLER)
+        for place in (place for name in inner for place in _places(name, ("", folder), ("",))):
+            content = None if place in documents else _content(path, asset_dir, place, limits.MODEL_BYTES)
+            if content is not None:
+                documents[place] = content
+                size = sum(map(len, documents.values()))
+                check_count(size, limits.MODEL_BYTES, "bytes of XML", where, _SMALLER)
+                left.append((posixpath.dirname(place), decoded(content, shown(path.parent / place))))
+    if len(folders) > _MOST_FOLDERS:
+        raise TunnelError(f"names {len(folders) - 1} folders", where=where, remedy="use one meshdir")
+    missing = []
+    for folder, name in names:
+        own = (name, posixpath.basename(name)) if stripped else (name,)
+        places = {place: None for one in own for place in _places(one, ("", folder), folders)}
+        for place in places.keys() - assets.keys():
+            content = _content(path, asset_dir, place, limits.ASSET_BYTES)
+            if content is not None:
+                assets[place] = content
+                size = sum(map(len, assets.values()))
+                check_count(size, limits.ASSET_BYTES, "bytes of meshes and images", where, _SMALLER)
+        if not places.keys() & assets.keys():
+            missing.append(name)
+    # MuJoCo would take a file of the same name from another folder in its place.
+    taken = {posixpath.basename(place).lower() for place in assets}
+    for name in missing:
+        if posixpath.basename(name).lower() in taken:
+            what = f"names {one_line(name)!r}, which is not there"
+            raise TunnelError(what, where=where, remedy="check the path")
+    return ModelFiles(text, documents, assets)
 
 
-class _Reader:
-    """What is found of a model's files."""
-
-    def __init__(self, path: Path, asset_dir: Path | None) -> None:
-        self._path = path
-        self._roots = [Path(os.path.realpath(one)) for one in (path.parent, asset_dir) if one is not None]
-        self._folders = {""}
-        self._names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
-        self._stripped = False
-        self.documents: dict[str, bytes] = {}
-        self.assets: dict[str, bytes] = {}
-
-    def read_documents(self, folder: str, text: str) -> Iterator[tuple[str, str]]:
-        """Read what a document in a folder includes, which is yielded, and note what else it names."""
-        first, *others = text.split("<!--")
-        text = first + "".join(one.partition("-->")[2] for one in others)
-        self._folders.update(_values(_FOLDER, text))
-        self._stripped |= _STRIPPED.search(text) is not None
-        inner = _values(_DOCUMENT, text)
-        self._names |= dict.fromkeys((folder, name) for name in _values(_FILE, text) if name not in inner)
-        count = len(self._names) + len(self.documents) + len(inner)
-        check_count(count, limits.MODEL_FILES, "names of files", shown(self._path), _SMALLER)
-        for name in inner:
-            for place in _places(name, ("", folder), ("",)):
-                content = None if place in self.documents else self._content(place, limits.MODEL_BYTES)
-                if content is not None:
-                    self.documents[place] = content
-                    self._check_size(self.documents, limits.MODEL_BYTES, "bytes of XML")
-                    yield posixpath.dirname(place), decoded(content, shown(self._path.parent / place))
-
-    def read_assets(self) -> None:
-        """Read the meshes and images."""
-        if len(self._folders) > _MOST_FOLDERS:
-            what = f"names {len(self._folders) - 1} folders"
-            raise TunnelError(what, where=shown(self._path), remedy="use one meshdir")
-        missing = []
-        for folder, name in self._names:
-            names = (name, posixpath.basename(name)) if self._stripped else (name,)
-            places = {place: None for one in names for place in _places(one, ("", folder), self._folders)}
-            known = len(self.assets)
-            for place in places.keys() - self.assets.keys():
-                content = self._content(place, limits.ASSET_BYTES)
-                if content is not None:
-                    self.assets[place] = content
-                    self._check_size(self.assets, limits.ASSET_BYTES, "bytes of meshes and images")
-            if len(self.assets) == known and not places.keys() & self.assets.keys():
-                missing.append(name)
-        # MuJoCo would take a file of the same name from another folder in its place.
-        taken = {posixpath.basename(place).lower() for place in self.assets}
-        for name in missing:
-            if posixpath.basename(name).lower() in taken:
-                what = f"names {one_line(name)!r}, which is not there"
-                raise TunnelError(what, where=shown(self._path), remedy="check the path")
-
-    def _content(self, place: str, limit: int) -> bytes | None:
-        """The content of a file; None where there is none."""
-        path = self._path.parent / place
-        try:
-            if not os.path.lexists(path):
-                return None
-            real = Path(os.path.realpath(path))
-        except ValueError:
+def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> bytes | None:
+    """The content of a file of a model; None where there is none."""
+    path = model.parent / place
+    try:
+        if not os.path.lexists(path):
             return None
-        if path.is_dir():  # a name that is put together from a folder of other files
-            return None
-        if not any(real.is_relative_to(root) for root in self._roots):
-            what = f"names {one_line(place)!r}, which is outside the model's folder"
-            remedy = "move it there, or name its folder with --asset-dir"
-            raise TunnelError(what, where=shown(self._path), remedy=remedy)
-        return read_regular(path, limit)
-
-    def _check_size(self, files: Mapping[str, bytes], limit: int, what: str) -> None:
-        check_count(sum(map(len, files.values())), limit, what, shown(self._path), _SMALLER)
+        real = Path(os.path.realpath(path))
+    except ValueError:
+        return None
+    if path.is_dir():  # a name that is put together from a folder of other files
+        return None
+    roots = [Path(os.path.realpath(one)) for one in (model.parent, asset_dir) if one is not None]
+    if not any(real.is_relative_to(root) for root in roots):
+        what = f"names {one_line(place)!r}, which is outside the model's folder"
+        remedy = "move it there, or name its folder with --asset-dir"
+        raise TunnelError(what, where=shown(model), remedy=remedy)
+    return read_regular(path, limit)
 
 
 def _places(name: str, bases: Sequence[str], folders: Iterable[str]) -> list[str]:
@@ -226,12 +207,9 @@ def read_joint_model(
     over twice the reach).
 
     Args:
-        path: MJCF, or URDF that MuJoCo loads.
-        joint: a hinge or slide, the only joint that moves.
         reach: greatest displacement from rest in the records, rad (m for a slide).
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
             where the joint has a spring beside gravity.
-        asset_dir: a further folder in which its files may be, beside the model's own.
     """
     files = read_model_files(path, asset_dir)
     request = json.dumps([joint, reach]).encode() + b"\n" + files.to_bytes()
@@ -287,12 +265,7 @@ def law_of_request(request: bytes) -> bytes:
 
 
 def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
-    """The kind of the only joint, of a model that can be simulated and in which no constraint holds it.
-
-    Raises:
-        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it, or
-            the model cannot be simulated.
-    """
+    """The kind of the only joint, of a model that can be simulated and in which no constraint holds it."""
     if not model.opt.timestep > 0.0:
         remedy = "correct the model's option"
         raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)

@@ -164,11 +164,7 @@ def _write_inertia(
 def _write_spring(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
-    """The sum of the joint's own spring and the added one, about the position at which it vanishes.
-
-    Raises:
-        TunnelError: when it vanishes nowhere.
-    """
+    """The sum of the joint's own spring and the added one, about the position at which it vanishes."""
     own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
     offset = model.law.rest - float(before.qpos_spring[0])
     total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
@@ -225,9 +221,6 @@ def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duratio
     Args:
         law_rest: the joint's position at rest, rad.
         duration: s.
-
-    Raises:
-        TunnelError: when the motion grows without bound, or its steps are too many.
     """
     steps = duration / model.opt.timestep
     remedy = "lengthen the model's timestep"

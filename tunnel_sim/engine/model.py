@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -28,11 +27,7 @@ from tunnel_sim.vocabulary.rig import Rig, WorkingSection, davis_vertices
 
 @functools.cache
 def load_plugin() -> None:
-    """Register the plugin with MuJoCo; a second call does nothing.
-
-    Raises:
-        TunnelError: when the library is missing.
-    """
+    """Register the plugin with MuJoCo; a second call does nothing."""
     mujoco.mj_loadPluginLibrary(str(native_library("vwt_plugin")))
 
 
@@ -188,7 +183,10 @@ class Model:
             mj.joint("rod_twist").stiffness = 1.0 / twist.compliance
             mj.joint("rod_twist").damping = twist.damping(settings.yaw_inertia)
             mj.body("rod_end").inertia = _inertia(self.rig, settings.yaw_inertia * share)
-        mj.numeric_data[:] = numeric_vector(mj, numerics(self.rig, settings))
+        for name, value in numerics(self.rig, settings).items():
+            numeric = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+            start = mj.numeric_adr[numeric]
+            mj.numeric_data[start : start + mj.numeric_size[numeric]] = value
         try:
             mujoco.mj_setConst(mj, mujoco.MjData(mj))
         except (ValueError, mujoco.FatalError) as error:
@@ -353,13 +351,3 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         "drive_held": (float(held),),
         "drive_on_end": (float(not drive.on_body),),
     }
-
-
-def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:
-    """A model's ``numeric_data``, shape (nnumericdata,), with some numbers or series of values changed."""
-    data = np.array(model.numeric_data)
-    for name, value in values.items():
-        numeric = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
-        start = model.numeric_adr[numeric]
-        data[start : start + model.numeric_size[numeric]] = value
-    return data

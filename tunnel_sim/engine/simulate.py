@@ -150,11 +150,7 @@ class RunBatch:
         return float(data.qpos[self._address]), float(data.qvel[self._address])
 
     def advance(
-        self,
-        samples: int,
-        first: Array,
-        rows: Any = None,
-        control: tuple[Array, Array] | None = None,
+        self, samples: int, first: Array, rows: Any = None, control: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
         """Integrate runs over some samples.
 

@@ -72,11 +72,7 @@ class FreeDecayConfig:
     rig_file: str | None = None
 
     def __post_init__(self) -> None:
-        """Check every argument.
-
-        Raises:
-            EnvError: when one is out of range, or a duration is not a whole number of the shorter interval.
-        """
+        """Refuse an argument out of range, or a duration that is not a whole number of the shorter interval."""
         if self.preset not in PRESETS:
             raise EnvError(f"unknown preset {self.preset!r}", remedy=did_you_mean(str(self.preset), PRESETS))
         for item in fields(self):

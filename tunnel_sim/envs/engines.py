@@ -82,9 +82,8 @@ class OneRun:
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
         """Integrate one control period, without control where no operation is given.
 
-        Returns:
-            Angle (rad) and rate (rad/s) of the rod's upper end at the samples and at the period's end, each of
-            shape (1, samples + 1).
+        Angle (rad) and rate (rad/s) of the rod's upper end at the samples and the period's end, shape (1,
+        samples + 1).
         """
         assert self._model is not None
         model, data, at = self._model.mj, self._data, self._model.yaw_address
@@ -119,12 +118,8 @@ class OneRun:
 
     def pose(self, row: int) -> tuple[float, float]:
         """Angle of the rod's upper end, and of the body relative to it, rad."""
-        return _pose(self.get_qpos(row))
-
-    def get_qpos(self, row: int) -> Array:
-        """Positions of a run's joints, rad; arguments as in `pose`."""
         del row
-        return np.array(self._data.qpos)
+        return _pose(self._data.qpos)
 
 
 class ManyRuns:
@@ -266,14 +261,13 @@ class WindAnswer:
     time_constant: float
 
     def speeds(self, begin: Array, set_point: Array) -> tuple[Array, Array]:
-        """Exact solution of τ V̇ = Vs − V over the period.
+        """Exact solution of τ V̇ = Vs − V over the period, m/s.
+
+        Mean speeds in the sample intervals, shape (runs, samples), and speed at the end, shape (runs,).
 
         Args:
             begin: speed at the start, shape (runs,), m/s.
             set_point: shape (runs,), m/s.
-
-        Returns:
-            Mean speeds in the sample intervals, shape (runs, samples), and speed at the end, shape (runs,), m/s.
         """
         left = np.exp(-np.arange(self.samples + 1) * (self.period / self.samples / self.time_constant))
         mean = (left[:-1] - left[1:]) * (self.time_constant * self.samples / self.period)

@@ -21,7 +21,7 @@ from tunnel_sim.effects.base import quantise
 from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
 from tunnel_sim.envs.engines import ManyRuns, OneRun, Operation, OperatorLog, WindAnswer, check_plain, decode
-from tunnel_sim.envs.information import Information, NominalRun, Prior
+from tunnel_sim.envs.information import Information, Prior
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -98,7 +98,7 @@ class Episodes:
             raise as_env_error(error, "reset options") from error
         self._plans[row], self._physics[row] = plan, physics
         self._readings.start(row, RunningSensor(chain, plan.sensor), rng)
-        self._information.start(row, self._nominal(plan))
+        self._information.start(row, stated, self._rig.body)
         self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
         self.step_count[row], self.ended[row] = 0, False
         time = self.step_count[row] * self._config.control_period
@@ -109,28 +109,10 @@ class Episodes:
             info["truth"] = plan
         return observation, info
 
-    def _nominal(self, plan: RunPlan) -> NominalRun:
-        truth, condition, body = plan.truth, plan.condition, self._rig.body
-        return NominalRun(
-            spring_stiffness=condition.spring_stiffness,
-            yaw_inertia=truth.yaw_inertia,
-            mechanical_damping=truth.mechanical_damping,
-            cn_beta=truth.cn_beta,
-            cn_r=truth.cn_r,
-            air_density=condition.air_density,
-            frontal_area=body.frontal_area,
-            reference_length=body.length,
-        )
-
     def advance(self, actions: Any) -> tuple[Array, Array, Flags, Flags]:
         """Advance every episode by one control period, including those that have ended.
 
-        Args:
-            actions: shape (runs,) in the plain preset, (runs, 2) in the operator preset.
-
-        Returns:
-            Observations of shape (runs, samples + 2), rewards (nats), terminations and truncations of shape
-            (runs,).
+        Observations, shape (runs, samples + 2), rewards (nats), terminations and truncations, shape (runs,).
         """
         operation = None
         if self._config.preset == "plain":
@@ -212,7 +194,7 @@ class Episodes:
         self._engine.start(row, state.physics)
         self._engine.set_state(row, state.mujoco)
         self._plans[row], self._physics[row] = state.plan, state.physics
-        self._information.restore(row, self._nominal(state.plan), state.arrays)
+        self._information.restore(row, state.plan.stated(), self._rig.body, state.arrays)
         self._log[row] = state.arrays["log"]
         self._speed[row], self._stated_speed[row] = state.arrays["speed"], state.plan.condition.wind_speed
         self.step_count[row], self.ended[row] = state.arrays["step_count"], state.arrays["ended"]

@@ -59,15 +59,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Start a run.
-
-        Args:
-            options: properties of the run; the others are drawn. See the environment's page.
-
-        Returns:
-            The observation (readings before the release, time 0 and wind speed), and the stated conditions of the
-            run.
-        """
+        """Start a run; the options that the environment's page lists fix its properties, the others are drawn."""
         super().reset(seed=seed)
         observation, info = self._episodes.start(0, options, self.np_random)
         if self.render_mode == "human":
@@ -77,12 +69,11 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Advance the run by one control period.
 
+        Observation, information gained (nats), whether the angle left the sensor's range, whether the run has
+        ended, and info.
+
         Args:
             action: 0 in the plain preset; set-point and moment, each from −1 to 1, in the operator preset.
-
-        Returns:
-            Observation, information gained (nats), whether the angle left the sensor's range, whether the run
-            has ended, and info.
         """
         if self._episodes.ended[0]:
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
@@ -192,10 +183,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         self._view = RigView(self.rig, render_mode, width, height, camera, self.config.control_period)
 
     def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Start all runs, or those selected by a mask.
 
@@ -203,9 +191,6 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
             seed: one per run, or the first of consecutive seeds, or None, as in ``SyncVectorEnv``.
             options: as in `FreeDecayEnv.reset`, for all runs. ``reset_mask``, a boolean array, selects the runs to
                 start; ``runs``, a sequence of mappings, overrides the common options run by run.
-
-        Returns:
-            Observations of all runs (zeros where the mask excludes a run), and infos.
         """
         common = dict(options or {})
         mask, each = common.pop("reset_mask", None), common.pop("runs", None)

@@ -15,62 +15,21 @@ from math import isfinite
 import numpy as np
 
 from tunnel_sim.envs import EnvError
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Body
 
 DYNAMIC = 6  # Izz, Cr, angle, rate, Cnβ, Cnr; the zero's sensitivity is one
 
 
-@dataclass(frozen=True)
-class NominalRun:
-    """The nominal model of one run.
-
-    Args:
-        spring_stiffness: Kr as stated, N m/rad.
-        yaw_inertia: Izz, kg m².
-        mechanical_damping: Cr, N m s/rad.
-        cn_beta: Cnβ, 1/rad.
-        cn_r: Cnr, 1/rad.
-        air_density: ρ, kg/m³.
-        frontal_area: A, m².
-        reference_length: l, m.
-    """
-
-    spring_stiffness: float
-    yaw_inertia: float
-    mechanical_damping: float
-    cn_beta: float
-    cn_r: float
-    air_density: float
-    frontal_area: float
-    reference_length: float
-
-    def coefficients(self) -> tuple[float, ...]:
-        """Kr/Izz, Cr/Izz, then ½ρAl/Izz and ½ρAl²/Izz without and with their coefficients, and 1/Izz."""
-        inertia = self.yaw_inertia
-        stiffness = 0.5 * self.air_density * self.frontal_area * self.reference_length / inertia
-        damping = stiffness * self.reference_length
-        return (
-            self.spring_stiffness / inertia,
-            self.mechanical_damping / inertia,
-            stiffness,
-            damping,
-            stiffness * self.cn_beta,
-            damping * self.cn_r,
-            1.0 / inertia,
-        )
-
-
 def propagator(a: Array, k: Array, duration: float) -> tuple[Array, Array, Array, Array]:
-    """Exact solution of ẍ + 2a ẋ + k x = 0 after a time, from (x, ẋ) = (1, 0) and (0, 1).
+    """Exact solution of ẍ + 2a ẋ + k x = 0 after a time: x from (1, 0) and (0, 1), then ẋ; each of shape (n,).
 
     Args:
         a: shape (n,), 1/s.
         k: shape (n,), 1/s²; may be below a², or negative.
         duration: s.
-
-    Returns:
-        x from (1, 0), x from (0, 1), ẋ from (1, 0), ẋ from (0, 1), each of shape (n,).
     """
     omega = np.sqrt((k - a**2).astype(np.complex128))
     decay = np.exp(-a * duration)
@@ -120,7 +79,7 @@ class Prior:
                 raise EnvError(what, where="prior", remedy="give it, SI units")
         return replace(Prior(), **changes)
 
-    def scales(self, run: NominalRun) -> Array:
+    def scales(self, run: RunSettings) -> Array:
         """The standard deviations in the units of the unknowns, shape (7,), in the order of `UNKNOWNS`."""
         own = {"yaw_inertia": run.yaw_inertia, "mechanical_damping": abs(run.mechanical_damping)}
         return np.array([getattr(self, name) * own.get(name, 1.0) for name in UNKNOWNS])
@@ -147,9 +106,21 @@ class Information:
         self.scaled = np.tile(np.eye(size), (count, 1, 1))
         self.known = np.zeros(count)
 
-    def start(self, row: int, run: NominalRun) -> None:
-        """Start a run."""
-        self._runs[:, row] = run.coefficients()
+    def start(self, row: int, run: RunSettings, body: Body) -> None:
+        """Start a run, its physics without effects, of a body."""
+        inertia = run.yaw_inertia
+        stiffness = 0.5 * run.air_density * body.frontal_area * body.length / inertia
+        damping = stiffness * body.length
+        # Kr/Izz, Cr/Izz, then ½ρAl/Izz and ½ρAl²/Izz without and with their coefficients, and 1/Izz
+        self._runs[:, row] = (
+            run.spring_stiffness / inertia,
+            run.mechanical_damping / inertia,
+            stiffness,
+            damping,
+            stiffness * run.derivatives.cn_beta,
+            damping * run.derivatives.cn_r,
+            1.0 / inertia,
+        )
         self._x[:, row] = 0.0
         self._x[0, row, 2] = self._x[1, row, 3] = 1.0
         self._speed[row] = np.nan
@@ -158,16 +129,13 @@ class Information:
         self.known[row] = 0.0
 
     def advance(self, angle: Array, rate: Array, wind_speed: Array, moment: Array) -> Array:
-        """Add the samples of one step.
+        """Add the samples of one step; the information gained about (Cnβ, Cnr), shape (runs,), nats.
 
         Args:
             angle: at the samples and at the end of the step, shape (runs, samples + 1), rad.
             rate: at the same times, shape (runs, samples + 1), rad/s.
             wind_speed: mean over the step, shape (runs,), m/s.
             moment: applied by the operator, shape (runs,), N m.
-
-        Returns:
-            The information gained about (Cnβ, Cnr), shape (runs,), nats.
         """
         if not np.array_equal(wind_speed, self._speed):
             stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
@@ -231,9 +199,9 @@ class Information:
         own["sensitivities"] = self._x[:, row]
         return {name: np.array(value) for name, value in own.items()}
 
-    def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
+    def restore(self, row: int, run: RunSettings, body: Body, state: Mapping[str, Array]) -> None:
         """Restore a run from a snapshot."""
-        self.start(row, run)
+        self.start(row, run, body)
         self._x[:, row] = state["sensitivities"]
         self._scale[row], self.scaled[row] = state["scale"], state["scaled"]
         self.known[row] = state["known"]

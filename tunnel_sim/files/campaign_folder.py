@@ -5,20 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tunnel_sim.files.plausible import (
-    checked_record,
-    plausible_values,
-)
+from tunnel_sim.files.plausible import checked_record, plausible_values
 from tunnel_sim.files.readers import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
 from tunnel_sim.files.toml_input import (
+    NotNegative,
     OneLine,
+    Positive,
     SampleRate,
     StrictModel,
     check_version,
@@ -38,15 +37,11 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import Drive, Hold, checked_drive, without_spring_needs_drive
+from tunnel_sim.vocabulary.drive import Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.record import Array, Record
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class CampaignTable(StrictModel):
@@ -83,7 +78,7 @@ class RunTable(StrictModel):
     file: OneLine = Field(description="a path inside the campaign's folder, such as 'runs/r01.csv'")
     spring_stiffness: NotNegative | None = optional(
         "a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
-        "normalised form",
+        "normalised form"
     )
     wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
     air_density: Positive | None = optional("a positive number in kg/m3")
@@ -173,16 +168,12 @@ IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """Read and check a campaign.
+    """Read and check a campaign, angles in radians.
+
+    Of several faults the first one is stated, in one line that names file, run and remedy.
 
     Args:
         folder: the campaign's folder, or the ``campaign.toml`` in it.
-
-    Returns:
-        The campaign, angles in radians.
-
-    Raises:
-        TunnelError: for the first fault, in one line that names file, run and remedy.
     """
     folder = Path(folder)
     if folder.name == CAMPAIGN_FILE and folder.is_file():
@@ -234,16 +225,9 @@ def write_campaign(
 ) -> Path:
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
-    Args:
-        folder: the folder to create, with its parents where they are missing.
-        overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
-        checked: whether every record has passed `checked_record`, so that this need not be done again.
-
-    Raises:
-        TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
-            reports an error.
-        ValueError: ``truth`` contains NaN or an infinity.
-        TypeError: ``truth`` contains a value that JSON cannot represent.
+    An existing folder may be replaced where it is empty or contains only a campaign. ``checked`` says that
+    every record has passed `checked_record`. A ``truth`` that JSON cannot represent is a ValueError or a
+    TypeError.
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:
@@ -267,7 +251,7 @@ def write_campaign(
         if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
             remedy = "shorten the run or leave it out"
             raise TunnelError("the record holds NaN or an infinity", where=where, remedy=remedy)
-        _record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, run.drive, where)
+        checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, run.drive)
         without_spring_needs_drive(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder, replace=overwrite) as partial:
@@ -314,26 +298,10 @@ def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
         what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
         remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"
         raise TunnelError(what, where=where, remedy=remedy)
-    record = _record(time_s, held.reading, held.column, sensor, run.release_angle, drive, where)
+    record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
     without_spring_needs_drive(run.spring_stiffness, drive, where)
     conditions = run.spring_stiffness, run.air_density, run.release_angle
     return Run(run.id, record, run.wind_speed, *conditions, drive=drive)
-
-
-def _record(
-    time_s: Array,
-    reading: Array,
-    column: str,
-    sensor: SensorProperties,
-    release_angle: float | None,
-    drive: Drive | None,
-    where: str,
-) -> Record:
-    """The record of a run, unless it or its input is refused."""
-    record = checked_record(time_s, reading, column, sensor, release_angle, where, driven=drive is not None)
-    if drive is not None:
-        checked_drive(drive, record, where, judged=sensor.plausible is not False)
-    return record
 
 
 def _check_target(folder: Path, *, overwrite: bool) -> None:

@@ -18,7 +18,17 @@ from pydantic import AfterValidator, Field
 from tunnel_sim.files.plan_drive import DriveTable, check_drive, drive_of_file, drive_of_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, load_toml, optional, shown, validate
+from tunnel_sim.files.toml_input import (
+    NotNegative,
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    load_toml,
+    optional,
+    shown,
+    validate,
+)
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -34,9 +44,6 @@ from tunnel_sim.vocabulary.rig import Rig
 
 STEPS_PER_SECOND = 1000.0
 """Integration steps per second of a run."""
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 def _release_angle(angle: float) -> float:
@@ -199,13 +206,8 @@ def check_conditions(plan: ConditionKeys, where: str) -> None:
 def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
     """Read a campaign description, a TOML file like the packaged ``paper-campaign.toml``.
 
-    Args:
-        rig: defines the numbered springs, and the inertia, damping and air density that the description does not
-            state; None uses the packaged rig.
-
-    Returns:
-        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
-        and repeats.
+    The rig (the packaged one by default) defines the numbered springs, and the inertia, damping and air
+    density that the description does not state.
     """
     path = Path(path)
     return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path), path.parent)

@@ -15,6 +15,7 @@ import numpy as np
 
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record, count_cycles
 
@@ -111,17 +112,16 @@ def checked_record(
     sensor: SensorProperties,
     release_angle: float | None,
     where: str,
-    *,
-    driven: bool = False,
+    drive: Drive | None = None,
 ) -> Record:
-    """The record of a run, unless it is refused.
+    """The record of a run, unless it or its input is refused.
 
     Args:
         time_s: sample times, shape (n,), s.
         reading: shape (n,), rad, rad/s or rad/s².
         column: that the readings are from, for messages.
         release_angle: as stated, rad.
-        driven: whether the run has an input: it need not oscillate at a frequency of its own.
+        drive: the input of a run, which need not oscillate at a frequency of its own.
 
     Raises:
         TunnelError: times that do not increase, too few cycles of a free decay, or what looks like a wrong unit.
@@ -147,21 +147,22 @@ def checked_record(
                 f"{KEEP}",
             )
     record = Record(time_s, reading)
-    cycles = 0.0 if driven else count_cycles(record)
-    if not driven and not cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
+    cycles = count_cycles(record) if drive is None else 0.0
+    if drive is None and not cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
         what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
         if not cycles > 0.0:
             what = "no oscillation is visible in the record, so it has fewer than three cycles"
         raise TunnelError(
             what, where=where, remedy="record for longer after the release, or leave the run out"
         )
-    if not judged:
-        return record
     step = record.sample_interval
-    if angle:  # rates and accelerations may have any size
+    if judged and angle:  # rates and accelerations may have any size
         _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
-    _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
-    if driven:
+    if judged:
+        _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
+    if drive is not None:
+        checked_drive(drive, record, where, judged=judged)
+    if drive is not None or not judged:
         return record
     per_cycle = reading.size / cycles
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)

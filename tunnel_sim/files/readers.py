@@ -98,11 +98,7 @@ def reader_place(ending: str) -> str | None:
 
 
 def load_reader(ending: str) -> Reader | None:
-    """The reader of files with an ending, as for `reader_place`; None where there is none.
-
-    Raises:
-        TunnelError: when an installed package states something that is not a reader.
-    """
+    """The reader of files with an ending, as for `reader_place`; None where there is none."""
     place = reader_place(ending)
     if place is None:
         return None
@@ -235,11 +231,7 @@ def _held(
 
 
 def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
-    """Read the input of a driven run from a file that need not hold a reading.
-
-    Returns:
-        Times, shape (n,), s, increasing; the input's column; its values, shape (n,), in the unit of that column.
-    """
+    """Read the input of a driven run, and its times, s, increasing, from a file that need not hold a reading."""
     held = _held(path, where, "put the file beside the plan or correct 'file'", limits.RUN_SAMPLES)
     column = _input_column(held.names, where)
     if column is None or "time_s" not in held.names:

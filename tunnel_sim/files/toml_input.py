@@ -45,6 +45,8 @@ def _printable(text: str) -> str:
 
 OneLine = Annotated[str, AfterValidator(_printable)]
 """A text without line breaks or control characters."""
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 SampleRate = Annotated[float, Field(ge=limits.SLOWEST_RATE, le=limits.FASTEST_RATE)]
 """A sample rate within its limits, Hz."""
 

@@ -85,8 +85,6 @@ class Run:
     """One run: its record and its conditions.
 
     Args:
-        id: unique in the campaign.
-        record: the sensor's reading.
         wind_speed: V, m/s; 0 is wind-off.
         spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.

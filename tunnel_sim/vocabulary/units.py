@@ -38,14 +38,10 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
 
 @functools.cache
 def dimension(unit: str) -> Dimension:
-    """The dimension of a unit.
+    """Powers of kg, m and s of a unit.
 
-    Args:
-        unit: factors with spaces between them and digits for powers, the denominator after one slash; or ``l/V``,
-            of a time as a multiple of the reference length over the wind speed, which is a number.
-
-    Returns:
-        Powers of kg, m and s.
+    It has factors with spaces between them and digits for powers, the denominator after one slash; or it is
+    ``l/V``, of a time as a multiple of the reference length over the wind speed, which is a number.
     """
     if unit == "l/V":
         return NUMBER

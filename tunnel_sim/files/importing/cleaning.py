@@ -78,13 +78,12 @@ def without_overflow(values: Array, said: list[str]) -> Array:
 
 
 def restarts(time: Array) -> list[int]:
-    """Where the clock of a record begins anew because another run follows.
+    """Where the clock of a record begins anew because another run follows: its first sample's index.
+
+    Empty where rows are only out of order.
 
     Args:
         time: as recorded, shape (n,).
-
-    Returns:
-        Index of the first sample of every further run; empty where rows are only out of order.
     """
     with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
         back = np.flatnonzero(np.diff(time) < 0.0) + 1
@@ -165,9 +164,6 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
         reading: of a run, shape (n,), in the unit.
         rest: as stated, in the unit.
         unit: of the reading.
-
-    Raises:
-        TunnelError: when the reading never passes the rest, as that of a body that swings must.
     """
     least, most = float(reading.min()), float(reading.max())
     if not least <= rest <= most:
@@ -181,13 +177,10 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
 
 
 def resolution(readings: Sequence[Array]) -> float | None:
-    """The step of a sensor whose readings lie on evenly spaced levels; None where they do not repeat.
+    """The step of a sensor whose readings lie on evenly spaced levels, in their unit; None where they do not.
 
     Args:
         readings: of the runs, each of shape (n,).
-
-    Returns:
-        The step, in the unit of the reading; None where the readings do not repeat.
     """
     some = np.concatenate([reading[:_LEVELS_OF] for reading in readings])
     levels = np.unique(some)

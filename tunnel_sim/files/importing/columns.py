@@ -61,11 +61,7 @@ def stem(name: str) -> str:
 
 
 def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
-    """The columns of each run, one run at least.
-
-    Raises:
-        TunnelError: a column that is not there, no column of angles, or several that may be it.
-    """
+    """The columns of each run, one run at least."""
     starts = [i for i, c in enumerate(table.channels) if _matches(c, choices.time or "") or is_time(c)]
     stems = {stem(table.channels[i].name) for i in starts}
     blocks = [table.channels]
@@ -228,11 +224,7 @@ Calibration = tuple[Array, Array] | tuple[float, float]
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
-    """The unit of certain kinds, keys of `UNITS`, that an option names; None where it is not given.
-
-    Raises:
-        TunnelError: not a unit of these kinds.
-    """
+    """The unit of certain kinds, keys of `UNITS`, that an option names; None where it is not given."""
     unit = known_unit(text) if text is not None else None
     if text is not None and (unit is None or kind_of(unit) not in kinds):
         names = ", ".join(name for kind in kinds for name in UNITS[kind])
@@ -274,11 +266,7 @@ def guessed_angle_unit(values: Array) -> tuple[str, float]:
 
 
 def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: str) -> Array:
-    """Times in s, shape (n,); a remark is added where the unit is guessed from the step.
-
-    Raises:
-        TunnelError: a column in another unit.
-    """
+    """Times in s, shape (n,); a remark is added where the unit is guessed from the step."""
     unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or time.unit
     if unit and kind_of(unit) != "time":
         what = f"'{one_line(time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
@@ -293,12 +281,7 @@ def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: st
 def in_radians(
     reading: Channel, choices: ImportChoices, calibration: Calibration | None, said: list[str], where: str
 ) -> tuple[Array, Quantity, str]:
-    """Readings in rad, rad/s or rad/s², shape (n,), what they are, and the unit they were taken to have.
-
-    Raises:
-        TunnelError: counts without counts per turn, volts without a calibration, another unit, or a swing of more
-            than half a turn in degrees that the user has not stated.
-    """
+    """Readings in rad, rad/s or rad/s², shape (n,), what they are, and the unit they were taken to have."""
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:

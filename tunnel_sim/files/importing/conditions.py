@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,18 @@ from pydantic import Field
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.tables import UNITS, Channel, kind_of, split_unit
 from tunnel_sim.files.importing.text import read_cells
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, optional, read_document, validate
+from tunnel_sim.files.toml_input import (
+    NotNegative,
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    optional,
+    read_document,
+    validate,
+)
 from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Conditions(StrictModel):
@@ -183,11 +189,7 @@ def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
 
 
 def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
-    """The condition of a run that a column states, in the unit of `Conditions`.
-
-    Returns:
-        The median; zero for a wind speed that lies about zero; None where the column says nothing.
-    """
+    """The condition of a run that a column states, in the unit of `Conditions`; None where it says nothing."""
     values = column.values[rows]
     values = values[np.isfinite(values)]
     if not values.size:

@@ -44,12 +44,7 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import (
-    HOLDS,
-    Drive,
-    Hold,
-    checked_drive,
-)
+from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -226,20 +221,15 @@ def _part(
         drive = Drive(column, values[kept], hold, gain)
     time = from_zero(time)
     try:
-        if drive is None:
-            release, stride = stated.get("release_angle"), time.size // _JUDGED
-            record = None
-            if stride > 1:
-                # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
-                with suppress(TunnelError):
-                    thin = time[::stride], reading[::stride]
-                    checked_record(*thin, "the reading", sensor, release, where)
-                    record = Record(time, reading)
-            if record is None:
-                record = checked_record(time, reading, "the reading", sensor, release, where)
-        else:
-            record = checked_record(time, reading, "the reading", sensor, None, where, driven=True)
-            checked_drive(drive, record, where)
+        record, stride = None, time.size // _JUDGED
+        release = None if drive is not None else stated.get("release_angle")
+        if drive is None and stride > 1:
+            # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+            with suppress(TunnelError):
+                checked_record(time[::stride], reading[::stride], "the reading", sensor, release, where)
+                record = Record(time, reading)
+        if record is None:
+            record = checked_record(time, reading, "the reading", sensor, release, where, drive)
     except TunnelError as error:
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
@@ -327,7 +317,15 @@ def write_imported(
 ) -> None:
     """Write what was read as a campaign, with its recipe; arguments as in `import_records`."""
     samples = sum(run.record.time_s.size for run in imported.campaign.runs)
-    beside = {IMPORT_RECIPE: recipe_text(imported).encode()}
+    recipe = {
+        "schema_version": 1,
+        "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
+        "originals": [
+            {"file": one_line(s.path.name), "sha256": s.sha256, "said": imported.remarks(s.path)}
+            for s in imported.sources
+        ],
+    }
+    beside = {IMPORT_RECIPE: tomli_w.dumps(recipe).encode()}
     if picture is not None:
         beside[IMPORT_PICTURE] = picture(imported)
     write_campaign(
@@ -357,16 +355,3 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
         unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
     return "\n".join([*originals, *head, *blocks])
-
-
-def recipe_text(imported: Imported) -> str:
-    """The recipe as TOML: the choices that were made, the originals, and what was changed."""
-    document = {
-        "schema_version": 1,
-        "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
-        "originals": [
-            {"file": one_line(s.path.name), "sha256": s.sha256, "said": imported.remarks(s.path)}
-            for s in imported.sources
-        ],
-    }
-    return tomli_w.dumps(document)

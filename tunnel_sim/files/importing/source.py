@@ -186,11 +186,7 @@ def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memory
 
 
 def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
-    """What `_send` has sent; EOFError where the other process has ended.
-
-    Raises:
-        EOFError: the other process has ended.
-    """
+    """What `_send` has sent; EOFError where the other process has ended."""
     line = stream.readline()
     if not line.endswith(b"\n"):
         raise EOFError
