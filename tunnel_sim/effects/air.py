@@ -40,15 +40,9 @@ class NonlinearYawMoment(Effect):
     law_terms = ("moment_cubic", "moment_cubic_exponent")
 
     coefficient: float = parameter(
-        "κa",
-        "1/rad2",
-        "relative change of Ka per squared angle",
-        scale=1.0,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-100.0,
-        fit_upper=100.0,
-    )
+        "κa", "1/rad2", "relative change of Ka per squared angle",
+        scale=1.0, lower=-1e6, upper=1e6, fit_lower=-100.0, fit_upper=100.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
 
 
@@ -70,15 +64,9 @@ class NonlinearYawDamping(Effect):
     law_terms = ("damping_quadratic", "damping_quadratic_exponent")
 
     coefficient: float = parameter(
-        "μa",
-        "1/rad2",
-        "relative change of Ca per squared angle",
-        scale=5.0,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-500.0,
-        fit_upper=500.0,
-    )
+        "μa", "1/rad2", "relative change of Ca per squared angle",
+        scale=5.0, lower=-1e6, upper=1e6, fit_lower=-500.0, fit_upper=500.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
 
 
@@ -271,23 +259,13 @@ class Buffeting(Effect):
     random = "broad_band"
 
     intensity: float = parameter(
-        "s",
-        "1",
-        "standard deviation of the moment coefficient",
-        scale=0.003,
-        lower=0.0,
-        upper=1.0,
-        per_pressure=True,
-    )
+        "s", "1", "standard deviation of the moment coefficient",
+        scale=0.003, lower=0.0, upper=1.0, per_pressure=True,
+    )  # fmt: skip
     bandwidth: float = parameter(
-        "fb",
-        "Hz",
-        "corner frequency of the moment's spectrum",
-        scale=20.0,
-        lower=0.01,
-        upper=400.0,
-        default=20.0,
-    )
+        "fb", "Hz", "corner frequency of the moment's spectrum",
+        scale=20.0, lower=0.01, upper=400.0, default=20.0,
+    )  # fmt: skip
 
     def moment_density(self, rate: float) -> float:
         """That of the random moment's spectrum at the frequency of the motion."""
@@ -334,14 +312,9 @@ class VortexShedding(Effect):
         "c", "1", "coefficient of the moment", scale=0.01, lower=0.0, upper=5.0, per_pressure=True
     )
     strouhal_number: float = parameter(
-        "St",
-        "1",
-        "Strouhal number based on the body's width",
-        scale=0.15,
-        lower=0.001,
-        upper=2.0,
-        default=0.15,
-    )
+        "St", "1", "Strouhal number based on the body's width",
+        scale=0.15, lower=0.001, upper=2.0, default=0.15,
+    )  # fmt: skip
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with the phase drawn for the run."""

@@ -30,15 +30,9 @@ class CubicStiffness(Effect):
     law_terms = ("stiffness_cubic", "stiffness_cubic_exponent")
 
     coefficient: float = parameter(
-        "κ",
-        "1/rad2",
-        "relative change of stiffness per squared angle, positive when hardening",
-        scale=0.2,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-10.0,
-        fit_upper=50.0,
-    )
+        "κ", "1/rad2", "relative change of stiffness per squared angle, positive when hardening",
+        scale=0.2, lower=-1e6, upper=1e6, fit_lower=-10.0, fit_upper=50.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)
 
 
@@ -62,15 +56,9 @@ class AsymmetricStiffness(Effect):
     law_terms = ("stiffness_quadratic", "stiffness_quadratic_exponent")
 
     coefficient: float = parameter(
-        "κ",
-        "1/rad",
-        "relative change of stiffness per angle",
-        scale=0.05,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-2.0,
-        fit_upper=2.0,
-    )
+        "κ", "1/rad", "relative change of stiffness per angle",
+        scale=0.05, lower=-1e6, upper=1e6, fit_lower=-2.0, fit_upper=2.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)
 
 
@@ -222,14 +210,9 @@ class SpringMiscalibration(Effect):
         "x", "1", "true over stated stiffness, less one", scale=0.02, lower=-0.9, upper=9.0
     )
     spring_stiffness: float = parameter(
-        "Kr",
-        "N m/rad",
-        "stated stiffness of the spring concerned",
-        scale=16.12,
-        lower=0.0,
-        upper=1e6,
-        chosen_spring=True,
-    )
+        "Kr", "N m/rad", "stated stiffness of the spring concerned",
+        scale=16.12, lower=0.0, upper=1e6, chosen_spring=True,
+    )  # fmt: skip
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -316,15 +299,9 @@ class QuadraticDamping(Effect):
     law_terms = ("quadratic_damping", "quadratic_damping_exponent")
 
     coefficient: float = parameter(
-        "C2",
-        "N m s2/rad2",
-        "coefficient of the squared rate",
-        scale=0.002,
-        lower=-1e4,
-        upper=1e4,
-        fit_lower=0.0,
-        rate_exponent="exponent",
-    )
+        "C2", "N m s2/rad2", "coefficient of the squared rate",
+        scale=0.002, lower=-1e4, upper=1e4, fit_lower=0.0, rate_exponent="exponent",
+    )  # fmt: skip
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
 
 

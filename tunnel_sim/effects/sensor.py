@@ -42,16 +42,9 @@ class SensorNonlinearity(Effect):
     exponent: float = exponent("p", "power of the angle in the error (unchanged at 0.2 rad)", 3.0)
 
     quadratic: float = parameter(
-        "q",
-        "1/rad",
-        "coefficient of an additional quadratic error",
-        scale=0.02,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-1.0,
-        fit_upper=1.0,
-        form=True,
-    )
+        "q", "1/rad", "coefficient of an additional quadratic error",
+        scale=0.02, lower=-1e6, upper=1e6, fit_lower=-1.0, fit_upper=1.0, form=True,
+    )  # fmt: skip
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -96,14 +89,9 @@ class SensorHysteresis(Effect):
 
     half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
     roundness: float = parameter(
-        "k",
-        "1",
-        "relative difference of two plays whose mean is read",
-        scale=0.3,
-        lower=0.0,
-        upper=1.0,
-        form=True,
-    )
+        "k", "1", "relative difference of two plays whose mean is read",
+        scale=0.3, lower=0.0, upper=1.0, form=True,
+    )  # fmt: skip
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Follow when pushed; the release has just pushed the reading outward."""
@@ -168,14 +156,9 @@ class SensorClipping(Effect):
         "c", "rad", "middle of the possible readings", scale=0.05, lower=-5.0, upper=5.0, form=True
     )
     knee: float = parameter(
-        "k",
-        "1",
-        "share of the limit over which the reading saturates gradually",
-        scale=0.05,
-        lower=0.0,
-        upper=0.9,
-        form=True,
-    )
+        "k", "1", "share of the limit over which the reading saturates gradually",
+        scale=0.05, lower=0.0, upper=0.9, form=True,
+    )  # fmt: skip
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -347,16 +330,9 @@ class SecondMode(Effect):
         "ω2", "rad/s", "undamped angular frequency", scale=50.0, lower=0.01, upper=1e5, default=50.0
     )
     damping_ratio: float = parameter(
-        "ζ2",
-        "1",
-        "share of critical damping",
-        scale=0.01,
-        lower=0.0,
-        upper=0.9,
-        default=0.01,
-        fit_lower=_LEAST_DAMPING,
-        fit_upper=0.2,
-    )
+        "ζ2", "1", "share of critical damping",
+        scale=0.01, lower=0.0, upper=0.9, default=0.01, fit_lower=_LEAST_DAMPING, fit_upper=0.2,
+    )  # fmt: skip
     exponent: float = parameter(
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
     )

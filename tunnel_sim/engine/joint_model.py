@@ -258,33 +258,28 @@ def law_of_request(request: bytes) -> bytes:
         with no_log(), np.errstate(all="ignore"):
             with engine_refusals("MuJoCo cannot load it", "correct the file"):
                 model = ModelFiles.from_bytes(request[at:]).spec().compile()
-            law = _law(model, reach, slide=_checked_joint(model, joint) == "slide")
+            if not model.opt.timestep > 0.0:
+                remedy = "correct the model's option"
+                raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)
+            names = [model.joint(i).name for i in range(model.njnt)]
+            if joint not in names:
+                known = [name for name in names if name]
+                remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
+                raise TunnelError("there is no such joint", remedy=remedy)
+            others = [name or "without a name" for name in names if name != joint]
+            if others:
+                remedy = "remove them, so that the bodies are welded; one joint is recorded"
+                raise TunnelError(f"other joints move too: {one_line(', '.join(others), 200)}", remedy=remedy)
+            if model.neq or model.nflex or model.na:
+                what = "equality constraints, deformable bodies and actuators with states cannot be part of the law"
+                raise TunnelError(what, remedy="remove them")
+            kind = _TYPES.get(int(model.jnt_type[0]))
+            if kind is None:
+                raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
+            law = _law(model, reach, slide=kind == "slide")
     except TunnelError as error:
         return json.dumps({"what": error.what, "remedy": error.remedy}).encode()
     return json.dumps({"law": asdict(law), "spring": bool(model.jnt_stiffness[0])}).encode()
-
-
-def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
-    """The kind of the only joint, of a model that can be simulated and in which no constraint holds it."""
-    if not model.opt.timestep > 0.0:
-        remedy = "correct the model's option"
-        raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)
-    names = [model.joint(i).name for i in range(model.njnt)]
-    if joint not in names:
-        known = [name for name in names if name]
-        remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
-        raise TunnelError("there is no such joint", remedy=remedy)
-    others = [name or "without a name" for name in names if name != joint]
-    if others:
-        remedy = "remove them, so that the bodies are welded; one joint is recorded"
-        raise TunnelError(f"other joints move too: {one_line(', '.join(others), 200)}", remedy=remedy)
-    if model.neq or model.nflex or model.na:
-        what = "equality constraints, deformable bodies and actuators with states cannot be part of the law"
-        raise TunnelError(what, remedy="remove them")
-    kind = _TYPES.get(int(model.jnt_type[0]))
-    if kind is None:
-        raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
-    return kind
 
 
 class _Engine:

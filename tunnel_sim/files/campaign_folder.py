@@ -186,8 +186,8 @@ def read_campaign(folder: Path | str) -> Campaign:
     document = read_document(folder / CAMPAIGN_FILE)
     sensor = SensorProperties(**document.sensor.model_dump())
     runs, samples = [], 0
-    for table in document.runs:
-        runs.append(_read_run(folder, table, sensor))
+    for run in document.runs:
+        runs.append(_read_run(folder, run, sensor))
         samples += runs[-1].record.time_s.size
         remedy = "put the runs into several campaigns"
         check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)

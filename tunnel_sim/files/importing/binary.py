@@ -77,7 +77,17 @@ def _read(content: bytes, where: str) -> list[Table]:
     fastexcel = library("fastexcel", "Excel", "import", where)
     tables = []
     with faults("an Excel workbook", where):
-        _check_archive(content, where)
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            entries = archive.infolist()
+        size = sum(entry.file_size for entry in entries)
+        check_count(size, limits.DATA_BYTES, "bytes once unpacked", where, "save fewer sheets, or as text")
+        names = [entry.filename.lower() for entry in entries]
+        if "xl/workbook.xml" not in names:
+            raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
+        for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
+            if any(part in name for name in names):
+                remedy = "save a copy with values only, as .xlsx or as text"
+                raise TunnelError(f"the workbook holds {what}", where=where, remedy=remedy)
         book = fastexcel.read_excel(content)
         sheets: dict[str, list[list[str]]] = {}
         described: dict[str, dict[str, Any]] = {}
@@ -119,21 +129,6 @@ def _read(content: bytes, where: str) -> list[Table]:
             table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
             tables += tables_of(body, layout, ".", labels, table)
     return tables
-
-
-def _check_archive(content: bytes, where: str) -> None:
-    """Refuse a workbook that unpacks to too much, or that brings programs or links along."""
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        entries = archive.infolist()
-    size = sum(entry.file_size for entry in entries)
-    check_count(size, limits.DATA_BYTES, "bytes once unpacked", where, "save fewer sheets, or as text")
-    names = [entry.filename.lower() for entry in entries]
-    if "xl/workbook.xml" not in names:
-        raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
-    for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
-        if any(part in name for name in names):
-            remedy = "save a copy with values only, as .xlsx or as text"
-            raise TunnelError(f"the workbook holds {what}", where=where, remedy=remedy)
 
 
 WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)

@@ -81,11 +81,20 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
             if len(named) > 1:
                 said.append(f"times from '{time.name}', the first of {len(named)} columns of times")
         elif choices.rate is None:
-            free = [c for c in _unconditional(block) if c.unit == "" and not _OTHER.search(c.name)]
-            time = next((c for c in free if _is_clock(c.values)), None)
-            if time is not None:
-                why = "evenly stepped numbers" + ("" if table.headed else ", and the file names no columns")
-                said.append(f"times from '{time.name}': {why}")
+            for channel in _unconditional(block):
+                numbers = channel.values[np.isfinite(channel.values)][:_HEAD]
+                steps = np.diff(np.sort(numbers))
+                if channel.unit or _OTHER.search(channel.name) or steps.size < 8 or not steps.max() > 0.0:
+                    continue
+                usual = float(np.median(steps))
+                count = usual == 1.0 and bool((numbers == np.round(numbers)).all())
+                if not count and float(np.mean(np.abs(steps - usual) < _STEADY * usual)) > 0.9:
+                    time = channel
+                    why = "evenly stepped numbers" + (
+                        "" if table.headed else ", and the file names no columns"
+                    )
+                    said.append(f"times from '{time.name}': {why}")
+                    break
         readings = _readings(block, time, choices, said, where)
         for reading in readings:
             mark = RUN_MARK.search(reading.name)
@@ -121,17 +130,6 @@ def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> l
         remedy = f"{option}: {did_you_mean(wanted, {channel.name for channel in block})}"
         raise TunnelError(what, where=where, remedy=remedy)
     return found
-
-
-def _is_clock(values: np.ndarray) -> bool:
-    """Whether numbers, once sorted, go up in steady steps; a count of samples does not pass."""
-    numbers = values[np.isfinite(values)][:_HEAD]
-    steps = np.diff(np.sort(numbers))
-    if steps.size < 8 or not steps.max() > 0.0:
-        return False
-    usual = float(np.median(steps))
-    count = usual == 1.0 and bool((numbers == np.round(numbers)).all())
-    return not count and float(np.mean(np.abs(steps - usual) < _STEADY * usual)) > 0.9
 
 
 def _readings(

@@ -101,9 +101,17 @@ def raw_records(
         facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
         for pair in find_pairs(table, choices, where):
             said = [*pair.said]
-            time = _times(pair, table, choices, said, where)
-            values = without_overflow(pair.reading.values, said)
-            reading = Channel(pair.reading.name, values, pair.reading.unit)
+            if pair.time is not None:
+                values = without_overflow(pair.time.values, said)
+                time = in_seconds(replace(pair.time, values=values), choices, said, where)
+            else:
+                interval, origin = sample_interval(table.facts, choices)
+                if interval is None:
+                    remedy = "give --time NAME, or --rate in Hz"
+                    raise TunnelError("no column of times", where=where, remedy=remedy)
+                said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
+                time = np.arange(pair.reading.values.size, dtype=np.float64) * interval
+            reading = replace(pair.reading, values=without_overflow(pair.reading.values, said))
             readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
             kept = _within(time, choices, said)
             driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
@@ -155,18 +163,6 @@ def raw_records(
                     )
                 )
     return found
-
-
-def _times(pair: ColumnPair, table: Table, choices: ImportChoices, said: list[str], where: str) -> Array:
-    """The times of a run, s."""
-    if pair.time is not None:
-        values = without_overflow(pair.time.values, said)
-        return in_seconds(Channel(pair.time.name, values, pair.time.unit), choices, said, where)
-    interval, origin = sample_interval(table.facts, choices)
-    if interval is None:
-        raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
-    said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
-    return np.arange(pair.reading.values.size, dtype=np.float64) * interval
 
 
 def _condition_columns(
