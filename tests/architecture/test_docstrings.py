@@ -75,13 +75,13 @@ def documented_arguments(text: str) -> dict[str, str]:
     if section is None:
         return {}
     found: dict[str, str] = {}
-    name = ""
+    names: list[str] = []
     for line in section[1].splitlines():
-        start = re.match(r"[ ]{4}(\w+)(?:, \w+)*:\s*(.*)", line)
+        start = re.match(r"[ ]{4}(\w+(?:, \w+)*):\s*(.*)", line)
         if start:
-            name = start[1]
-            found[name] = start[2]
-        elif name:
+            names = start[1].split(", ")  # several of one kind share a line
+            found |= dict.fromkeys(names, start[2])
+        for name in () if start else names:
             found[name] += " " + line.strip()
     return found
 
@@ -198,6 +198,15 @@ def without_unit(speed: float, count: int) -> float:
     return speed * count
 
 
+def without_a_shared_unit(low: float, high: float) -> float:
+    """Something.
+
+    Args:
+        low, high: ends of the band.
+    """
+    return high - low
+
+
 def promises_more(speed: float, count: int) -> float:
     """Something.
 
@@ -223,6 +232,7 @@ class HalfDescribed:
         (HalfDescribed, "argument angle is not documented"),
         (undocumented_argument, "argument speed is not documented"),
         (without_unit, "argument speed has no unit"),
+        (without_a_shared_unit, "argument high has no unit"),
         (promises_more, "documents colour, which it does not take"),
         (lambda: None, "no docstring"),
     ],

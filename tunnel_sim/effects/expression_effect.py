@@ -40,10 +40,7 @@ class Quantity:
 
     Args:
         unit: as `tunnel_sim.vocabulary.units.dimension` reads it.
-        scale: a typical value, in the unit.
-        lower: least value, in the unit.
-        upper: greatest value, in the unit.
-        default: value where none is given, in the unit.
+        scale, lower, upper, default: a typical value, its bounds, and the value where none is given, in the unit.
     """
 
     unit: str

@@ -30,11 +30,9 @@ class ParameterInfo:
     Args:
         unit: SI, angles in rad.
         scale: a typical value for this rig, for steps and starting values.
-        lower: least value allowed, in the unit.
-        upper: greatest value allowed, in the unit.
+        lower, upper: least and greatest value allowed, in the unit.
         default: value where none is given, in the unit; zero for the severity.
-        fit_lower: least value a fit of swings from `SWING` on may take, in the unit.
-        fit_upper: greatest value a fit of such swings may take, in the unit.
+        fit_lower, fit_upper: least and greatest value a fit of swings from `SWING` on may take, in the unit.
         rate_exponent: name of the parameter that is the power of the rate which it multiplies; empty: none.
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
@@ -180,10 +178,8 @@ class WindOnRun:
 
     Args:
         spring_stiffness: Kr, N m/rad.
-        omega: natural frequency with the wind on, rad/s.
-        still_omega: natural frequency of the same rig in still air, rad/s.
-        per_cn_beta: ½ρV²Al, which multiplies Cnβ, N m.
-        per_cn_r: ½ρVAl², which multiplies Cnr, N m s.
+        omega, still_omega: natural frequency with the wind on, and of the same rig in still air, rad/s.
+        per_cn_beta, per_cn_r: ½ρV²Al and ½ρVAl², which multiply Cnβ and Cnr, N m and N m s.
     """
 
     spring_stiffness: float

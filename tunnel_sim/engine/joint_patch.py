@@ -51,8 +51,7 @@ class Start:
 
     Args:
         time: since the start of the record, s.
-        angle: displacement from rest, rad.
-        rate: rad/s.
+        angle, rate: displacement from rest, rad, and its rate, rad/s.
     """
 
     run: str

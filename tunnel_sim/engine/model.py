@@ -57,8 +57,7 @@ def box_mesh(low: tuple[float, float, float], high: tuple[float, float, float], 
     """A box between two corners, rotated about the vertical axis.
 
     Args:
-        low: least x, y and z, m.
-        high: greatest x, y and z, m.
+        low, high: least and greatest x, y and z, m.
         turn: rotation, rad, counter-clockwise seen from above.
     """
     vertices = np.asarray(low) + np.array(_CORNERS, dtype=float) * (np.asarray(high) - np.asarray(low))
@@ -77,10 +76,8 @@ def coil_mesh(radius: float, wire: float, low: float, high: float, turns: int) -
     """A coil spring about the vertical axis.
 
     Args:
-        radius: of the coil, m.
-        wire: radius of the wire, m.
-        low: height of the lower end, m.
-        high: height of the upper end, m.
+        radius, wire: radii of the coil and of its wire, m.
+        low, high: heights of its ends, m.
         turns: number of turns.
     """
     around, along = 8, 24 * turns + 1

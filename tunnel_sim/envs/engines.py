@@ -192,8 +192,7 @@ class OperatorLog:
 
     Args:
         time_s: start of the period, shape (n,), s.
-        set_point: of the wind speed, shape (n,), m/s.
-        wind_speed: at the period's end, shape (n,), m/s.
+        set_point, wind_speed: set-point and, at the period's end, the speed, shape (n,), m/s.
         moment: applied to the rod's upper end, shape (n,), N m.
     """
 
@@ -266,8 +265,7 @@ class WindAnswer:
         Mean speeds in the sample intervals, shape (runs, samples), and speed at the end, shape (runs,).
 
         Args:
-            begin: speed at the start, shape (runs,), m/s.
-            set_point: shape (runs,), m/s.
+            begin, set_point: speed at the start, and set-point, shape (runs,), m/s.
         """
         left = np.exp(-np.arange(self.samples + 1) * (self.period / self.samples / self.time_constant))
         mean = (left[:-1] - left[1:]) * (self.time_constant * self.samples / self.period)

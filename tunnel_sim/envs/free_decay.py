@@ -24,8 +24,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
     Args:
         render_mode: ``human``: MuJoCo's viewer; ``rgb_array``: pictures; None: nothing is drawn.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
+        width, height: of a picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
         **arguments: fields of `FreeDecayConfig`.
     """

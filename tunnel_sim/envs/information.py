@@ -49,13 +49,10 @@ class Prior:
     """What is known before the run, as standard deviations; 0: known exactly.
 
     Args:
-        yaw_inertia: as a share of Izz, dimensionless; known from wind-off runs with the spring.
-        mechanical_damping: as a share of Cr, dimensionless; known from the same runs.
-        release_angle: rad.
+        yaw_inertia, mechanical_damping: as a share of Izz and Cr; known from wind-off runs with the spring.
+        release_angle, sensor_zero: rad.
         release_rate: rad/s.
-        sensor_zero: rad.
-        cn_beta: 1/rad, above 0.
-        cn_r: 1/rad, above 0.
+        cn_beta, cn_r: 1/rad, above 0.
     """
 
     yaw_inertia: float = 1e-4
@@ -132,8 +129,7 @@ class Information:
         """Add the samples of one step; the information gained about (Cnβ, Cnr), shape (runs,), nats.
 
         Args:
-            angle: at the samples and at the end of the step, shape (runs, samples + 1), rad.
-            rate: at the same times, shape (runs, samples + 1), rad/s.
+            angle, rate: at the samples and at the end of the step, shape (runs, samples + 1), rad and rad/s.
             wind_speed: mean over the step, shape (runs,), m/s.
             moment: applied by the operator, shape (runs,), N m.
         """

@@ -34,8 +34,7 @@ class RigView:
 
     Args:
         mode: ``human``, ``rgb_array`` or None.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
+        width, height: of a picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
         period: time between two frames in a window, s.
     """

@@ -41,11 +41,9 @@ class Range:
     """The plausible values of one quantity.
 
     Args:
-        low: least plausible value, in the unit.
-        high: greatest plausible value, in the unit.
+        low, high: least and greatest plausible value, in the unit.
         unit: unit in the file format.
-        above: likely unit of a value above the range.
-        below: likely unit of a value below the range.
+        above, below: likely unit of a value above and below the range.
     """
 
     low: float

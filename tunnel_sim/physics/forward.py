@@ -161,8 +161,7 @@ class Ringing:
         """Angle and rate with the ringing.
 
         Args:
-            angle: of the slow motion at equal intervals from the release, rad, shape (n,).
-            rate: of the slow motion, rad/s, shape (n,).
+            angle, rate: of the slow motion at equal intervals from the release, rad and rad/s, shape (n,).
             interval: s.
         """
         size = abs(self.amplitude)

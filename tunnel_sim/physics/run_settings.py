@@ -148,8 +148,7 @@ class RunSettings:
         air_density: ρ, kg/m³.
         release_angle: rad, of the body.
         release_rate: rad/s; the rig itself releases from rest.
-        duration: s.
-        timestep: integration step, s.
+        duration, timestep: of the run, and of an integration step, s.
         parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``); the others are
             zero.
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
@@ -252,8 +251,7 @@ class Motion:
 
     Args:
         time_s: shape (n,), s from the release.
-        angle: of the rod's upper end, which carries spring and sensor, shape (n,), rad.
-        rate: of the same end, shape (n,), rad/s.
+        angle, rate: of the rod's upper end, which carries spring and sensor, shape (n,), rad and rad/s.
     """
 
     time_s: Array

@@ -23,8 +23,7 @@ class AeroDerivatives:
     """Yaw-moment derivatives.
 
     Args:
-        cn_beta: Cnβ = ∂Cn/∂β, 1/rad.
-        cn_r: Cnr = ∂Cn/∂(r l/V), 1/rad.
+        cn_beta, cn_r: Cnβ = ∂Cn/∂β and Cnr = ∂Cn/∂(r l/V), 1/rad.
     """
 
     cn_beta: float
@@ -73,8 +72,7 @@ class Truth:
     """The coefficients that the simulation uses, which the estimators are to recover.
 
     Args:
-        cn_beta: Cnβ, 1/rad.
-        cn_r: Cnr, 1/rad.
+        cn_beta, cn_r: Cnβ and Cnr, 1/rad.
         yaw_inertia: Izz of model and support, kg m².
         mechanical_damping: Cr, N m s/rad.
     """
@@ -171,8 +169,7 @@ def chirp(time_s: Array, start_hz: float, end_hz: float) -> Array:
 
     Args:
         time_s: of the samples from 0 on, shape (n,), s.
-        start_hz: frequency at the first sample, Hz.
-        end_hz: frequency at the last sample, Hz.
+        start_hz, end_hz: frequencies at the first and the last sample, Hz.
     """
     slope = (end_hz - start_hz) / time_s[-1]
     values: Array = np.sin(2.0 * pi * (start_hz + 0.5 * slope * time_s) * time_s)
@@ -196,8 +193,7 @@ def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> 
     Args:
         size: number of samples n (a count).
         interval: between samples, s.
-        low_hz: lower end of the band, included, Hz.
-        high_hz: upper end of the band, included, Hz.
+        low_hz, high_hz: ends of the band, included, Hz.
     """
     length = size * interval
     first, last = np.ceil(low_hz * length - 1e-9), np.floor(high_hz * length + 1e-9)
@@ -209,8 +205,7 @@ def multisine(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Gener
 
     Args:
         time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        low_hz: lower end of the band, Hz.
-        high_hz: upper end of the band, below half the sample rate, Hz; at least one line lies between.
+        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line lies between.
         rng: draws the phases; None: those of Schroeder, −π k (k − 1)/N of the k-th of N lines, which keep the peak
             low (doi:10.1109/TIT.1970.1054411).
     """
@@ -225,9 +220,7 @@ def band_noise(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Gene
 
     Args:
         time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
-        low_hz: lower end of the band, Hz.
-        high_hz: upper end of the band, below half the sample rate, Hz; at least one multiple of one over the
-            record's length lies between.
+        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line lies between.
     """
     lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
     return _of_lines(

@@ -106,9 +106,7 @@ class WorkingSection:
     """The tunnel's working section.
 
     Args:
-        width: across the flow, m.
-        height: m.
-        length: along the flow, m.
+        width, height, length: m; the width is across the flow, the length along it.
     """
 
     width: float
@@ -122,13 +120,10 @@ class Body:
 
     Args:
         length: reference length l, m.
-        width: m.
-        height: m.
+        width, height, ground_clearance: m.
         rear_slant_deg: angle of the rear slant below the roof, degrees.
-        ground_clearance: m.
         mass: of model and oscillating mechanism, kg.
-        frontal_area: A, m².
-        side_area: m².
+        frontal_area, side_area: A, and that of the side, m².
     """
 
     length: float
@@ -156,8 +151,7 @@ class Rod:
     """The support rod.
 
     Args:
-        diameter: m.
-        length_above_ceiling: m.
+        diameter, length_above_ceiling: m.
     """
 
     diameter: float
