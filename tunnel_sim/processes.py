@@ -195,12 +195,11 @@ def _one_thread_each() -> Iterator[None]:
 def _start(line: Connection) -> None:
     """Prepare a process: Ctrl-C is handled by the parent, and the process ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(line,), daemon=True).start()
 
+    def end() -> None:
+        try:
+            line.recv()
+        except (EOFError, OSError):  # the pipe to the parent is closed, by the parent or by its death
+            os._exit(1)
 
-def _end_with(line: Connection) -> None:
-    """End this process when the pipe to the parent is closed, by the parent or by its death."""
-    try:
-        line.recv()
-    except (EOFError, OSError):
-        os._exit(1)
+    threading.Thread(target=end, daemon=True).start()

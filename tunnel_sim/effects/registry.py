@@ -30,22 +30,20 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
 )
 
 
-def _found() -> tuple[type[Effect], ...]:
-    """The effects that the package's modules define, by their place."""
-    room = __name__.rpartition(".")[0]
-    names = [f"{room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
-    modules = [import_module(name) for name in names if name != __name__]
-    defined = {
-        kind
-        for module in modules
-        for kind in vars(module).values()
-        if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
-    }
-    return tuple(sorted((kind for kind in defined if hasattr(kind, "place")), key=lambda kind: kind.place))
-
+_room = __name__.rpartition(".")[0]
+_names = [f"{_room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
+_modules = [import_module(name) for name in _names if name != __name__]
+_defined = {
+    kind
+    for module in _modules
+    for kind in vars(module).values()
+    if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
+}
 
 #: Every built-in effect, in the order of the vocabulary: a module of this package that defines one is enough.
-ALL_EFFECTS: tuple[type[Effect], ...] = _found()
+ALL_EFFECTS: tuple[type[Effect], ...] = tuple(
+    sorted((kind for kind in _defined if hasattr(kind, "place")), key=lambda kind: kind.place)
+)
 
 
 def known_effects() -> tuple[type[Effect], ...]:

@@ -110,7 +110,14 @@ def patched(
         spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
     with _refusals(model):
         after = spec.compile()
-    return spec, _differences(before, after)
+    old, new = _attributes(before), _attributes(after)
+    spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
+    return spec, tuple(
+        Written(name, old[name, unit], value, unit)
+        for (name, unit), value in new.items()
+        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
+        and (spring or name != "joint springref")
+    )
 
 
 def _refusals(model: JointModel) -> AbstractContextManager[None]:
@@ -183,35 +190,22 @@ def _write_spring(
     joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
 
 
-def _differences(before: mujoco.MjModel, after: mujoco.MjModel) -> tuple[Written, ...]:
-    def of(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
-        moving = [i for i in range(model.nbody) if model.body_weldid[i]]
-        found = {
-            ("joint armature", "kg m2"): [model.dof_armature[0]],
-            ("joint stiffness", "N m/rad, /rad2, /rad3"): [
-                model.jnt_stiffness[0],
-                *model.jnt_stiffnesspoly[0],
-            ],
-            ("joint springref", "rad"): [model.qpos_spring[0]],
-            ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): [
-                model.dof_damping[0],
-                *model.dof_dampingpoly[0],
-            ],
-            ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
-            **{(f"body {model.body(i).name or i} mass", "kg"): [model.body_mass[i]] for i in moving},
-            ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
-            ("plugin vwt.yaw_moment", "1"): [model.nplugin],
-        }
-        return {name: tuple(map(float, values)) for name, values in found.items()}
-
-    old, new = of(before), of(after)
-    spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
-    return tuple(
-        Written(name, old[name, unit], value, unit)
-        for (name, unit), value in new.items()
-        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
-        and (spring or name != "joint springref")
-    )
+def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
+    """What may be written into a model, by name and unit."""
+    moving = [i for i in range(model.nbody) if model.body_weldid[i]]
+    spring = model.jnt_stiffness[0], *model.jnt_stiffnesspoly[0]
+    damping = model.dof_damping[0], *model.dof_dampingpoly[0]
+    found = {
+        ("joint armature", "kg m2"): [model.dof_armature[0]],
+        ("joint stiffness", "N m/rad, /rad2, /rad3"): spring,
+        ("joint springref", "rad"): [model.qpos_spring[0]],
+        ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): damping,
+        ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
+        **{(f"body {model.body(i).name or i} mass", "kg"): [model.body_mass[i]] for i in moving},
+        ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
+        ("plugin vwt.yaw_moment", "1"): [model.nplugin],
+    }
+    return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
 def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duration: float) -> Motion:

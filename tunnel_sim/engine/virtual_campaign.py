@@ -98,13 +98,10 @@ def stated_run(condition: Condition, record: Record) -> Run:
     )
 
 
-def run_settings(
-    truth: Truth, condition: Condition, *, timestep: float = 1e-3, sample_rate: float | None = None
-) -> RunSettings:
+def run_settings(truth: Truth, condition: Condition, *, sample_rate: float | None = None) -> RunSettings:
     """The stated physics of one run.
 
     Args:
-        timestep: integration step, s.
         sample_rate: of the input of a driven run, Hz; not used for a free decay.
     """
     given, moment = condition.drive, None
@@ -126,7 +123,6 @@ def run_settings(
         air_density=condition.air_density,
         release_angle=condition.release_angle,
         duration=condition.duration,
-        timestep=timestep,
         drive=moment,
     )
 

@@ -141,7 +141,31 @@ class Information:
             whole = propagator(a, k, self._interval)
             half = propagator(a, k, 0.5 * self._interval)
             self._propagator = np.stack((*whole, half[1], half[3]))
-        kicks = self._kicks(angle, rate, wind_speed, moment)
+        # What u adds to value and rate in each interval: kicks, shape (2, samples, runs, DYNAMIC).
+        h = self._interval
+        a, k = self._decay
+        _, f01, _, f11, m01, m11 = self._propagator
+        _, _, stiffness, damping, _, _, inverse = self._runs
+        begin, end = angle[:, :-1], angle[:, 1:]
+        rate0, rate1 = rate[:, :-1], rate[:, 1:]
+        sums = np.empty(
+            (2, 2, self._samples, len(wind_speed))
+        )  # of value, rate; driven by the angle, its rate
+        for drive, (u0, middle, u1) in enumerate(
+            (
+                (begin.T, (0.5 * (begin + end) + 0.125 * h * (rate0 - rate1)).T, end.T),
+                (rate0.T, (1.5 * (end - begin) / h - 0.25 * (rate0 + rate1)).T, rate1.T),
+            )
+        ):
+            sums[0, drive] = (h / 6.0) * (f01 * u0 + 4.0 * m01 * middle)
+            sums[1, drive] = (h / 6.0) * (f11 * u0 + 4.0 * m11 * middle + u1)
+        push = (h / 6.0) * np.stack((f01 + 4.0 * m01, f11 + 4.0 * m11 + 1.0)) * (moment * inverse)
+        kicks = np.zeros((2, self._samples, len(wind_speed), DYNAMIC))
+        by_angle, by_rate = sums[:, 0], sums[:, 1]
+        kicks[..., 0] = inverse * (k * by_angle + 2.0 * a * by_rate - push[:, None])  # −β̈/Izz
+        kicks[..., 1] = -inverse * by_rate
+        kicks[..., 4] = stiffness * wind_speed**2 * by_angle
+        kicks[..., 5] = damping * wind_speed * by_rate
         f00, f01, f10, f11 = (row[:, None] for row in self._propagator[:4])
         x, v = self._x
         out = np.ones((self._samples, len(self._speed), DYNAMIC + 1))  # the sensitivity to the zero remains 1
@@ -154,32 +178,6 @@ class Information:
         self.scaled += np.matmul(of_reading, of_reading.transpose(0, 2, 1)) / self._variance
         before, self.known = self.known, half_log_det(self.scaled)
         return np.maximum(self.known - before, 0.0)
-
-    def _kicks(self, angle: Array, rate: Array, speed: Array, moment: Array) -> Array:
-        """What u adds to value and rate in each interval, shape (2, samples, runs, DYNAMIC)."""
-        h = self._interval
-        a, k = self._decay
-        _, f01, _, f11, m01, m11 = self._propagator
-        _, _, stiffness, damping, _, _, inverse = self._runs
-        begin, end = angle[:, :-1], angle[:, 1:]
-        rate0, rate1 = rate[:, :-1], rate[:, 1:]
-        sums = np.empty((2, 2, self._samples, len(speed)))  # of value, rate; driven by the angle, its rate
-        for drive, (u0, middle, u1) in enumerate(
-            (
-                (begin.T, (0.5 * (begin + end) + 0.125 * h * (rate0 - rate1)).T, end.T),
-                (rate0.T, (1.5 * (end - begin) / h - 0.25 * (rate0 + rate1)).T, rate1.T),
-            )
-        ):
-            sums[0, drive] = (h / 6.0) * (f01 * u0 + 4.0 * m01 * middle)
-            sums[1, drive] = (h / 6.0) * (f11 * u0 + 4.0 * m11 * middle + u1)
-        push = (h / 6.0) * np.stack((f01 + 4.0 * m01, f11 + 4.0 * m11 + 1.0)) * (moment * inverse)
-        kicks = np.zeros((2, self._samples, len(speed), DYNAMIC))
-        by_angle, by_rate = sums[:, 0], sums[:, 1]
-        kicks[..., 0] = inverse * (k * by_angle + 2.0 * a * by_rate - push[:, None])  # −β̈/Izz
-        kicks[..., 1] = -inverse * by_rate
-        kicks[..., 4] = stiffness * speed**2 * by_angle
-        kicks[..., 5] = damping * speed * by_rate
-        return kicks
 
     def matrix(self, row: int) -> Array:
         """The Fisher information of one run, including its prior: shape (7, 7), in the order of `UNKNOWNS`.

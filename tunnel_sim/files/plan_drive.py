@@ -11,7 +11,7 @@ from pydantic import Field
 
 from tunnel_sim.files.readers import read_input
 from tunnel_sim.files.toml_input import OneLine, StrictModel
-from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
+from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 from tunnel_sim.vocabulary.record import Array
@@ -67,10 +67,6 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
     Args:
         samples: of a run (a count).
         sample_rate: Hz.
-        where: file and table, for messages.
-
-    Raises:
-        TunnelError: for the first fault.
     """
     given = [name for name in _OPTIONAL if getattr(table, name) not in (None, [])]
     needed = _NEEDS[table.kind]
@@ -104,19 +100,6 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
         _check_sampled(name, getattr(table, name), sample_rate, where)
     for frequency in table.frequencies_hz:
         _check_sampled("frequencies_hz", frequency, sample_rate, where)
-    _check_band(table, samples, sample_rate, where)
-
-
-def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
-    if frequency is not None and not frequency < 0.5 * sample_rate:
-        raise TunnelError(
-            f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz",
-            where=where,
-            remedy="lower it, or raise sample_rate under [sensor]",
-        )
-
-
-def _check_band(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
     low, high = table.from_hz, table.to_hz
     if table.kind not in _BANDS or low is None or high is None:
         return
@@ -129,46 +112,44 @@ def _check_band(table: DriveTable, samples: int, sample_rate: float, where: str)
         )
 
 
+def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
+    if frequency is not None and not frequency < 0.5 * sample_rate:
+        raise TunnelError(
+            f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz",
+            where=where,
+            remedy="lower it, or raise sample_rate under [sensor]",
+        )
+
+
 def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array) -> Drive:
     """The input of one driven run that is not that of a file.
 
     Args:
-        table: checked by `check_drive`.
         amplitude: peak, N m or rad.
         number: of the driven run in the plan from 0 on: drawn phases differ from run to run.
         time_s: of the samples from 0 on, shape (n,), s.
     """
-    column: InputColumn = "moment_nm" if table.amplitudes_nm else "base_rad"
-    return Drive(column, amplitude * _waveform(table, time_s, number), table.hold)
-
-
-def _waveform(table: DriveTable, time: Array, number: int) -> Array:
     low, high = table.from_hz or 0.0, table.to_hz or 0.0
     rng = np.random.default_rng([table.seed or 0, number])
     match table.kind:
         case "square":
-            return square(time, table.frequency_hz or 0.0)
+            wave = square(time_s, table.frequency_hz or 0.0)
         case "chirp":
-            return chirp(time, low, high)
+            wave = chirp(time_s, low, high)
         case "multisine":
-            return multisine(time, low, high, None if table.seed is None else rng)
+            wave = multisine(time_s, low, high, None if table.seed is None else rng)
         case "random":
-            return band_noise(time, low, high, rng)
+            wave = band_noise(time_s, low, high, rng)
         case _:
-            return stepped_sine(time, table.frequencies_hz or [table.frequency_hz or 0.0])
+            wave = stepped_sine(time_s, table.frequencies_hz or [table.frequency_hz or 0.0])
+    return Drive("moment_nm" if table.amplitudes_nm else "base_rad", amplitude * wave, table.hold)
 
 
 def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:
     """The input of a file at the times of the samples, its first value at time 0.
 
     Args:
-        path: a table with time_s and one of moment_nm (N m) and base_rad (rad).
         time_s: of the samples from 0 on, shape (n,), s.
-        hold: between the file's values.
-        where: plan and file, for messages.
-
-    Raises:
-        TunnelError: a file that is not an input of known unit, is constant, or is shorter than the run.
     """
     given, column, values = read_input(path, where)
     if column == "drive":

@@ -318,10 +318,6 @@ class EffectsDocument(StrictModel):
 
 
 def read_effect_tables(path: Path) -> list[OwnEffectTable]:
-    """The tables of an effects file (TOML), their expressions not yet parsed.
-
-    Args:
-        path: a TOML file.
-    """
+    """The tables of an effects file (TOML), their expressions not yet parsed."""
     document = load_toml(path, missing="name an effects file; docs/how-to/add-an-effect.md has an example")
     return validate(EffectsDocument, document, path).effects

@@ -109,10 +109,9 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
         os.close(descriptor)
 
 
-def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> str:
+def read_text(path: Path, limit: int, *, missing: str = "") -> str:
     """Read a regular file of UTF-8 text, without its byte order mark; arguments as in `read_regular`."""
-    where = where or shown(path)
-    return decoded(read_regular(path, limit, where=where, missing=missing), where)
+    return decoded(read_regular(path, limit, missing=missing), shown(path))
 
 
 def decoded(content: bytes, where: str) -> str:
@@ -125,9 +124,10 @@ def decoded(content: bytes, where: str) -> str:
         raise TunnelError(what, where=where, remedy="save the file as UTF-8") from None
 
 
-def read_json(path: Path, *, remedy: str, limit: int = limits.JSON_BYTES) -> dict[str, Any]:
+def read_json(path: Path, *, remedy: str) -> dict[str, Any]:
     """Read a JSON object; the remedy is for a file that is missing or malformed."""
-    return parse_json(read_regular(path, limit, missing=remedy, readable=remedy), shown(path), remedy)
+    content = read_regular(path, limits.JSON_BYTES, missing=remedy, readable=remedy)
+    return parse_json(content, shown(path), remedy)
 
 
 def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:

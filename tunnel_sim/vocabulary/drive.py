@@ -62,16 +62,7 @@ class Drive:
 
 
 def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = True) -> None:
-    """Refuse an input that cannot be that of its record.
-
-    Args:
-        record: of the response.
-        where: file and run, for messages.
-        judged: whether an input that looks clipped is refused too.
-
-    Raises:
-        TunnelError: an input of another length than the record, constant, clipped, or the response itself.
-    """
+    """Refuse an input that cannot be that of its record; where it is ``judged``, one that looks clipped too."""
     values, name = drive.values, drive.column
     if values.shape != record.yaw_rad.shape:
         raise TunnelError(
@@ -128,11 +119,6 @@ def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | No
 
     Args:
         spring_stiffness: as stated, N m/rad; None where it is not.
-        drive: the run's input; None of a free run.
-        where: file and run, for messages.
-
-    Raises:
-        TunnelError: a stiffness of zero in a free run, which does not oscillate.
     """
     if spring_stiffness == 0.0 and drive is None:
         raise TunnelError(

@@ -39,11 +39,7 @@ class Record:
     yaw_rad: Array
 
     def __post_init__(self) -> None:
-        """Copy, freeze and check the arrays.
-
-        Raises:
-            ValueError: when shapes differ or there are fewer than two samples.
-        """
+        """Copy, freeze and check the arrays."""
         object.__setattr__(self, "time_s", read_only(self.time_s))
         object.__setattr__(self, "yaw_rad", read_only(self.yaw_rad))
         if self.time_s.ndim != 1 or self.time_s.shape != self.yaw_rad.shape or self.time_s.size < 2:
@@ -86,27 +82,23 @@ class Record:
 
 
 def gaps(time: Array) -> NDArray[np.bool_]:
-    """Whether samples are missing between one time and the next.
+    """Whether samples are missing after each time but the last (steps of over four mean intervals), shape (n - 1,).
 
     Args:
         time: of the samples, shape (n,), s, increasing.
-
-    Returns:
-        Shape (n - 1,): whether the step is longer than four mean intervals.
     """
     steps = np.diff(time)
     return steps > _GAP * steps.mean() if steps.size else np.zeros(0, dtype=np.bool_)
 
 
 def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
-    """A record on a uniform raster, for methods that need one.
+    """A record on a uniform raster, for methods that need one: itself where it is uniform.
+
+    Else a smooth curve through it at as many times. Interpolation reduces the noise, and readings within a
+    gap are not measurements.
 
     Args:
         bridged: whether gaps are bridged by a curve; False: by the record's mean, which adds nothing to a spectrum.
-
-    Returns:
-        The record itself where it is uniform; else a smooth curve through it at as many times, evenly spaced from
-        the first to the last. Interpolation reduces the noise, and readings within a gap are not measurements.
     """
     if record.uniform:
         return record

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
-from tunnel_sim.files.importing.inputs import is_input, is_stated
-from tunnel_sim.files.importing.tables import UNITS, Channel, Table, kind_of, known_unit
+from tunnel_sim.files.importing.tables import UNITS, Channel, Table, heading, is_input, kind_of, known_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
@@ -112,6 +111,16 @@ def is_time(channel: Channel) -> bool:
     if condition_of(channel.name, channel.unit) is not None:
         return False
     return kind == "time" or (kind == "" and _TIME.search(channel.name) is not None)
+
+
+def is_stated(channel: Channel, choices: ImportChoices) -> bool:
+    """Whether a column is stated to be the input, with its unit or without."""
+    bare = re.sub(r"\s*[(\[].*", "", channel.name.lower())
+    return choices.input is not None and choices.input.lower() in (
+        channel.name.lower(),
+        bare,
+        heading(channel),
+    )
 
 
 def _matches(channel: Channel, wanted: str) -> bool:

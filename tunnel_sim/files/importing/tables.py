@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.vocabulary.drive import HOLDS
+from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -171,6 +171,17 @@ def by_run(table: Table) -> list[Table]:
     return by_label(
         table, channel.name, starts, [f"{n:.15g}" if n > -np.inf else "" for n in number[[0, *starts]]]
     )
+
+
+def is_input(channel: Channel) -> bool:
+    """Whether a column is named as the format names an input, so that it is not the reading."""
+    return heading(channel) in INPUT_COLUMNS
+
+
+def heading(channel: Channel) -> str:
+    """The name of a column with its unit, as the format writes it."""
+    name = channel.name.strip().lower()
+    return f"{name}_{channel.unit}" if channel.unit else name
 
 
 def with_input_facts(table: Table) -> Table:
