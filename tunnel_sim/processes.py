@@ -57,7 +57,7 @@ def in_processes(
 ) -> Iterator[tuple[ItemT, ResultT]]:
     """Do work in processes of one thread each, few items in flight at a time, which bounds the memory.
 
-    Items come with their results, in the order in which they finish.
+    Items come with their results, in the order in which they finish; a BrokenProcessPool where a process dies.
 
     Args:
         work: what to do; it and its results must be picklable.
@@ -114,9 +114,12 @@ def in_limited_process(
     """Do work on untrusted input in a process of its own, which can open no file. Bytes go in and out, no pickles.
 
     Args:
-        prepare: another one, called before the limits hold: it loads all that the work needs.
+        prepare: a function of a module as the work is, called before the limits hold: it loads all that is needed.
         seconds: of the processor that the work may take, s; the clock allows four times as long.
         memory: that the work may take, bytes.
+
+    Raises:
+        LimitReached: when the work takes too long or too much memory, or its process dies.
     """
     header = {
         "path": sys.path,
