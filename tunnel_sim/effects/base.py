@@ -111,9 +111,13 @@ class Effect:
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
 
     @classmethod
+    @functools.cache
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
-        return _parameters(cls)  # type: ignore[arg-type]  # mypy takes the instances' hash for the class's
+        return tuple(
+            ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
+            for own in dataclasses.fields(cls)
+        )
 
     @property
     def severity(self) -> float:
@@ -261,14 +265,6 @@ class Effect:
         """Name and parameters as plain JSON values."""
         parameters = {info.name: getattr(self, info.name) for info in self.parameters()}
         return {"name": self.name, "parameters": parameters}
-
-
-@functools.cache
-def _parameters(kind: type[Effect]) -> tuple[ParameterInfo, ...]:
-    return tuple(
-        ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
-        for own in dataclasses.fields(kind)
-    )
 
 
 def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:

@@ -187,8 +187,41 @@ def read_campaign(folder: Path | str) -> Campaign:
     sensor = SensorProperties(**document.sensor.model_dump())
     runs, samples = [], 0
     for run in document.runs:
-        runs.append(_read_run(folder, run, sensor))
-        samples += runs[-1].record.time_s.size
+        path = folder / run.file
+        where = run_place(path, run.id)
+        # Refuse a run file outside the folder, also through a symbolic link.
+        try:
+            inside = path.resolve().is_relative_to(folder.resolve())
+        except (OSError, RuntimeError, ValueError):
+            raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
+        if not inside:
+            what = "a symbolic link leads outside the campaign's folder"
+            raise TunnelError(what, where=where, remedy="copy the file into the folder")
+        held = read_table(path, where, timed=sensor.sample_rate is None, quantity=sensor.quantity or "angle")
+        time_s = held.time_s
+        if time_s is None:
+            if sensor.sample_rate is None:
+                remedy = (
+                    "add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml"
+                )
+                raise TunnelError("no column time_s and no sample_rate", where=where, remedy=remedy)
+            time_s = np.arange(held.reading.size) / sensor.sample_rate
+        drive = None
+        if held.input is not None and held.input_column is not None:
+            if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
+                what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
+                remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
+                raise TunnelError(what, where=where, remedy=remedy)
+            drive = Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
+        elif run.drive_hold is not None or run.drive_gain is not None:
+            what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
+            remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"
+            raise TunnelError(what, where=where, remedy=remedy)
+        record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
+        without_spring_needs_drive(run.spring_stiffness, drive, where)
+        conditions = run.spring_stiffness, run.air_density, run.release_angle
+        runs.append(Run(run.id, record, run.wind_speed, *conditions, drive=drive))
+        samples += record.time_s.size
         remedy = "put the runs into several campaigns"
         check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
     return Campaign(
@@ -266,42 +299,6 @@ def write_campaign(
             (partial / name).write_bytes(content)
         (partial / CAMPAIGN_FILE).write_bytes(text(document).encode())
     return folder
-
-
-def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
-    sample_rate = sensor.sample_rate
-    path = folder / run.file
-    where = run_place(path, run.id)
-    # Refuse a run file outside the folder, also through a symbolic link.
-    try:
-        inside = path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):
-        raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
-    if not inside:
-        what = "a symbolic link leads outside the campaign's folder"
-        raise TunnelError(what, where=where, remedy="copy the file into the folder")
-    held = read_table(path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle")
-    time_s = held.time_s
-    if time_s is None:
-        if sample_rate is None:
-            remedy = "add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml"
-            raise TunnelError("no column time_s and no sample_rate", where=where, remedy=remedy)
-        time_s = np.arange(held.reading.size) / sample_rate
-    drive = None
-    if held.input is not None and held.input_column is not None:
-        if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
-            what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
-            remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
-            raise TunnelError(what, where=where, remedy=remedy)
-        drive = Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
-    elif run.drive_hold is not None or run.drive_gain is not None:
-        what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
-        remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"
-        raise TunnelError(what, where=where, remedy=remedy)
-    record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
-    without_spring_needs_drive(run.spring_stiffness, drive, where)
-    conditions = run.spring_stiffness, run.air_density, run.release_angle
-    return Run(run.id, record, run.wind_speed, *conditions, drive=drive)
 
 
 def _check_target(folder: Path, *, overwrite: bool) -> None:

@@ -216,7 +216,13 @@ def write_whole(path: Path, content: bytes) -> Path:
     """
     target = _target(path)
     with refusals(path):
-        stream = _standard_stream(path)
+        stream = None  # a standard stream of this process, to which a path such as /dev/stdout refers
+        for standard in (sys.__stdout__, sys.__stderr__):
+            with suppress(OSError, ValueError):
+                own = standard is not None and os.path.samestat(path.stat(), os.fstat(standard.fileno()))
+                if stream is None and standard is not None and own:
+                    standard.flush()
+                    stream = standard.fileno()
         if stream is not None:
             _write_to(os.dup(stream), content)
         elif path.exists() and not path.is_file():
@@ -320,18 +326,6 @@ def _target(path: Path) -> Path:
         if target.is_symlink():
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         return target
-
-
-def _standard_stream(path: Path) -> int | None:
-    """Descriptor of this process's standard stream that a path such as ``/dev/stdout`` refers to."""
-    for stream in (sys.__stdout__, sys.__stderr__):
-        try:
-            if stream is not None and os.path.samestat(path.stat(), os.fstat(stream.fileno())):
-                stream.flush()
-                return stream.fileno()
-        except (OSError, ValueError):
-            continue
-    return None
 
 
 def _write_to(descriptor: int, content: bytes) -> None:

@@ -89,29 +89,23 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
             where=where,
             remedy=f"record what drives the body in {name}, not the sensor's reading",
         )
-    if judged and _is_clipped(values, span):
-        raise TunnelError(
-            f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
-            where=where,
-            remedy="record the input in a wider range; where the actuator itself saturates, state "
-            "plausible = false under [sensor] to keep it",
-        )
-
-
-def _is_clipped(values: Array, span: float) -> bool:
-    """Whether an input stands at an extreme for some samples again and again, and is seldom near it."""
     ends = (float(values.min()), float(values.max()))
-    at = [values == end for end in ends]
-    if np.mean(at[0] | at[1]) > _LEVELS:
-        return False
-    for end, there in zip(ends, at, strict=True):
+    if not judged or np.mean((values == ends[0]) | (values == ends[1])) > _LEVELS:
+        return
+    # It is clipped where it stands at an extreme for some samples again and again, and is seldom near it.
+    for end in ends:
+        there = values == end
         count = int(np.count_nonzero(there))
         near = int(np.count_nonzero(np.abs(values - end) < 0.01 * span)) - count
         flat = there[2:] & there[1:-1] & there[:-2]
         stands = int(np.count_nonzero(flat)) * _FLAT > count
         if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
-            return True
-    return False
+            raise TunnelError(
+                f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
+                where=where,
+                remedy="record the input in a wider range; where the actuator itself saturates, state "
+                "plausible = false under [sensor] to keep it",
+            )
 
 
 def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | None, where: str) -> None:

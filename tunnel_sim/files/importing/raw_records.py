@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -232,13 +233,18 @@ def find_input(
         return _as_input(named[0], reading, choices, said)
     # a column that is empty here is the input of other runs of the file
     exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
-    found = exact or [
-        channel
-        for channel in others
-        if condition_of(channel.name, channel.unit) is None
-        and (_moment_unit(channel) or _NAMES.search(channel.name))
-        and _drives(channel.values, reading)
-    ]
+    found = exact
+    for channel in () if exact else others:
+        good = np.isfinite(channel.values) & np.isfinite(reading)
+        plausible = _moment_unit(channel) or _NAMES.search(channel.name)
+        conditional = condition_of(channel.name, channel.unit) is not None
+        if conditional or not plausible or np.count_nonzero(good) < 16:
+            continue
+        record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
+        with suppress(TunnelError):  # it correlates with the motion, and is not the motion itself
+            checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
+            if correlation(channel.values, reading)[0] >= _CORRELATED:
+                found.append(channel)
     if len(found) > 1:
         listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in found)
         raise TunnelError(
@@ -277,19 +283,6 @@ def _as_input(
 
 def _moment_unit(channel: Channel) -> bool:
     return channel.unit.strip().lower() in _MOMENTS
-
-
-def _drives(values: Array, reading: Array) -> bool:
-    """Whether a column of a plausible name correlates with the motion, and is not the motion itself."""
-    good = np.isfinite(values) & np.isfinite(reading)
-    if np.count_nonzero(good) < 16:
-        return False
-    record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
-    try:
-        checked_drive(Drive("drive", values[good]), record, "", judged=False)
-    except TunnelError:
-        return False
-    return correlation(values, reading)[0] >= _CORRELATED
 
 
 def correlation(values: Array, reading: Array) -> tuple[float, int]:

@@ -60,12 +60,6 @@ def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
             raise
 
 
-@atexit.register
-def _end() -> None:
-    while _kept:
-        _kept.pop().end()
-
-
 class _Server:
     """The process, seen from the one that asks."""
 
@@ -84,6 +78,7 @@ class _Server:
         )
         self._asked, self._answers = cast(BinaryIO, self._process.stdin), cast(BinaryIO, self._process.stdout)
         self._owner = os.getpid()
+        atexit.register(self.end)
 
     def usable(self) -> bool:
         """Whether the process runs and belongs to this one: a fork must not talk on its parent's pipes."""
@@ -91,6 +86,7 @@ class _Server:
 
     def end(self) -> None:
         """End the process at once."""
+        atexit.unregister(self.end)
         if self._owner == os.getpid():
             self._process.kill()
             self._process.wait()

@@ -302,12 +302,19 @@ def tables_of(
             number = cells.cast(pl.Float64, strict=False)
             lost = number.null_count() - column.null_count()
         if lost and number.null_count() == column.len():
-            clock = _clock(column)
-            if clock is not None:
-                number, unit = clock, "s"
+            # Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight.
+            text = column.str.strip_chars(' \t\r"')
+            parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
+            hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
+            half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
+            hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
+            hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
+            seconds = 3600.0 * hours + 60.0 * minutes + rest
+            notes[i] = f"the column '{name}' holds text and is left out"
+            if 2 * seconds.null_count() <= seconds.len():
+                midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
+                number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
-            else:
-                notes[i] = f"the column '{name}' holds text and is left out"
         elif lost:
             notes[i] = f"{lost} texts in the column '{name}' are taken as missing"
         if number.null_count() < number.len():
@@ -318,20 +325,6 @@ def tables_of(
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
     return [replace(one, said=(*said, *one.said[1:])) for one in tables]
-
-
-def _clock(text: pl.Series) -> pl.Series | None:
-    """Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight."""
-    text = text.str.strip_chars(' \t\r"')
-    fields = [text.str.extract(_CLOCK, group).str.replace(",", ".").cast(pl.Float64) for group in (1, 2, 3)]
-    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
-    hours = pl.select(pl.when(half.is_null()).then(fields[0]).otherwise(fields[0] % 12.0)).to_series()
-    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
-    seconds = 3600.0 * hours + 60.0 * fields[1] + fields[2]
-    if 2 * seconds.null_count() > seconds.len():
-        return None
-    midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
-    return seconds + _DAY * midnights
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
