@@ -9,7 +9,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, with_law
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
 from tunnel_sim.effects.parameters import (
     EQUATION,
     Circumstances,
@@ -148,10 +148,10 @@ class FlowMisalignment(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the flow angle in the moment law."""
         del drawn
-        if stated.wind_speed <= 0.0:
-            return with_law(run, flow_angle=self.angle)
-        grown = self.angle * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
-        return with_law(run, flow_angle=grown)
+        grown = self.angle
+        if stated.wind_speed > 0.0:
+            grown *= (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
+        return run.with_parameters({"flow_angle": grown})
 
 
 @dataclass(frozen=True)
@@ -321,9 +321,5 @@ class VortexShedding(Effect):
         del stated
         if self.is_null:
             return run
-        return with_law(
-            run,
-            shedding_amplitude=self.amplitude,
-            strouhal_number=self.strouhal_number,
-            shedding_phase=self.drawn_number(drawn),
-        )
+        shedding = {"shedding_amplitude": self.amplitude, "strouhal_number": self.strouhal_number}
+        return run.with_parameters(shedding | {"shedding_phase": self.drawn_number(drawn)})

@@ -212,7 +212,7 @@ class Effect:
         """
         del stated, drawn
         law = self.law()
-        return with_law(run, **law) if law else run
+        return run.with_parameters(law) if law else run
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
         """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.
@@ -275,11 +275,6 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
             remedy = did_you_mean(name, known)
             raise TunnelError(f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=remedy)
     return kind(**parameters)
-
-
-def with_law(run: RunSettings, **values: float) -> RunSettings:
-    """A copy of a run with parameters of the moment law added or replaced."""
-    return run.with_parameters(values)
 
 
 @dataclass(frozen=True, eq=False)

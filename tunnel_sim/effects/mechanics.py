@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isclose, log, pi, sqrt
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, with_law
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
@@ -276,11 +276,10 @@ class CoulombFriction(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with steps short enough to resolve the presliding range."""
         del stated, drawn
+        sliding = run.with_parameters({"friction_moment": self.friction_moment})
         if self.is_null or self.presliding == 0.0:
-            return with_law(run, friction_moment=self.friction_moment)
-        return steps.for_contact(
-            with_law(run, friction_moment=self.friction_moment, presliding=self.presliding)
-        )
+            return sliding
+        return steps.for_contact(sliding.with_parameters({"presliding": self.presliding}))
 
 
 @dataclass(frozen=True)
