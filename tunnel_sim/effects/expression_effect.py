@@ -220,9 +220,11 @@ def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null:
 
 def read_effects(path: Path) -> tuple[type[Effect], ...]:
     """The effects of an effects file (docs/how-to/add-an-effect.md) in its order; they are not registered."""
-    from tunnel_sim.files.plan_file import read_effect_tables  # only here: slow to load
+    from tunnel_sim.files.plan_file import EffectsDocument  # only here: slow to load
+    from tunnel_sim.files.toml_input import load_toml, validate
 
-    tables = read_effect_tables(path)
+    missing = "name an effects file; docs/how-to/add-an-effect.md has an example"
+    tables = validate(EffectsDocument, load_toml(path, missing=missing), path).effects
     names = [table.name for table in tables]
     found = []
     for table in tables:

@@ -315,9 +315,3 @@ class EffectsDocument(StrictModel):
     effects: Annotated[list[OwnEffectTable], Field(min_length=1, max_length=limits.OWN_EFFECTS)] = Field(
         description="tables [[effects]]"
     )
-
-
-def read_effect_tables(path: Path) -> list[OwnEffectTable]:
-    """The tables of an effects file (TOML), their expressions not yet parsed."""
-    document = load_toml(path, missing="name an effects file; docs/how-to/add-an-effect.md has an example")
-    return validate(EffectsDocument, document, path).effects
