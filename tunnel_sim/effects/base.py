@@ -151,14 +151,7 @@ class Effect:
         return 0.0
 
     def moment_density(self, rate: float) -> float:
-        """Spectral intensity of the effect's random moment at a rate in rad/s, as if it were white.
-
-        q of the moment coefficient with the wind on, ⟨c(t)c(t′)⟩ = q δ(t − t′), s; 0 without a broad
-        spectrum.
-
-        Args:
-            rate: angular frequency of the motion, rad/s.
-        """
+        """Spectral intensity of the random moment coefficient at a rate, rad/s, as if it were white, s; else 0."""
         del rate
         return 0.0
 

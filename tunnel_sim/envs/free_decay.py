@@ -70,9 +70,6 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
         Observation, information gained (nats), whether the angle left the sensor's range, whether the run has
         ended, and info.
-
-        Args:
-            action: 0 in the plain preset; set-point and moment, each from −1 to 1, in the operator preset.
         """
         if self._episodes.ended[0]:
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
@@ -124,11 +121,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
 
 def render_fps(control_period: float) -> float | int:
-    """Pictures per second of real time, 1/dt, Hz; an integer where possible.
-
-    Args:
-        control_period: s.
-    """
+    """Pictures per second of real time for a control period in s, 1/dt, Hz; an integer where possible."""
     rate = 1.0 / control_period
     return round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate
 

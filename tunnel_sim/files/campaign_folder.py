@@ -168,13 +168,7 @@ IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """Read and check a campaign, angles in radians.
-
-    Of several faults the first one is stated, in one line that names file, run and remedy.
-
-    Args:
-        folder: the campaign's folder, or the ``campaign.toml`` in it.
-    """
+    """Read and check the campaign in a folder, or with a ``campaign.toml``; angles in radians."""
     folder = Path(folder)
     if folder.name == CAMPAIGN_FILE and folder.is_file():
         folder = folder.parent

@@ -82,11 +82,7 @@ class Record:
 
 
 def gaps(time: Array) -> NDArray[np.bool_]:
-    """Whether samples are missing after each time but the last (steps of over four mean intervals), shape (n - 1,).
-
-    Args:
-        time: of the samples, shape (n,), s, increasing.
-    """
+    """Whether samples are missing after each of the times, shape (n,), but the last: steps over four mean ones."""
     steps = np.diff(time)
     return steps > _GAP * steps.mean() if steps.size else np.zeros(0, dtype=np.bool_)
 

@@ -175,11 +175,7 @@ class Dynamics:
 
 @dataclass(frozen=True)
 class Air:
-    """The air in the tunnel.
-
-    Args:
-        density: ρ, kg/m³.
-    """
+    """The air in the tunnel, of density ρ, kg/m³."""
 
     density: float
 

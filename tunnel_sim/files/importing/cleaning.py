@@ -78,13 +78,7 @@ def without_overflow(values: Array, said: list[str]) -> Array:
 
 
 def restarts(time: Array) -> list[int]:
-    """Where the clock of a record begins anew because another run follows: its first sample's index.
-
-    Empty where rows are only out of order.
-
-    Args:
-        time: as recorded, shape (n,).
-    """
+    """Where the times, shape (n,), begin anew because another run follows: its first samples; empty: nowhere."""
     with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
         back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if not back.size or back.size > max(1.0, _RESTARTS * time.size):
@@ -177,11 +171,7 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
 
 
 def resolution(readings: Sequence[Array]) -> float | None:
-    """The step of a sensor whose readings lie on evenly spaced levels, in their unit; None where they do not.
-
-    Args:
-        readings: of the runs, each of shape (n,).
-    """
+    """The step of a sensor whose readings, each of shape (n,), lie on evenly spaced levels; None: they do not."""
     some = np.concatenate([reading[:_LEVELS_OF] for reading in readings])
     levels = np.unique(some)
     if not 3 <= levels.size <= min(_MOST_LEVELS, some.size // 2):

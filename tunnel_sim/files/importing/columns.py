@@ -252,22 +252,14 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
 
 
 def guessed_time_unit(values: Array) -> tuple[str, float]:
-    """The unit that times without one are taken to have, and the usual step in it.
-
-    Args:
-        values: the column, shape (n,).
-    """
+    """The unit that times without one, shape (n,), are taken to have, and the usual step in it."""
     steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
 
 
 def guessed_angle_unit(values: Array) -> tuple[str, float]:
-    """The unit that angles without one are taken to have, and half the range of the readings in it.
-
-    Args:
-        values: the column, shape (n,); at least one number.
-    """
+    """The unit that angles without one, shape (n,), are taken to have, and half their range in it."""
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     return "deg" if swing > _HALF_TURN else "rad", swing
 
@@ -338,11 +330,7 @@ def in_radians(
 
 
 def read_calibration(text: str | None) -> Calibration | None:
-    """The calibration that ``--calibration`` states.
-
-    Args:
-        text: a formula such as ``0.1 + 20*V``, or the name of a text file of two columns, volts and angle.
-    """
+    """The calibration: a formula such as ``0.1 + 20*V``, or that of a text file of volts and angle."""
     if text is None:
         return None
     formula = _FORMULA.match(text)

@@ -247,11 +247,7 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
 
 
 class ConditionTable:
-    """A table of conditions, one row for each file or run.
-
-    Args:
-        path: a text file with a column ``file`` or ``run``, and columns named as in ``campaign.toml``.
-    """
+    """A table of conditions in a text file, one row for each file or run, with keys of ``campaign.toml``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
