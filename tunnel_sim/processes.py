@@ -57,11 +57,8 @@ def in_processes(
 ) -> Iterator[tuple[ItemT, ResultT]]:
     """Do work in processes of one thread each, few items in flight at a time, which bounds the memory.
 
-    Items come with their results, in the order in which they finish; a BrokenProcessPool where a process dies.
-
-    Args:
-        work: what to do; it and its results must be picklable.
-        jobs: number of processes; 0 works in this one.
+    Work and results must be picklable; 0 processes means this one. Items come with their results, in the
+    order in which they finish; a BrokenProcessPool where a process dies.
     """
     if jobs == 0 or not items:
         yield from ((item, work(item)) for item in items)

@@ -124,10 +124,10 @@ def expression_effect(
 ) -> type[Effect]:
     """An effect whose moment or reading is an expression; the class is not registered.
 
-    Refused where the effect acts at its null, does nothing beyond it or has no value somewhere.
+    Its first parameter is the severity. Refused where the effect acts at its null, does nothing beyond it or
+    has no value somewhere.
 
     Args:
-        parameters: by name; the first is the severity.
         moment: on the right-hand side of the equation of motion, N m: of the angle ``b`` (rad) and rate ``r``
             (rad/s) of the rod's upper end, the time ``t`` (s) since the run's start, the wind speed ``V`` (m/s),
             the stated stiffness ``Kr`` (N m/rad), ``omega`` = √(Kr/Izz) (rad/s) and the parameters.

@@ -212,9 +212,8 @@ class Model:
 def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model:
     """Build the model of one run; compiled, which takes nearly all of the time, once for all runs of a layout.
 
-    Args:
-        drawn: with the shapes, lights and cameras. The motion is bit-identical without them, and a step takes four
-            fifths of the time.
+    Without shapes, lights and cameras (``drawn``) the motion is bit-identical, and a step takes four fifths
+    of the time.
     """
     check_stable(rig, settings)
     key = (repr(rig), settings.layout(), drawn)

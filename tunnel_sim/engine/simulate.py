@@ -111,10 +111,7 @@ def simulate_motions(
 class RunBatch:
     """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run.
 
-    Args:
-        count: number of runs.
-        steps: number of integration steps between two samples.
-        nthread: number of threads; 0 uses all processors. The result does not depend on it.
+    The result does not depend on the number of threads, of which 0 means one for each processor.
     """
 
     def __init__(self, model: Model, count: int, steps: int, nthread: int) -> None:

@@ -59,11 +59,7 @@ class Models:
 
 
 class OneRun:
-    """A single run with its own model; its ``row`` is always 0.
-
-    Args:
-        samples: in one control period.
-    """
+    """A single run with its own model, of some samples in each control period; its ``row`` is always 0."""
 
     def __init__(self, models: Models, samples: int) -> None:
         self._models = models
@@ -123,12 +119,7 @@ class OneRun:
 
 
 class ManyRuns:
-    """Many runs on ``mujoco.batch``, one batch per layout; ``row`` is the index of a run.
-
-    Args:
-        samples: number of samples in one control period.
-        nthread: number of threads; 0 uses all processors. The result does not depend on it.
-    """
+    """Many runs on ``mujoco.batch``, one batch per layout; ``row`` is the index of a run."""
 
     def __init__(self, models: Models, samples: int, count: int, nthread: int) -> None:
         self._models, self._samples, self._count, self._nthread = models, samples, count, nthread

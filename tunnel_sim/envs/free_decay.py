@@ -132,8 +132,6 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
     A run that has ended is restarted in the next step (``AutoresetMode.NEXT_STEP``), with all properties drawn.
 
     Args:
-        num_envs: number of runs.
-        render_mode: ``rgb_array`` or None.
         max_episode_steps: number of steps after which runs are truncated; None: at their end only.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
         width, height, camera: as in `FreeDecayEnv`.

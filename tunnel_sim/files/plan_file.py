@@ -155,8 +155,7 @@ class ConditionKeys(Protocol):
 def run_count(keys: ConditionKeys, driven: int = 0) -> int:
     """The number of runs, from the lengths of the lists of a description, or of a table with the same keys.
 
-    Args:
-        driven: number of driven runs of each spring and speed, before repeats.
+    ``driven`` is the number of driven runs of each spring and speed, before repeats.
     """
     springs = len(keys.springs) + len(keys.spring_stiffness)
     return springs * len(keys.wind_speeds) * (len(keys.release_angles_deg) + driven) * keys.repeats

@@ -42,12 +42,7 @@ USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names
 
 @dataclass(frozen=True)
 class FileTable:
-    """The table of a run file.
-
-    Args:
-        frame: at least those of `USED_COLUMNS` that the file has.
-        text: whether values are still texts, below a line of headings.
-    """
+    """The table of a run file: at least its `USED_COLUMNS`, perhaps as texts below a line of headings."""
 
     frame: pl.DataFrame
     names: Sequence[str]
@@ -172,10 +167,7 @@ def read_table(
 ) -> RunTableValues:
     """Read times, readings and the input of a driven run from a run file; other columns are ignored.
 
-    All values are finite.
-
-    Args:
-        timed: whether times are required because no ``sample_rate`` is stated.
+    All values are finite. Times are required (``timed``) where no ``sample_rate`` is stated.
     """
     missing = "put the file there or correct 'file' in campaign.toml"
     known = COLUMNS[quantity]

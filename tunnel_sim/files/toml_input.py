@@ -55,12 +55,9 @@ _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{limits.
 
 
 def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
-    """Read a TOML file, not yet validated.
+    """Read a TOML file, not yet validated; ``missing`` is the remedy where there is none.
 
     Its numbers are from `limits.SMALLEST_NUMBER` to `limits.LARGEST_NUMBER` in magnitude.
-
-    Args:
-        missing: the remedy when there is no such file.
     """
     where = shown(path)
     text = read_text(path, limits.DOCUMENT_BYTES, missing=missing)

@@ -261,11 +261,8 @@ def write_json(path: Path, document: Mapping[str, object]) -> Path:
 def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
     """Write a folder completely or not at all: a new, empty one, which is renamed at the end.
 
-    Missing parents are created; symbolic links are followed.
-
-    Args:
-        replace: whether a folder that holds something is replaced; otherwise it is refused, also one that another
-            process has written meanwhile.
+    Missing parents are created; symbolic links are followed. A folder that holds something is replaced or
+    else refused, also one that another process has written meanwhile.
     """
     target = Path(os.path.realpath(folder))
     with refusals(folder, (OSError,)):
@@ -296,12 +293,9 @@ def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
 
 @contextmanager
 def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException,)) -> Iterator[None]:
-    """Convert the exceptions of a writer to a `TunnelError`.
+    """Convert the exceptions of a writer to a `TunnelError`; interruptions and broken pipes are passed on.
 
-    Interruptions and broken pipes are passed on.
-
-    Args:
-        kinds: exceptions to convert; libraries written in Rust raise some that are not subclasses of `Exception`.
+    Libraries written in Rust raise some that are not subclasses of `Exception`.
     """
     try:
         yield

@@ -147,12 +147,7 @@ _CONVERGED = 1e-14  # relative
 
 @dataclass(frozen=True)
 class Ringing:
-    """A decaying oscillation of the rod's upper end, Re(amplitude · exp(root · t)).
-
-    Args:
-        amplitude: rad.
-        root: 1/s, with a positive imaginary part.
-    """
+    """A decaying oscillation of the rod's upper end, Re(amplitude · exp(root · t)), rad; root: 1/s, Im > 0."""
 
     amplitude: complex
     root: complex

@@ -147,8 +147,7 @@ def needs_density(wind_speed: float, *scales: float | None) -> bool:
 class Campaign:
     """The runs (at least one, with unique ids) of one rig with one sensor; the sensor's zero is unknown.
 
-    Args:
-        law: of the joint in a model of one's own; None: spring and damper.
+    ``law`` is that of the joint in a model of one's own; None: spring and damper.
     """
 
     name: str

@@ -31,11 +31,7 @@ class TunnelError(Exception):
 
 
 def one_line(value: object, limit: int = 120) -> str:
-    """The text of a value without line breaks or control characters.
-
-    Args:
-        limit: greatest length, characters; longer text is cut.
-    """
+    """The text of a value without line breaks or control characters, cut to a number of characters."""
     try:
         whole = str(value)
     except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits

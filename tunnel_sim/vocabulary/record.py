@@ -91,10 +91,8 @@ def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     """A record on a uniform raster, for methods that need one: itself where it is uniform.
 
     Else a smooth curve through it at as many times. Interpolation reduces the noise, and readings within a
-    gap are not measurements.
-
-    Args:
-        bridged: whether gaps are bridged by a curve; False: by the record's mean, which adds nothing to a spectrum.
+    gap are not measurements: gaps are bridged by the curve, or else by the mean, which adds nothing to a
+    spectrum.
     """
     if record.uniform:
         return record

@@ -196,11 +196,7 @@ def tables_of_arrays(
 
 
 def check_size(count: int, where: str) -> None:
-    """Refuse arrays whose number of values, as the file states it, is too large.
-
-    Args:
-        count: of all values (a count).
-    """
+    """Refuse arrays whose number of values, as the file states it, is too large."""
     most = limits.DATA_BYTES // 8
     check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")
 

@@ -199,12 +199,7 @@ _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
 
 @dataclass(frozen=True)
 class RecordPiece:
-    """A run in a record.
-
-    Args:
-        first: index of its first sample.
-        last: index behind its last sample.
-    """
+    """A run in a record: the index of its first sample, and that behind its last one."""
 
     first: int
     last: int

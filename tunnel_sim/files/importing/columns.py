@@ -41,12 +41,7 @@ _DERIVATIVE = 0.9  # correlation with the derivative of another column, from whi
 
 @dataclass(frozen=True, eq=False)
 class ColumnPair:
-    """The columns of one run.
-
-    Args:
-        run: its name in the table; empty where the table holds one run.
-        time: None where the samples follow at a sample rate.
-    """
+    """The columns of one run and its name in the table; without times the samples follow at a sample rate."""
 
     run: str
     time: Channel | None

@@ -195,14 +195,7 @@ def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A file that was read.
-
-    Args:
-        path: of the file.
-        sha256: of its content.
-        tables: in the order of the file.
-        known: how it was read, for the recipe.
-    """
+    """A file that was read: its SHA-256, its tables in their order, and how it was read, for the recipe."""
 
     path: Path
     sha256: str

@@ -57,12 +57,9 @@ def is_missing(text: str) -> bool:
 
 @dataclass(frozen=True)
 class Layout:
-    """The head of a sheet.
+    """The head of a sheet: its first row of numbers, the names and units of its columns, and what is stated above.
 
-    Args:
-        first: index of the first row of numbers.
-        units: of the columns, as `split_unit` gives them.
-        facts: numbers that the lines above the table state, by name, in SI units where their unit is known.
+    ``facts`` are numbers by name, in SI units where their unit is known.
     """
 
     first: int
@@ -83,10 +80,7 @@ def find_layout(
 ) -> Layout | None:
     """Names, units and the first row of numbers of a sheet; None where no row holds numbers.
 
-    Args:
-        lines: the same rows as they are, for numbers stated in them.
-        decimal: the decimal sign.
-        width: number of columns (a count).
+    ``rows`` are the first rows of the sheet, split into cells, and ``lines`` the same rows as they are.
     """
     tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
     numeric = [
@@ -156,13 +150,7 @@ _SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blan
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a line is split and a number is written.
-
-    Args:
-        delimiter: one character; a blank stands for any number of blanks and tabs.
-        decimal: the decimal sign.
-        width: number of columns (a count).
-    """
+    """How a line is split and a number is written; a blank stands for any number of blanks and tabs."""
 
     delimiter: str
     decimal: str
