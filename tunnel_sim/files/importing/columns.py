@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tunnel_sim.files.importing.cleaning import without_overflow
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
 from tunnel_sim.files.importing.tables import UNITS, Channel, Table, heading, is_input, kind_of, known_unit
 from tunnel_sim.vocabulary import limits
@@ -259,17 +260,26 @@ def guessed_angle_unit(values: Array) -> tuple[str, float]:
     return "deg" if swing > _HALF_TURN else "rad", swing
 
 
-def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: str) -> Array:
-    """Times in s, shape (n,); a remark is added where the unit is guessed from the step."""
-    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or time.unit
+def in_seconds(
+    pair: ColumnPair, facts: Mapping[str, float], choices: ImportChoices, said: list[str], where: str
+) -> Array:
+    """The times of a run, s, shape (n,): of their column, or at the stated rate; what is guessed is said."""
+    if pair.time is None:
+        interval, origin = sample_interval(facts, choices)
+        if interval is None:
+            raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
+        said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
+        return np.arange(pair.reading.values.size, dtype=np.float64) * interval
+    values = without_overflow(pair.time.values, said)
+    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or pair.time.unit
     if unit and kind_of(unit) != "time":
-        what = f"'{one_line(time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
+        what = f"'{one_line(pair.time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
         remedy = "give --time-unit, or --time with the name of another column"
         raise TunnelError(what, where=where, remedy=remedy)
     if not unit:
-        unit, step = guessed_time_unit(time.values)
+        unit, step = guessed_time_unit(values)
         said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
-    return time.values * UNITS["time"][unit] if unit != "s" else time.values
+    return values * UNITS["time"][unit] if unit != "s" else values
 
 
 def in_radians(

@@ -23,7 +23,6 @@ from tunnel_sim.files.importing.columns import (
     in_radians,
     in_seconds,
     is_stated,
-    sample_interval,
 )
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of, from_column, from_facts
 from tunnel_sim.files.importing.source import Source
@@ -105,16 +104,7 @@ def raw_records(
         facts = {key: value for key in INPUT_FACTS if np.isfinite(value := table.facts.get(key, np.nan))}
         for pair in find_pairs(table, choices, where):
             said = [*pair.said]
-            if pair.time is not None:
-                values = without_overflow(pair.time.values, said)
-                time = in_seconds(replace(pair.time, values=values), choices, said, where)
-            else:
-                interval, origin = sample_interval(table.facts, choices)
-                if interval is None:
-                    remedy = "give --time NAME, or --rate in Hz"
-                    raise TunnelError("no column of times", where=where, remedy=remedy)
-                said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
-                time = np.arange(pair.reading.values.size, dtype=np.float64) * interval
+            time = in_seconds(pair, table.facts, choices, said, where)
             reading = replace(pair.reading, values=without_overflow(pair.reading.values, said))
             readings, quantity, unit = in_radians(reading, choices, calibration, said, where)
             kept = np.ones(time.shape, dtype=bool)
@@ -128,12 +118,8 @@ def raw_records(
             driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
             time, readings = time[kept], readings[kept]
             conditions = _condition_columns(table, pair, kept, said)
-            names = [
-                source.path.stem if several or not (table.part or pair.run) else "",
-                table.part,
-                pair.run,
-            ]
-            name = one_line("-".join(part for part in names if part))
+            file = source.path.stem if several or not (table.part or pair.run) else ""
+            name = one_line("-".join(part for part in (file, table.part, pair.run) if part))
             stated = from_facts(table.facts, said)
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
             starts = [0, *restarts(time), time.size]
