@@ -11,12 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, stated_run
+from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import (
     POTENTIOMETER_RESOLUTION,
@@ -27,7 +26,6 @@ from tunnel_sim.vocabulary.plan import (
     Truth,
     aerodynamic_stiffness,
 )
-from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 
 PRESETS = ("operator", "plain")
@@ -107,11 +105,6 @@ class FreeDecayConfig:
         return round(self.duration / self.control_period)
 
     @property
-    def sample_times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Sample times of a whole run, s, as in `tunnel_sim.engine.simulate`."""
-        return np.arange(self.steps * self.samples_per_step) / self.sample_rate
-
-    @property
     def reading_variance(self) -> float:
         """Variance of one reading, its quantisation included, rad²."""
         return self.noise_std**2 + self.resolution**2 / 12.0
@@ -172,20 +165,6 @@ class RunPlan:
     def stated(self) -> RunSettings:
         """The run's physics without its effects."""
         return run_settings(self.truth, self.condition)
-
-    def run(self, record: Record) -> Run:
-        """The run as a campaign lists it."""
-        return stated_run(self.condition, record)
-
-    def statement(self) -> dict[str, float]:
-        """The conditions given to the operator at the start, in SI units."""
-        condition = self.condition
-        return {
-            "spring_stiffness": condition.spring_stiffness,
-            "wind_speed": condition.wind_speed,
-            "air_density": condition.air_density,
-            "release_angle": condition.release_angle,
-        }
 
 
 def plan_run(

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
 from tunnel_sim.effects.base import quantise
+from tunnel_sim.engine.virtual_campaign import stated_run
 from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
 from tunnel_sim.envs.engines import ManyRuns, OneRun, Operation, OperatorLog, WindAnswer, check_plain, decode
@@ -69,10 +70,8 @@ class Episodes:
     def __init__(self, config: FreeDecayConfig, rig: Rig, engine: Engine, count: int) -> None:
         self._config, self._rig, self._engine, self._count = config, rig, engine, count
         samples = config.samples_per_step
-        self._prior = Prior.changed(config.prior)
-        self._information = Information(
-            count, samples, 1.0 / config.sample_rate, config.reading_variance, self._prior
-        )
+        interval, variance = 1.0 / config.sample_rate, config.reading_variance
+        self.information = Information(count, samples, interval, variance, Prior.changed(config.prior))
         self._wind = WindAnswer(config.control_period, samples, config.wind_time_constant)
         self._limit = angle_limit(rig)
         self._plans: list[RunPlan | None] = [None] * count
@@ -98,13 +97,14 @@ class Episodes:
             raise as_env_error(error, "reset options") from error
         self._plans[row], self._physics[row] = plan, physics
         self._readings.start(row, RunningSensor(chain, plan.sensor), rng)
-        self._information.start(row, stated, self._rig.body)
+        self.information.start(row, stated, self._rig.body)
         self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
         self.step_count[row], self.ended[row] = 0, False
         time = self.step_count[row] * self._config.control_period
         shown = np.clip(self._readings.held(row, end_angle), -READING_BOUND, READING_BOUND)
         observation = np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
-        info: dict[str, Any] = dict(plan.statement())
+        given = ("spring_stiffness", "wind_speed", "air_density", "release_angle")  # to the operator
+        info: dict[str, Any] = {name: getattr(plan.condition, name) for name in given}
         if self._config.expose_truth:
             info["truth"] = plan
         return observation, info
@@ -132,7 +132,7 @@ class Episodes:
         if wild.any():
             angle, rate = (np.nan_to_num(np.clip(values, -1e3, 1e3)) for values in (angle, rate))
         readings = self._readings.take(angle[:, :-1], self.step_count, ~self.ended)
-        rewards = self._information.advance(angle, rate, speeds.mean(axis=1), moment)
+        rewards = self.information.advance(angle, rate, speeds.mean(axis=1), moment)
         self.step_count += 1
         observations = np.empty((self._count, self._config.samples_per_step + 2))
         np.clip(readings, -READING_BOUND, READING_BOUND, out=observations[:, :-2])
@@ -150,7 +150,7 @@ class Episodes:
         plan, record = self._plan(row), self.record(row)
         info: dict[str, Any] = {"record": record}
         if self._config.preset == "plain":
-            info["run"] = plan.run(record)
+            info["run"] = stated_run(plan.condition, record)
         else:
             steps = int(self.step_count[row])
             time = np.arange(steps, dtype=np.float64) * self._config.control_period
@@ -169,10 +169,6 @@ class Episodes:
             raise EnvError("no episode has begun", remedy="call reset() first")
         return plan
 
-    def matrix(self, row: int) -> Array:
-        """The Fisher information so far; result and arguments as in `Information.matrix`."""
-        return self._information.matrix(row)
-
     def get_state(self, row: int) -> EpisodeState:
         """The complete state of an episode in progress."""
         plan, physics = self._plan(row), self._physics[row]
@@ -185,7 +181,7 @@ class Episodes:
             "step_count": self.step_count[row],
             "ended": self.ended[row],
         }
-        arrays = {name: np.array(value) for name, value in own.items()} | self._information.snapshot(row)
+        arrays = {name: np.array(value) for name, value in own.items()} | self.information.snapshot(row)
         return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
@@ -194,7 +190,7 @@ class Episodes:
         self._engine.start(row, state.physics)
         self._engine.set_state(row, state.mujoco)
         self._plans[row], self._physics[row] = state.plan, state.physics
-        self._information.restore(row, state.plan.stated(), self._rig.body, state.arrays)
+        self.information.restore(row, state.plan.stated(), self._rig.body, state.arrays)
         self._log[row] = state.arrays["log"]
         self._speed[row], self._stated_speed[row] = state.arrays["speed"], state.plan.condition.wind_speed
         self.step_count[row], self.ended[row] = state.arrays["step_count"], state.arrays["ended"]
@@ -264,7 +260,7 @@ class Readings:
     def __init__(self, config: FreeDecayConfig, count: int) -> None:
         self._samples = config.samples_per_step
         self._steps = config.steps
-        self._times = config.sample_times
+        self._times = np.arange(config.steps * config.samples_per_step) / config.sample_rate
         self._interval = 1.0 / config.sample_rate
         self._running: list[RunningSensor | None] = [None] * count
         self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count

@@ -94,7 +94,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
         It is computed at the true coefficients, so an agent must not observe it.
         """
-        return self._episodes.matrix(0)
+        return self._episodes.information.matrix(0)
 
     def record(self) -> Record:
         """The record so far, for example of a run ended by ``TimeLimit``."""
@@ -245,7 +245,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
 
     def information(self, index: int) -> Array:
         """The Fisher information of one run so far, shape (7, 7), as `FreeDecayEnv.information`."""
-        return self._episodes.matrix(index)
+        return self._episodes.information.matrix(index)
 
     def render(self) -> tuple[Any, ...] | None:
         """A picture of every run; result and arguments as in `FreeDecayEnv.render`."""
