@@ -189,7 +189,11 @@ def plan_run(
     elif given.get("spring_stiffness") is not None:
         stiffness = _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
     else:
-        springs = drawn_springs(rig)
+        # Of those whose stiffness exceeds Ka at any drawn speed, or else of all.
+        needed = STIFFNESS_MARGIN * aerodynamic_stiffness(
+            CN_BETA[1], **rig.body.flow(rig.air.density, WIND_SPEED[1])
+        )
+        springs = [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
         stiffness = springs[int(rng.integers(len(springs)))]
     wind = _number(given, "wind_speed", WIND_SPEED, rng, least=0.0, most=config.wind_limit)
     density = _number(given, "air_density", (rig.air.density, rig.air.density), None, least=0.0)
@@ -260,13 +264,6 @@ def _number(
         remedy = f"give a number from {least:g} to {most:g} in SI units"
         raise EnvError(f"{value!r} is out of range", where=f"option {name}", remedy=remedy)
     return float(value)
-
-
-def drawn_springs(rig: Rig) -> list[float]:
-    """The stiffnesses from which episodes draw, N m/rad: those that exceed Ka at any drawn speed, or all."""
-    flow = rig.body.flow(rig.air.density, WIND_SPEED[1])
-    needed = STIFFNESS_MARGIN * aerodynamic_stiffness(CN_BETA[1], **flow)
-    return [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
 
 
 def _effects(
