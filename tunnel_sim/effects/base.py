@@ -199,19 +199,13 @@ class Effect:
         return dict(zip(self.law_terms, values, strict=False))
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Change the physics of a run; by default, set the effect's terms of the moment law.
-
-        ``run`` is as the earlier effects left it.
-        """
+        """Change the physics of a run, as earlier effects left it; by default, set the terms of the moment law."""
         del stated, drawn
         law = self.law()
         return run.with_parameters(law) if law else run
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
-        """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.
-
-        N m as a function of time (s), angle (rad) and rate (rad/s); None: not stated.
-        """
+        """The moment, N m, computed independently of the hooks, of time (s), angle (rad) and rate (rad/s)."""
         del stated
         return None
 
@@ -368,10 +362,7 @@ def _overrides(effect: Effect, *hooks: str) -> bool:
 def read_motion(
     motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
 ) -> Record:
-    """The reading y = quantised(β + zero + noise), with the effects that act on sensor and reading.
-
-    The ideal converter has an unlimited range: clipping is an effect.
-    """
+    """The reading y = quantised(β + zero + noise) with the effects on sensor and reading; of unlimited range."""
     angle, time = motion.angle, motion.time_s
     if chain is not None and chain.skips:
         time = time[: round(chain.stated.duration / (time[1] - time[0]))]

@@ -190,8 +190,5 @@ class WindOnRun:
 
 
 def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
-    """Factor on a parameter's typical value: 10 for a moment in normalised form, else 1.
-
-    In normalised form moments are divided by about 0.1 kg m².
-    """
+    """Factor on a typical value: 10 for a moment in normalised form, divided by about 0.1 kg m², else 1."""
     return 10.0 if campaign.normalised and info.unit.startswith("N m") else 1.0

@@ -54,10 +54,7 @@ def known_effects() -> tuple[type[Effect], ...]:
 
 
 def register_effect(kind: KindT) -> KindT:
-    """Add an effect of one's own to the vocabulary; as a decorator too.
-
-    It is a frozen dataclass derived from `Effect`, and replaces an earlier one of the same name.
-    """
+    """Add a frozen dataclass derived from `Effect` to the vocabulary, or replace one; a decorator too."""
     check_kind(kind)
     _registered[kind.name] = kind
     return kind

@@ -247,11 +247,7 @@ def prepare() -> None:
 
 
 def law_of_request(request: bytes) -> bytes:
-    """The law of a joint, for `read_joint_model` in a process with limits.
-
-    The request is joint and reach as JSON in a line, then the files. The answer is JSON: the law, and whether
-    the joint has a spring; or what is refused, and the remedy.
-    """
+    """The law of a joint, or what is refused, as JSON; the request is joint and reach as JSON, then the files."""
     at = request.index(b"\n") + 1
     joint, reach = json.loads(request[:at])
     try:

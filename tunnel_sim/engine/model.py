@@ -165,10 +165,7 @@ class Model:
         return int(self.mj.joint("yaw").qposadr[0])
 
     def with_settings(self, settings: RunSettings) -> Model:
-        """The same model with the numbers of another run of its `RunSettings.layout`, without compiling again.
-
-        Its physics is bit-identical to that of a model compiled from ``build_spec(rig, settings)``.
-        """
+        """The model of another run of the same `RunSettings.layout`, bit-identical to one compiled anew."""
         check_stable(self.rig, settings)
         mj = copy.copy(self.mj)
         twist = settings.rod_twist
@@ -304,10 +301,7 @@ def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
 
 
 def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
-    """The ``<numeric>`` elements of the MJCF, by name: the moment law's parameters, sampled inputs and program.
-
-    Attributes of joint and body are left out.
-    """
+    """The ``<numeric>`` elements of the MJCF by name: the law's other parameters, series and program."""
     law = settings.law(rig).items()
     values: dict[str, tuple[float, ...]] = {name: (value,) for name, value in law if name not in _NATIVE}
     values["wind_speed"] = (settings.wind_speed,)

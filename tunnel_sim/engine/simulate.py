@@ -109,10 +109,7 @@ def simulate_motions(
 
 
 class RunBatch:
-    """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run.
-
-    The result does not depend on the number of threads, of which 0 means one for each processor.
-    """
+    """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run."""
 
     def __init__(self, model: Model, count: int, steps: int, nthread: int) -> None:
         self._batch = mujoco_batch.Batch(model.mj, nsim=count, nthread=nthread)

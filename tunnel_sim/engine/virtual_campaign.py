@@ -47,10 +47,7 @@ def simulate_campaigns(
     nthread: int = 0,
     progress: Progress | None = None,
 ) -> list[Campaign]:
-    """Simulate every run of several plans of one sample rate, integrating the runs together.
-
-    The campaigns are bit-identical to those of `simulate_campaign`, whose arguments this takes.
-    """
+    """Simulate several plans of one sample rate together, bit-identical to `simulate_campaign`."""
     rig = load_rig() if rig is None else rig
     rates = {plan.sensor.sample_rate for plan in plans}
     if len(rates) != 1:

@@ -143,10 +143,7 @@ class Episodes:
         return observations, rewards, wild, truncated
 
     def outcome(self, row: int) -> dict[str, Any]:
-        """The content of ``info`` at the end of an episode.
-
-        ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
-        """
+        """The content of ``info`` at the end of an episode, as the environment's page lists it."""
         plan, record = self._plan(row), self.record(row)
         info: dict[str, Any] = {"record": record}
         if self._config.preset == "plain":

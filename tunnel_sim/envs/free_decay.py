@@ -90,10 +90,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return operator_action(self.config, wind_speed=wind_speed, moment=moment)
 
     def information(self) -> Array:
-        """The Fisher information so far, including the prior, shape (7, 7), in the order of `UNKNOWNS`.
-
-        It is computed at the true coefficients, so an agent must not observe it.
-        """
+        """The Fisher information so far with the prior, shape (7, 7), at the truth: not for the agent."""
         return self._episodes.information.matrix(0)
 
     def record(self) -> Record:
@@ -216,10 +213,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return observation, self._add_info(infos, info, row)
 
     def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Advance all runs by one control period; runs that ended in the previous step are restarted instead.
-
-        Their actions are ignored. The results are as in `FreeDecayEnv.step`, for all runs.
-        """
+        """Advance all runs as `FreeDecayEnv.step` does, or restart those that ended in the previous step."""
         if any(rng is None for rng in self._rngs):
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
         renewed = np.flatnonzero(self._episodes.ended)

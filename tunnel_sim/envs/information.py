@@ -180,10 +180,7 @@ class Information:
         return np.maximum(self.known - before, 0.0)
 
     def matrix(self, row: int) -> Array:
-        """The Fisher information of one run, including its prior: shape (7, 7), in the order of `UNKNOWNS`.
-
-        It is in the inverse products of their units, and infinite where the prior is exact.
-        """
+        """The Fisher information of one run, shape (7, 7), as `UNKNOWNS`; infinite where the prior is exact."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.scaled[row] / np.outer(self._scale[row], self._scale[row]))
 

@@ -23,10 +23,7 @@ _SHEET_ROWS = 1_048_576
 
 
 def export_campaign(campaign: Campaign, path: Path, kind: str) -> Path:
-    """Write a campaign as one file of the kind ``mat``, ``csv``, ``xlsx`` or ``hdf5``, completely or not at all.
-
-    Units are those of the campaign format; conditions that are not stated are left out, or empty.
-    """
+    """Write a campaign as one ``mat``, ``csv``, ``xlsx`` or ``hdf5`` file, completely or not at all."""
     if kind not in WRITERS:
         raise TunnelError(f"unknown format '{kind}'", where=shown(path), remedy=did_you_mean(kind, WRITERS))
     return write_encoded(path, lambda stream: WRITERS[kind](campaign, stream, shown(path)))

@@ -153,10 +153,7 @@ class ConditionKeys(Protocol):
 
 
 def run_count(keys: ConditionKeys, driven: int = 0) -> int:
-    """The number of runs, from the lengths of the lists of a description, or of a table with the same keys.
-
-    ``driven`` is the number of driven runs of each spring and speed, before repeats.
-    """
+    """The number of runs of a table of lists, with some driven runs of each spring and speed before repeats."""
     springs = len(keys.springs) + len(keys.spring_stiffness)
     return springs * len(keys.wind_speeds) * (len(keys.release_angles_deg) + driven) * keys.repeats
 

@@ -93,10 +93,7 @@ step and its period of oscillation."""
 
 
 def plausible_values(values: Mapping[str, Any], where: str) -> None:
-    """Refuse stated values, by key of ``campaign.toml`` and in its units, that appear to be in a wrong unit.
-
-    Keys without a range and values that are None are skipped.
-    """
+    """Refuse stated values, by key of ``campaign.toml`` and in its units, that appear to be in a wrong unit."""
     for key, value in values.items():
         allowed = RANGES.get(key)
         if allowed is not None and value is not None:

@@ -238,10 +238,7 @@ def read_input(path: Path, where: str) -> tuple[Array, InputColumn, Array]:
 def table_bytes(
     record: Record, path: Path, quantity: Quantity = "angle", drive: Drive | None = None
 ) -> bytes:
-    """The content of a run file with times and readings in radians; reading it gives the same numbers.
-
-    The path is for the format and for messages, the quantity names the column of the readings.
-    """
+    """The content of a run file, of the path's format, with readings in radians, to the last digit."""
     given: dict[str, Array] = {} if drive is None else {drive.column: drive.values}
     table = pl.DataFrame({"time_s": record.time_s, COLUMNS[quantity][0]: record.yaw_rad, **given})
     # CSV values have the fewest digits that read back as the same float.

@@ -178,10 +178,7 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
 def frame_schema(
     content: bytes, where: str, remedy: str, *, rows: int, counted: str = "rows"
 ) -> dict[str, pl.DataType]:
-    """The types by name of a Parquet file whose metadata says that it is not too large; no row is read.
-
-    ``counted`` says what a row is, in the plural, for messages.
-    """
+    """The types by name of a Parquet file whose metadata says that it is not too large; no row is read."""
     import polars as pl
 
     with _parquet_faults(where, remedy):

@@ -26,10 +26,7 @@ _MAY_BE_ZERO = {"rear_slant_deg", "mechanical_damping", "noise_std", "length_abo
 
 
 def load_rig(path: Path | None = None) -> Rig:
-    """Read a rig description: a TOML file with the sections of the packaged ``rig.toml``, or that file.
-
-    The packaged file describes the rig of the paper.
-    """
+    """Read a rig description: a TOML file like the packaged ``rig.toml``, or that file, of the paper's rig."""
     return parse_rig(rig_document(path), "rig.toml" if path is None else str(path))
 
 

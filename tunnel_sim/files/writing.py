@@ -33,10 +33,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def json_text(document: Mapping[str, object]) -> str:
-    """A document as indented JSON for a file, with a final line feed.
-
-    A number that is not finite is a bug in the program: a ValueError says where.
-    """
+    """A document as indented JSON; a number that is not finite is a bug, and a ValueError says where."""
     return _encoded(document, indent=2) + "\n"
 
 
@@ -103,10 +100,7 @@ def temporary_names(target: Path) -> tuple[Path, Path]:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove what killed commands left in a folder, and restore folders that they had set aside.
-
-    Files of running processes and of other machines are kept. Files that cannot be removed are skipped.
-    """
+    """Remove what killed commands of this machine left in a folder, and restore what they had set aside."""
     try:
         names = [entry.name for entry in os.scandir(folder) if entry.name.startswith(".")]
     except OSError:
@@ -293,10 +287,7 @@ def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
 
 @contextmanager
 def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException,)) -> Iterator[None]:
-    """Convert the exceptions of a writer to a `TunnelError`; interruptions and broken pipes are passed on.
-
-    Libraries written in Rust raise some that are not subclasses of `Exception`.
-    """
+    """Convert the exceptions of a writer to a `TunnelError`; interruptions and broken pipes are passed on."""
     try:
         yield
     except _PASSED_ON:

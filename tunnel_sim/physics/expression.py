@@ -49,10 +49,7 @@ class Expression:
         return frozenset(_names(self.root))
 
     def value(self, values: Mapping[str, float | Array]) -> Array:
-        """The value for numbers or arrays of shape (n,) by name, in SI units.
-
-        It is not a number or infinite outside the domain of a function.
-        """
+        """The value for numbers or arrays, shape (n,), by name in SI units; not finite where it has none."""
         with np.errstate(all="ignore"):
             return np.asarray(_value(self.root, values), np.float64)
 
@@ -61,10 +58,7 @@ class Expression:
         return _dimension(self.root, dimensions) or NUMBER
 
     def program(self, constants: Mapping[str, float], inputs: Mapping[str, str]) -> tuple[float, ...]:
-        """The code that the moment law evaluates, as ``mjcf/plugin/expression.h`` describes it.
-
-        Constants are values in SI units, inputs the operations for what changes during a run, both by name.
-        """
+        """The moment law's code (``mjcf/plugin/expression.h``) with constants in SI units and inputs."""
         return _code(_folded(self.root, constants), inputs)
 
 

@@ -68,10 +68,7 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
 
 
 def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
-    """A run's conditions in the form that the compiled code takes: shape (1,), of `run_dtype`, at the release.
-
-    The arrays that it points to come with it, and must be kept alive.
-    """
+    """A run at its release for the compiled code, shape (1,), of `run_dtype`, and the arrays to be kept alive."""
     wind = settings.series.get("wind_speed")
     forcing = settings.series.get("forcing")
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)

@@ -145,10 +145,7 @@ def needs_density(wind_speed: float, *scales: float | None) -> bool:
 
 @dataclass(frozen=True)
 class Campaign:
-    """The runs (at least one, with unique ids) of one rig with one sensor; the sensor's zero is unknown.
-
-    ``law`` is that of the joint in a model of one's own; None: spring and damper.
-    """
+    """One or more runs, with unique ids, of a rig with a sensor; ``law``: of the joint of one's own model."""
 
     name: str
     rig: RigProperties

@@ -75,10 +75,7 @@ _STEPS = 8  # facets of a quarter round
 
 
 def davis_vertices(body: Body) -> Array:
-    """Vertices whose convex hull is the body, in its own frame: shape (n, 3), m.
-
-    x is forward, y to the left, z up; the origin is the middle of the bounding box.
-    """
+    """Vertices whose convex hull is the body about its middle, shape (n, 3), m: forward, to the left, up."""
     nose, tail = body.length / 2, -body.length / 2
     top, bottom = body.height / 2, -body.height / 2
     drop = _SLANT_DROP * body.height if body.rear_slant_deg > 0 else 0.0

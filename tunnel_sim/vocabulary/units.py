@@ -57,10 +57,7 @@ def dimension(unit: str) -> Dimension:
 
 @functools.cache
 def angle_power(unit: str) -> float:
-    """The power by which a quantity changes where all angles and moments are multiplied by a number.
-
-    It is 1 for an angle or a moment, 0 for a stiffness, -2 for 1/rad2.
-    """
+    """The power by which a quantity grows with all angles and moments: 1 for either, 0 for a stiffness."""
     above, _, below = unit.partition("/")
     return dimension(unit)[0] + _radians(above) - _radians(below.strip("()"))
 

@@ -87,10 +87,7 @@ class Imported:
     said: tuple[str, ...]
 
     def remarks(self, path: Path | None = None) -> list[str]:
-        """How the files were read and what was changed, each once with the runs that it concerns.
-
-        Of one file where ``path`` is given.
-        """
+        """How all files or one were read and what was changed, each once with the runs that it concerns."""
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]

@@ -205,10 +205,7 @@ def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
 
 
 def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequence[str]) -> list[Table]:
-    """A table as one for each run that a column names; as it is where the column cannot name runs.
-
-    The rows of a stretch without a name belong to no run.
-    """
+    """A table as one for each run that its column names; as it is where the column cannot name runs."""
     runs = [name for name in names if name]
     rows = table.channels[0].values.size if table.channels else 0
     if not 0 < len(names) <= rows / _LEAST_ROWS or len(set(runs)) < len(runs):

@@ -57,10 +57,7 @@ def is_missing(text: str) -> bool:
 
 @dataclass(frozen=True)
 class Layout:
-    """The head of a sheet: its first row of numbers, the names and units of its columns, and what is stated above.
-
-    ``facts`` are numbers by name, in SI units where their unit is known.
-    """
+    """The head of a sheet: its first row of numbers, its columns, and numbers stated above, in SI units."""
 
     first: int
     names: tuple[str, ...]
@@ -78,10 +75,7 @@ class Layout:
 def find_layout(
     rows: Sequence[Sequence[str]], lines: Sequence[str], decimal: str, width: int
 ) -> Layout | None:
-    """Names, units and the first row of numbers of a sheet; None where no row holds numbers.
-
-    ``rows`` are the first rows of the sheet, split into cells, and ``lines`` the same rows as they are.
-    """
+    """Names, units and the first row of numbers of a sheet, given the cells and lines of its head; or None."""
     tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
     numeric = [
         column
@@ -272,10 +266,7 @@ def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
 def tables_of(
     frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
 ) -> list[Table]:
-    """The tables of a sheet with the columns that hold numbers or times of day: one, or one for each run.
-
-    ``table`` holds what else is known of it, ``labels`` the run of each row where a column names the runs.
-    """
+    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
     channels, notes = [], {-1: table.said[0]}
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
