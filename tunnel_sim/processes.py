@@ -55,10 +55,9 @@ class LimitReached(Exception):
 def in_processes(
     work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
 ) -> Iterator[tuple[ItemT, ResultT]]:
-    """Do work in processes of one thread each, few items in flight at a time, which bounds the memory.
+    """Do work in processes of one thread each (0: in this one), few items in flight at a time for the memory.
 
-    Work and results must be picklable; 0 processes means this one. Items come with their results, in the
-    order in which they finish; a BrokenProcessPool where a process dies.
+    Items come with results as they finish; BrokenProcessPool where a process dies.
     """
     if jobs == 0 or not items:
         yield from ((item, work(item)) for item in items)

@@ -274,11 +274,7 @@ class EffectChain:
 
     @classmethod
     def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
-        """Draw the random parts of the effects in one run.
-
-        Each effect draws from generators spawned from ``rng``, one for the motion and one for the sensor, so
-        that an effect never changes what is later drawn from ``rng`` itself.
-        """
+        """Draw the random parts of effects, which never changes what is later drawn from ``rng`` itself."""
         motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
         drawn = tuple(
             effect.draw(stated, of_sensor if _overrides(effect, *_SEEN) else of_motion)
@@ -305,9 +301,7 @@ class EffectChain:
         return time_s
 
     def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
-        """What the sensor sees of a motion before its zero and noise: the angle, rad, or its derivative.
-
-        Shape (n,), cubic between the motion's own times.
+        """What the sensor sees of a motion before zero and noise: the angle, rad, or its derivative, shape (n,).
 
         Args:
             motion: of the rod's upper end, as long as `physics` asks for.

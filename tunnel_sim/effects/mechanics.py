@@ -327,8 +327,8 @@ class StructuralDamping(Effect):
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show which frequency sets the loss: that of the motion, or that of the rig in still air.
 
-        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall, J. Sound Vib. 11 (1970) 3). The
-        truth may lie between the two cases; their difference counts as a rectangular half-width.
+        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall 1970). The truth may lie between
+        the two cases; their difference counts as a rectangular half-width.
         """
         del cn_beta
         if not runs:

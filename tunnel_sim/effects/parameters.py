@@ -145,9 +145,7 @@ class Circumstances:
     """What the starting values for the fit of an effect depend on.
 
     Args:
-        springs: stated stiffnesses, ascending, N m/rad.
         greatest_reading: greatest absolute reading of any run, rad.
-        normalised: whether runs are fitted per unit inertia.
         slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
     """
 
@@ -162,7 +160,6 @@ class Trial:
     """Starting values for the fit of an effect.
 
     Args:
-        scaled: name of the parameter that linear theory rescales; None where the values are used as they are.
         at_most: greatest absolute value that linear theory may give it, in its unit.
     """
 

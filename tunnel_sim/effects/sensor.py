@@ -372,10 +372,8 @@ class SecondMode(Effect):
 class InputDelay(Effect):
     """An input that acts later than its time stamps say.
 
-    The shifted input is exact for both holds, for any delay and not only whole samples: the integrator ends a step
-    at each of its kinks, wherever they fall. The motion is therefore continuous in the delay. What the record does
-    not hold is not known: the input keeps its first value until its first sample acts, and its last value after its
-    last sample (where the delay is negative).
+    It is exact for both holds and any delay: the integrator ends a step at each kink. Beyond its samples the
+    input keeps its first and its last value.
     """
 
     name = "input_delay"

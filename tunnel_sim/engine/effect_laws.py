@@ -221,11 +221,7 @@ LAWS: Mapping[str, Callable[[type[Effect]], str]] = {
 
 
 def check(kind: type[Effect]) -> list[Verdict]:
-    """Hold an effect, registered or not, to every law: one verdict for each of `LAWS`, in their order.
-
-    There is none for the oracle where the class states none, and none for free decays where the effect acts
-    on them. An exception of the effect's own code is a fault.
-    """
+    """Hold an effect to every law that applies to it, in the order of `LAWS`; an exception is a fault."""
     unstated = kind.moment_oracle is Effect.moment_oracle
     left_out = [law for law, absent in ((oracle, unstated), (free, not kind.driven)) if absent]
     verdicts = []

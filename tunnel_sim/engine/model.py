@@ -78,7 +78,6 @@ def coil_mesh(radius: float, wire: float, low: float, high: float, turns: int) -
     Args:
         radius, wire: radii of the coil and of its wire, m.
         low, high: heights of its ends, m.
-        turns: number of turns.
     """
     around, along = 8, 24 * turns + 1
     turn = np.linspace(0.0, 2 * pi * turns, along)[:, None]
@@ -188,12 +187,7 @@ class Model:
         return Model(mj, self.rig, settings)
 
     def release_state(self) -> mujoco.MjData:
-        """The state at the release, where the body has been held at its angle until now.
-
-        With a flexible rod the body is at the release angle, and the rod's upper end is in equilibrium between
-        spring and twisted rod. The plugin's state starts there too: the lag at the body's angle, the deflection
-        of the friction contact at zero.
-        """
+        """The state at the release, where the body has been held and rod and spring are in equilibrium."""
         data = mujoco.MjData(self.mj)
         release = self.settings.release_angle
         end = spring_end_angle(self.settings)
@@ -207,11 +201,7 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model:
-    """Build the model of one run; compiled, which takes nearly all of the time, once for all runs of a layout.
-
-    Without shapes, lights and cameras (``drawn``) the motion is bit-identical, and a step takes four fifths
-    of the time.
-    """
+    """Build the model of a run, compiled once for all of its layout; undrawn it moves alike, in less time."""
     check_stable(rig, settings)
     key = (repr(rig), settings.layout(), drawn)
     compiled = _COMPILED.get(key)

@@ -78,7 +78,6 @@ def simulate_motions(
     Args:
         sample_rate: Hz.
         nthread: number of threads; 0 uses all processors.
-        progress: called with (runs done, runs in all).
     """
     runs: list[RunSettings] = []
     groups: dict[tuple[object, ...], list[int]] = {}  # of runs that can share one compiled model

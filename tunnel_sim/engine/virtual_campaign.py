@@ -26,13 +26,9 @@ from tunnel_sim.vocabulary.rig import Rig
 def simulate_campaign(
     plan: CampaignPlan, rig: Rig | None = None, *, nthread: int = 0, progress: Progress | None = None
 ) -> Campaign:
-    """Simulate every run of a plan as a rig engineer would have measured it.
-
-    The campaign states the rig's nominal inertia, not that of the truth, and contains no other trace of the
-    truth.
+    """Simulate every run of a plan as a rig engineer would have measured it, without a trace of the truth.
 
     Args:
-        rig: geometry and mass; None uses the packaged rig.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
         progress: called with (runs done, runs in all).
     """

@@ -51,8 +51,6 @@ class FreeDecayConfig:
         moment_limit: greatest moment that the operator can apply, N m.
         effect_probability: probability that an episode draws an effect, if its options do not name effects.
         prior: changes to `Prior` by name, in its units.
-        expose_truth: whether ``info`` contains the truth.
-        rig_file: a rig description; None: the packaged one.
     """
 
     preset: Literal["plain", "operator"] = "operator"

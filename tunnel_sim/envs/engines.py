@@ -76,11 +76,7 @@ class OneRun:
         return float(self._data.qpos[self._model.yaw_address])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Integrate one control period, without control where no operation is given.
-
-        Angle (rad) and rate (rad/s) of the rod's upper end at the samples and the period's end, shape (1,
-        samples + 1).
-        """
+        """Integrate a control period: angle (rad) and rate (rad/s) at samples and end, shape (1, samples + 1)."""
         assert self._model is not None
         model, data, at = self._model.mj, self._data, self._model.yaw_address
         angle, rate = np.empty((1, self._samples + 1)), np.empty((1, self._samples + 1))

@@ -43,10 +43,7 @@ class EpisodeState:
     """The complete state of an episode in progress; continuing from it gives bit-identical results.
 
     Args:
-        physics: the plan's run with its effects, as integrated.
         mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, including the plugin's state, shape (n,).
-        arrays: readings so far, sensitivities and information, by name.
-        sensor: the run's effects on the reading.
     """
 
     plan: RunPlan
@@ -110,10 +107,7 @@ class Episodes:
         return observation, info
 
     def advance(self, actions: Any) -> tuple[Array, Array, Flags, Flags]:
-        """Advance every episode by one control period, including those that have ended.
-
-        Observations, shape (runs, samples + 2), rewards (nats), terminations and truncations, shape (runs,).
-        """
+        """Advance all episodes: observations, shape (runs, samples + 2), rewards (nats) and ends, shape (runs,)."""
         operation = None
         if self._config.preset == "plain":
             check_plain(actions, self._count)
@@ -202,11 +196,7 @@ class _HasRig(Protocol):
 
 
 def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") -> Campaign:
-    """The runs (``info["run"]``) of finished episodes in the plain preset as one campaign.
-
-    It states the rig's nominal inertia and the configured sensor, and contains no trace of the truth. Runs
-    with equal conditions are numbered.
-    """
+    """The runs of finished episodes (plain preset) as one campaign, without the truth; equal ids are numbered."""
     listed = list(runs)
     if not listed:
         raise EnvError("no run is given", where="campaign_of", remedy="give info['run'] of finished episodes")
@@ -273,9 +263,7 @@ class Readings:
         (self._altered.discard if running.chain.reads_plainly else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
-        """Readings (rad) of the control period before the release, shape (samples,).
-
-        Their noise is not drawn from the run's generator.
+        """Readings (rad) of the control period before the release, shape (samples,), by noise of their own.
 
         Args:
             angle: at which the rod's upper end is held, rad.

@@ -33,9 +33,7 @@ class RigView:
     """Draws the rig.
 
     Args:
-        mode: ``human``, ``rgb_array`` or None.
         width, height: of a picture, pixels.
-        camera: name of a camera of ``mjcf/rig.xml``.
         period: time between two frames in a window, s.
     """
 

@@ -253,8 +253,7 @@ def write_campaign(
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
     An existing folder may be replaced where it is empty or contains only a campaign. ``checked`` says that
-    every record has passed `checked_record`. A ``truth`` that JSON cannot represent is a ValueError or a
-    TypeError.
+    every record has passed `checked_record`.
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:

@@ -162,7 +162,6 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
     """Refuse a campaign that is too large to simulate or to read again, before it is expanded.
 
     Args:
-        runs: number of runs.
         duration: of each run, s.
         sample_rate: Hz.
     """
@@ -200,11 +199,7 @@ def check_conditions(plan: ConditionKeys, where: str) -> None:
 
 
 def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
-    """Read a campaign description, a TOML file like the packaged ``paper-campaign.toml``.
-
-    The rig (the packaged one by default) defines the numbered springs, and the inertia, damping and air
-    density that the description does not state.
-    """
+    """Read a campaign description; a rig (the packaged one) states what the description does not."""
     path = Path(path)
     return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path), path.parent)
 

@@ -42,7 +42,6 @@ class Range:
 
     Args:
         low, high: least and greatest plausible value, in the unit.
-        unit: unit in the file format.
         above, below: likely unit of a value above and below the range.
     """
 
@@ -114,12 +113,7 @@ def checked_record(
     Args:
         time_s: sample times, shape (n,), s.
         reading: shape (n,), rad, rad/s or rad/s².
-        column: that the readings are from, for messages.
         release_angle: as stated, rad.
-        drive: the input of a run, which need not oscillate at a frequency of its own.
-
-    Raises:
-        TunnelError: times that do not increase, too few cycles of a free decay, or what looks like a wrong unit.
     """
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False

@@ -55,7 +55,6 @@ class Reader:
 
     Args:
         limit: largest file, bytes.
-        magic: how such a file begins; empty where anything will do.
         read_run: the table of a campaign's run file, from its content, its name for messages, and the greatest
             number of samples; None where such files are not run files.
         read_tables: the tables of a file that an instrument wrote, from its content and its name for messages; it
@@ -145,8 +144,6 @@ class RunTableValues:
     Args:
         time_s: sample times, shape (n,), s; None without a column time_s.
         reading: shape (n,), rad, rad/s or rad/s².
-        column: the reading's, one of those in `COLUMNS`.
-        input_column: of a driven run; None of a free decay.
         input: shape (n,), in the unit of its column; None of a free decay.
     """
 
@@ -165,10 +162,7 @@ def read_table(
     quantity: Quantity = "angle",
     most: int = limits.RUN_SAMPLES,
 ) -> RunTableValues:
-    """Read times, readings and the input of a driven run from a run file; other columns are ignored.
-
-    All values are finite. Times are required (``timed``) where no ``sample_rate`` is stated.
-    """
+    """Read finite times, readings and an input from a run file; ``timed``: for want of a sample rate."""
     missing = "put the file there or correct 'file' in campaign.toml"
     known = COLUMNS[quantity]
     holds = f"give it a column {' or '.join(known)}, and time_s unless [sensor] sample_rate is given"

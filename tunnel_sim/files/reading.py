@@ -71,14 +71,7 @@ _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeErr
 
 
 def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", readable: str = "") -> bytes:
-    """Read a regular file.
-
-    Args:
-        limit: greatest size, bytes.
-        where: its name in messages; its path when empty.
-        missing: the remedy where there is no such file.
-        readable: the remedy where it is not a regular file or cannot be read.
-    """
+    """Read a regular file of at most some bytes; ``missing`` and ``readable`` are remedies."""
     where = where or shown(path)
     readable = readable or "name a file that can be read"
     try:
@@ -131,11 +124,7 @@ def read_json(path: Path, *, remedy: str) -> dict[str, Any]:
 
 
 def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
-    """A JSON object from its text, or from UTF-8.
-
-    It holds neither NaN nor infinities, is nested no deeper than `limits.NESTING` and has integers of at most
-    `limits.INTEGER_BITS`.
-    """
+    """A JSON object from its text, or from UTF-8, with finite numbers only and within `check_shape`."""
     text = content if isinstance(content, str) else decoded(content, where)
 
     def refused(number: str) -> float:

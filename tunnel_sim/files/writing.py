@@ -126,11 +126,7 @@ def clear_leftovers_once(folder: Path) -> None:
 
 
 def discard(folder: Path, partial: Path) -> None:
-    """Remove a folder, if it exists, that was set aside and is no longer needed.
-
-    It is renamed to ``partial``, an unused name from `temporary_names`, first, so that after an interrupted
-    removal the rest is not restored.
-    """
+    """Remove a folder that was set aside; renamed first, so that an interruption does not restore the rest."""
     if folder.exists():
         folder.rename(partial)
         shutil.rmtree(partial, ignore_errors=True)

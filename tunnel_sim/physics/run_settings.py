@@ -114,7 +114,6 @@ class DriveMoment:
         values: at these times, shape (n,), any unit.
         scale: N m per unit.
         delay: by which it acts later than its samples, s.
-        held: whether it is constant from one sample to the next; else linear.
         on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
     """
 
@@ -152,9 +151,7 @@ class RunSettings:
         parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``); the others are
             zero.
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
-        rod_twist: None for a rigid rod.
         program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
-        drive: the moment of a driven run; None of a free decay.
     """
 
     spring_stiffness: float
@@ -265,10 +262,7 @@ class Motion:
 
 
 def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
-    """The number of samples in a run, and of integration steps between two samples.
-
-    Refused where the sample interval is not a whole number of timesteps, or the sample rate is outside its
-    limits.
+    """The number of samples in a run, and of whole integration steps between two samples.
 
     Args:
         sample_rate: Hz.

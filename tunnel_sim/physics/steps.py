@@ -98,7 +98,6 @@ def compensated(law: Mapping[str, float], wind_speed: float, step: float) -> tup
     σ (1 − (ωh)⁴/30) + ω (ωh)⁵/144, and the damper makes up for both. What is left is of the order (ωh)⁵.
 
     Args:
-        law: every parameter by name, in the law's units.
         wind_speed: m/s.
         step: h, s.
     """
@@ -161,10 +160,7 @@ def check_stable(rig: Rig, run: RunSettings) -> None:
 
 
 def body_rate(rig: Rig, run: RunSettings) -> float:
-    """The fastest rate of the body on its spring, rad/s: the larger of the two roots, with or without wind.
-
-    Terms that are nonlinear in the angle count with their slope at the release.
-    """
+    """The fastest rate of the body on its spring, rad/s, with or without wind, at the slopes of the release."""
     inertia, law = run.yaw_inertia, run.parameters
     angle = abs(run.release_angle)
     # stiffness of spring and gravity at the release

@@ -53,8 +53,6 @@ class SensorProperties:
         resolution: step of the reading, rad (rad/s or rad/s² where it measures a rate or an acceleration).
         noise_std: standard deviation of the reading's noise, in the same unit.
         plausible: False accepts values that look like a wrong unit, and a low sample rate.
-        quantity: what the readings are; None: the angle.
-        zero: whether the runs have a common zero; None: the records decide.
     """
 
     sample_rate: float | None = None
@@ -89,7 +87,6 @@ class Run:
         spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
-        drive: the input of a driven run, which need not start with a release; None of a free decay.
     """
 
     id: str

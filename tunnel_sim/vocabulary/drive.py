@@ -35,9 +35,7 @@ class Drive:
     """The input of a run at the samples of its record.
 
     Args:
-        column: what it is.
         values: at the times of the record, shape (n,): N m, any unit, or rad, as ``column`` says.
-        hold: between the samples.
         gain: N m per unit of a ``drive``; None where it is not stated.
     """
 

@@ -88,13 +88,11 @@ class Condition:
     """One run to simulate.
 
     Args:
-        id: unique in the campaign; made of spring, speed, angle (or amplitude of the drive) and repeat.
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         air_density: ρ, kg/m³.
         release_angle: rad, nose-right positive; of a driven run 0, where it starts at rest.
         duration: of the record, s.
-        drive: the input of a driven run at the samples of the sensor; None of a free decay.
     """
 
     id: str

@@ -90,9 +90,7 @@ def gaps(time: Array) -> NDArray[np.bool_]:
 def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
     """A record on a uniform raster, for methods that need one: itself where it is uniform.
 
-    Else a smooth curve through it at as many times. Interpolation reduces the noise, and readings within a
-    gap are not measurements: gaps are bridged by the curve, or else by the mean, which adds nothing to a
-    spectrum.
+    Else a smooth curve through it, which bridges gaps or leaves them at the mean; neither is a measurement.
     """
     if record.uniform:
         return record
@@ -130,10 +128,8 @@ NOISE_MARGIN = 4.0  # or by this many standard deviations of the smoothed noise,
 def count_cycles(record: Record) -> float:
     """Number of cycles of the dominant oscillation within the record; 0 when nothing oscillates.
 
-    Slow drift and mains hum are removed. The dominant spectral line gives the time scale; a moving average
-    over a quarter of its period removes faster components. The period follows from the crossings of the
-    centre of oscillation, with hysteresis. The number of cycles is the record's duration over that period, so
-    the part of a heavily damped run in which the swing is lost in noise counts as well.
+    The dominant spectral line gives the time scale; the period follows from the crossings of the centre, with
+    hysteresis. The part of a heavily damped run in which the swing is lost in noise counts as well.
     """
     record = evenly_spaced(record, bridged=False)
     reading = _without_hum(record)

@@ -47,9 +47,7 @@ class JointLaw:
         damping: C, N m s/rad.
         friction: moment of dry friction, N m.
         rest: the joint's position at rest, rad.
-        terms: what the restoring moment and the damping have beside K and C.
         free: which of `FREE_PARAMETERS` are fitted.
-        slide: whether the joint slides.
     """
 
     inertia: float
@@ -162,7 +160,6 @@ class Dynamics:
     Args:
         yaw_inertia: Izz of model and support, kg m².
         mechanical_damping: Cr, N m s/rad.
-        default_spring: number of the spring used where none is named.
     """
 
     yaw_inertia: float

@@ -40,8 +40,8 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
 def dimension(unit: str) -> Dimension:
     """Powers of kg, m and s of a unit.
 
-    It has factors with spaces between them and digits for powers, the denominator after one slash; or it is
-    ``l/V``, of a time as a multiple of the reference length over the wind speed, which is a number.
+    It has factors with spaces between them and digits for powers, the denominator after one slash; ``l/V``,
+    of a time as a multiple of length over speed, is a number.
     """
     if unit == "l/V":
         return NUMBER

@@ -155,9 +155,6 @@ def tables_of_arrays(
 
     Args:
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
-        kind: of the file, for the remark.
-        units: stated units of arrays, by path.
-        runs: names of the runs that groups hold, by path.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}

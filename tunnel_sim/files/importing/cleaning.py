@@ -49,11 +49,10 @@ class Cleaned:
 
 
 def without_overflow(values: Array, said: list[str]) -> Array:
-    """Readings of a counter or a single-turn sensor without the jumps at the ends of its range.
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are said.
 
     Args:
         values: as recorded, shape (n,); NaN where there is no number.
-        said: a remark is added where something is changed.
     """
     known = np.flatnonzero(np.isfinite(values))
     numbers = values[known]

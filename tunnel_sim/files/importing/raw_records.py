@@ -40,8 +40,6 @@ class RawRecord:
     """A record of a file, cleaned but not yet cut.
 
     Args:
-        cleaned: times and readings.
-        quantity: what the readings are.
         columns: of conditions, by key, with the rows of the record.
         clock: of these rows, from the first sample on, shape (n,), s; NaN where there is no time.
         whole: whether the file itself says that it is one run.
@@ -70,7 +68,6 @@ class RawRecord:
         Args:
             first: time of a run's first sample, s.
             last: time of its last sample, s.
-            said: remarks are added.
         """
         rows = (self.clock >= first) & (self.clock <= last)
         found = {

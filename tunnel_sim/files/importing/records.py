@@ -57,9 +57,7 @@ class ImportedRun:
     """A run, or what was taken for one.
 
     Args:
-        said: why it is left out, or what is assumed of it.
         rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
-        sizes: of the rig, as the file states them, by key of `Conditions`.
     """
 
     id: str
@@ -110,15 +108,7 @@ def read_records(
     conditions: Path | None = None,
     name: str = "",
 ) -> Imported:
-    """Read files as instruments write them; nothing is written.
-
-    A campaign without a name is named after the first file.
-
-    Args:
-        files: one or more; each holds one run, several side by side, or several one after another.
-        choices: what is known about them; the rest is found.
-        conditions: a table of conditions of the files or runs.
-    """
+    """Read files as instruments write them; nothing is written, and what ``choices`` leave open is found."""
     calibration = read_calibration(choices.calibration)
     pattern = None if choices.name is None else name_pattern(choices.name)
     table = None if conditions is None else ConditionTable(conditions)

@@ -85,10 +85,7 @@ def kind_of(unit: str) -> str:
 
 
 def split_unit(heading: str) -> tuple[str, str]:
-    """A heading such as ``Angle (deg) Run #1``, ``yaw_rad`` or ``t / s`` as name and unit.
-
-    The unit is one of `UNITS`, the text in brackets where it is another one, or an empty text.
-    """
+    """A heading such as ``Angle (deg) Run #1`` or ``t / s`` as name and unit, which may be empty."""
     heading = " ".join(heading.split())
     if "/" in heading and known_unit(heading):  # a unit alone, such as "m/s"
         return heading, ""
@@ -122,7 +119,6 @@ class Channel:
     """One column of a table.
 
     Args:
-        name: as in the file, without its unit.
         values: shape (n,), in the unit of the file; NaN where there is no number.
         unit: one of `UNITS`, another text, or empty where none is stated.
     """
