@@ -29,7 +29,6 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
     "effects of the diagnosis under way", default=()
 )
 
-
 _room = __name__.rpartition(".")[0]
 _names = [f"{_room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
 _modules = [import_module(name) for name in _names if name != __name__]

@@ -81,21 +81,15 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
     )
     for name in given:
         if name not in taken:
-            raise TunnelError(
-                f"kind = '{table.kind}' does not take {name}", where=where, remedy="leave it out"
-            )
+            remedy = "leave it out"
+            raise TunnelError(f"kind = '{table.kind}' does not take {name}", where=where, remedy=remedy)
     if table.kind != "file" and bool(table.amplitudes_nm) == bool(table.amplitudes_rad):
-        raise TunnelError(
-            "both amplitudes_nm and amplitudes_rad" if table.amplitudes_nm else "no amplitudes",
-            where=where,
-            remedy="give amplitudes_nm (moments on the body) or amplitudes_rad (angles of the spring's root)",
-        )
+        what = "both amplitudes_nm and amplitudes_rad" if table.amplitudes_nm else "no amplitudes"
+        remedy = "give amplitudes_nm (moments on the body) or amplitudes_rad (angles of the spring's root)"
+        raise TunnelError(what, where=where, remedy=remedy)
     if len(set(table.amplitudes)) < len(table.amplitudes):
-        raise TunnelError(
-            "the amplitudes hold a value twice",
-            where=where,
-            remedy="leave one out, and use repeats for more runs",
-        )
+        remedy = "leave one out, and use repeats for more runs"
+        raise TunnelError("the amplitudes hold a value twice", where=where, remedy=remedy)
     for name in ("frequency_hz", "from_hz", "to_hz"):
         _check_sampled(name, getattr(table, name), sample_rate, where)
     for frequency in table.frequencies_hz:
@@ -114,11 +108,8 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
 
 def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
     if frequency is not None and not frequency < 0.5 * sample_rate:
-        raise TunnelError(
-            f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz",
-            where=where,
-            remedy="lower it, or raise sample_rate under [sensor]",
-        )
+        what = f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz"
+        raise TunnelError(what, where=where, remedy="lower it, or raise sample_rate under [sensor]")
 
 
 def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array) -> Drive:
@@ -153,25 +144,18 @@ def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:
     """
     given, column, values = read_input(path, where)
     if column == "drive":
-        raise TunnelError(
-            "the column drive has no known unit",
-            where=where,
-            remedy="name it moment_nm (N m on the body) or base_rad (rad of the spring's root)",
-        )
+        remedy = "name it moment_nm (N m on the body) or base_rad (rad of the spring's root)"
+        raise TunnelError("the column drive has no known unit", where=where, remedy=remedy)
     given = given - given[0]
     slack = 1e-6 * (time_s[1] - time_s[0])
     if given[-1] < time_s[-1] - slack:
-        raise TunnelError(
-            f"ends after {given[-1]:.6g} s, before the last sample of a run at {time_s[-1]:.6g} s",
-            where=where,
-            remedy="give a longer file or a shorter duration",
-        )
+        what = f"ends after {given[-1]:.6g} s, before the last sample of a run at {time_s[-1]:.6g} s"
+        raise TunnelError(what, where=where, remedy="give a longer file or a shorter duration")
     if hold == "zero":
         sampled = values[np.searchsorted(given, time_s + slack, side="right") - 1]
     else:
         sampled = np.interp(time_s, given, values)
     if np.ptp(sampled) == 0.0:
-        raise TunnelError(
-            f"the column {column} is constant", where=where, remedy="give an input that changes"
-        )
+        remedy = "give an input that changes"
+        raise TunnelError(f"the column {column} is constant", where=where, remedy=remedy)
     return Drive(column, sampled, hold)

@@ -141,9 +141,8 @@ def checked_record(
         what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
         if not cycles > 0.0:
             what = "no oscillation is visible in the record, so it has fewer than three cycles"
-        raise TunnelError(
-            what, where=where, remedy="record for longer after the release, or leave the run out"
-        )
+        remedy = "record for longer after the release, or leave the run out"
+        raise TunnelError(what, where=where, remedy=remedy)
     step = record.sample_interval
     if judged and angle:  # rates and accelerations may have any size
         _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)

@@ -81,7 +81,6 @@ READERS: Mapping[str, str] = {
 }
 """Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
 
-
 RUN_ENDINGS = (".csv", ".parquet")
 """The endings of `READERS` whose readers read run files, known without loading them."""
 

@@ -63,30 +63,22 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
     """Refuse an input that cannot be that of its record; where it is ``judged``, one that looks clipped too."""
     values, name = drive.values, drive.column
     if values.shape != record.yaw_rad.shape:
-        raise TunnelError(
-            f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}",
-            where=where,
-            remedy="give the input at the times of the record, one value for each sample",
-        )
+        what = f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}"
+        remedy = "give the input at the times of the record, one value for each sample"
+        raise TunnelError(what, where=where, remedy=remedy)
     if not np.isfinite(values).all():
-        raise TunnelError(
-            f"the input {name} holds NaN or an infinity", where=where, remedy="give all its values"
-        )
+        remedy = "give all its values"
+        raise TunnelError(f"the input {name} holds NaN or an infinity", where=where, remedy=remedy)
     span = float(np.ptp(values))
     if span <= _CONSTANT * float(np.abs(values).max()):
-        raise TunnelError(
-            f"the input {name} is constant",
-            where=where,
-            remedy=f"leave the column out if the run is a free decay, or record what drives it in {name}",
-        )
+        remedy = f"leave the column out if the run is a free decay, or record what drives it in {name}"
+        raise TunnelError(f"the input {name} is constant", where=where, remedy=remedy)
     x, y = values - values.mean(), record.yaw_rad - record.yaw_rad.mean()
     alike = float(x @ y) ** 2 / max(float(x @ x) * float(y @ y), 1e-300)
     if 1.0 - alike < _ITSELF:
-        raise TunnelError(
-            f"the input {name} is the response itself, up to a factor",
-            where=where,
-            remedy=f"record what drives the body in {name}, not the sensor's reading",
-        )
+        what = f"the input {name} is the response itself, up to a factor"
+        remedy = f"record what drives the body in {name}, not the sensor's reading"
+        raise TunnelError(what, where=where, remedy=remedy)
     ends = (float(values.min()), float(values.max()))
     if not judged or np.mean((values == ends[0]) | (values == ends[1])) > _LEVELS:
         return

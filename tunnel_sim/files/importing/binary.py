@@ -68,7 +68,6 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
 
 PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
 
-
 _HEAD = 400
 
 
@@ -132,7 +131,6 @@ def _read(content: bytes, where: str) -> list[Table]:
 
 
 WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)
-
 
 RUN_IDS = ("id", "run", "run_id")
 """Members and attributes whose text is the name of the run that a group holds."""

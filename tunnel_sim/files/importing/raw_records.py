@@ -208,11 +208,9 @@ def find_input(
     if choices.input is not None:
         named = [c for c in others if is_stated(c, choices)]
         if not named:
-            raise TunnelError(
-                f"no column '{one_line(choices.input, 40)}' for the input",
-                where=where,
-                remedy=f"--input: {did_you_mean(choices.input, {c.name for c in others})}",
-            )
+            what = f"no column '{one_line(choices.input, 40)}' for the input"
+            remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
+            raise TunnelError(what, where=where, remedy=remedy)
         return _as_input(named[0], reading, choices, said)
     # a column that is empty here is the input of other runs of the file
     exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
@@ -230,11 +228,8 @@ def find_input(
                 found.append(channel)
     if len(found) > 1:
         listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in found)
-        raise TunnelError(
-            f"{len(found)} columns may be the input: {listed}",
-            where=where,
-            remedy=f'give --input "{one_line(found[0].name, 40)}", another of them, or --input none',
-        )
+        remedy = f'give --input "{one_line(found[0].name, 40)}", another of them, or --input none'
+        raise TunnelError(f"{len(found)} columns may be the input: {listed}", where=where, remedy=remedy)
     return _as_input(found[0], reading, choices, said) if found else None
 
 
