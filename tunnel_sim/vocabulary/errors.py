@@ -69,8 +69,9 @@ def library(name: str, use: str, extra: str, where: str = "") -> Any:
     try:
         return import_module(name)
     except ImportError:
-        what, remedy = f"{use} needs the package {name.partition('.')[0]}", f"virtual-wind-tunnel[{extra}]"
-        raise TunnelError(what, where=where, remedy=f"run: pip install '{remedy}'") from None
+        what = f"{use} needs the package {name.partition('.')[0]}"
+        remedy = f"run: pip install 'virtual-wind-tunnel[{extra}]'"
+        raise TunnelError(what, where=where, remedy=remedy) from None
 
 
 def added_to(group: str) -> dict[str, EntryPoint]:

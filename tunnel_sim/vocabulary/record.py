@@ -82,7 +82,7 @@ class Record:
 
 
 def gaps(time: Array) -> NDArray[np.bool_]:
-    """Whether samples are missing after each of the times, shape (n,), but the last: steps over four mean ones."""
+    """Where samples are missing: steps of over four mean intervals between times, shape (n,); shape (n - 1,)."""
     steps = np.diff(time)
     return steps > _GAP * steps.mean() if steps.size else np.zeros(0, dtype=np.bool_)
 
