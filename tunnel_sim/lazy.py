@@ -10,7 +10,7 @@ from importlib import import_module
 def lazy_names(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """The functions ``__getattr__`` and ``__dir__`` of a package, for names by their relative module."""
+    """The functions ``__getattr__`` and ``__dir__`` of a package, for names in a text by module."""
     home_of = {name: home for home, names in homes.items() for name in names.split()}
 
     def load(name: str) -> object:

@@ -205,7 +205,7 @@ class Effect:
         return run.with_parameters(law) if law else run
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
-        """The moment, N m, computed independently of the hooks, of time (s), angle (rad) and rate (rad/s)."""
+        """The moment, N m, without the hooks, of time (s), angle (rad) and rate (rad/s); None: not stated."""
         del stated
         return None
 

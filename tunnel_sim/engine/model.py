@@ -201,7 +201,7 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model:
-    """Build the model of a run, compiled once for all of its layout; undrawn it moves alike, in less time."""
+    """Build the model of a run, compiled once for its layout; without shapes it moves the same, faster."""
     check_stable(rig, settings)
     key = (repr(rig), settings.layout(), drawn)
     compiled = _COMPILED.get(key)

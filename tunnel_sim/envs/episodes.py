@@ -263,7 +263,7 @@ class Readings:
         (self._altered.discard if running.chain.reads_plainly else self._altered.add)(row)
 
     def held(self, row: int, angle: float) -> Array:
-        """Readings (rad) of the control period before the release, shape (samples,), by noise of their own.
+        """Readings (rad) of the control period before the release, shape (samples,), with noise of their own.
 
         Args:
             angle: at which the rod's upper end is held, rad.

@@ -161,7 +161,7 @@ def read_table(
     quantity: Quantity = "angle",
     most: int = limits.RUN_SAMPLES,
 ) -> RunTableValues:
-    """Read finite times, readings and an input from a run file; ``timed``: for want of a sample rate."""
+    """Read finite times, readings and an input from a run file; ``timed``: the times are required."""
     missing = "put the file there or correct 'file' in campaign.toml"
     known = COLUMNS[quantity]
     holds = f"give it a column {' or '.join(known)}, and time_s unless [sensor] sample_rate is given"

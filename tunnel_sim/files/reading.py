@@ -71,7 +71,7 @@ _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeErr
 
 
 def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", readable: str = "") -> bytes:
-    """Read a regular file of at most some bytes; ``missing`` and ``readable`` are remedies."""
+    """Read a regular file of limited size, in bytes; ``missing`` and ``readable`` are the remedies."""
     where = where or shown(path)
     readable = readable or "name a file that can be read"
     try:

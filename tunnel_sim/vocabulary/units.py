@@ -57,7 +57,7 @@ def dimension(unit: str) -> Dimension:
 
 @functools.cache
 def angle_power(unit: str) -> float:
-    """The power by which a quantity grows with all angles and moments: 1 for either, 0 for a stiffness."""
+    """The power in which a quantity grows with all angles and moments: 1 for either, 0 for a stiffness."""
     above, _, below = unit.partition("/")
     return dimension(unit)[0] + _radians(above) - _radians(below.strip("()"))
 
