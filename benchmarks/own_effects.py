@@ -18,7 +18,7 @@ from benchmarks.throughput import interleaved, row, stepping
 from diagnosis import diagnose
 from tests.unit.own_effects import CUBIC, DETENT
 from tunnel_sim.effects import Effect, effect_class
-from tunnel_sim.effects.stiffness import CubicStiffness
+from tunnel_sim.effects.mechanics import CubicStiffness
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.rig_file import load_rig

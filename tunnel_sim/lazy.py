@@ -10,16 +10,7 @@ from importlib import import_module
 def lazy_names(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """The functions ``__getattr__`` and ``__dir__`` of a package.
-
-    Args:
-        package: its ``__name__``.
-        homes: names it offers, separated by blanks, by the module that defines them, relative to the package
-            (``.estimate``).
-
-    Returns:
-        Both functions. The first raises AttributeError for a name that is not offered.
-    """
+    """The functions ``__getattr__`` and ``__dir__`` of a package, for names in a text by module."""
     home_of = {name: home for home, names in homes.items() for name in names.split()}
 
     def load(name: str) -> object:

@@ -55,18 +55,9 @@ class LimitReached(Exception):
 def in_processes(
     work: Callable[[ItemT], ResultT], items: Sequence[ItemT], jobs: int
 ) -> Iterator[tuple[ItemT, ResultT]]:
-    """Do work in processes of one thread each, few items in flight at a time, which bounds the memory.
+    """Do work in processes of one thread each (0: in this one), few items in flight at a time for the memory.
 
-    Args:
-        work: what to do; it and its results must be picklable.
-        items: on which.
-        jobs: number of processes; 0 works in this one.
-
-    Yields:
-        Items with their results, in the order in which they finish.
-
-    Raises:
-        BrokenProcessPool: when a process dies.
+    Items come with results as they finish; BrokenProcessPool where a process dies.
     """
     if jobs == 0 or not items:
         yield from ((item, work(item)) for item in items)
@@ -103,11 +94,7 @@ class Worker:
     def submit(
         self, work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs
     ) -> Future[ResultT]:
-        """Do work after what was submitted before.
-
-        Args:
-            work: what to do; it, its arguments and its result must be picklable.
-        """
+        """Do work after what was submitted before; it, its arguments and its result must be picklable."""
         with _one_thread_each():  # the process is started by the first work
             return self._pool.submit(work, *given, **named)
 
@@ -123,9 +110,7 @@ def in_limited_process(
     """Do work on untrusted input in a process of its own, which can open no file. Bytes go in and out, no pickles.
 
     Args:
-        work: a function of a module, known by its name.
-        given: its argument.
-        prepare: another one, called before the limits hold: it loads all that the work needs.
+        prepare: a function of a module as the work is, called before the limits hold: it loads all that is needed.
         seconds: of the processor that the work may take, s; the clock allows four times as long.
         memory: that the work may take, bytes.
 
@@ -209,12 +194,11 @@ def _one_thread_each() -> Iterator[None]:
 def _start(line: Connection) -> None:
     """Prepare a process: Ctrl-C is handled by the parent, and the process ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(line,), daemon=True).start()
 
+    def end() -> None:
+        try:
+            line.recv()
+        except (EOFError, OSError):  # the pipe to the parent is closed, by the parent or by its death
+            os._exit(1)
 
-def _end_with(line: Connection) -> None:
-    """End this process when the pipe to the parent is closed, by the parent or by its death."""
-    try:
-        line.recv()
-    except (EOFError, OSError):
-        os._exit(1)
+    threading.Thread(target=end, daemon=True).start()

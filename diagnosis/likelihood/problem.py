@@ -15,8 +15,7 @@ from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.parameters import SWING, ParameterInfo
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.physics.forward import forward_run, integrate
-from tunnel_sim.physics.rod_modes import slow_motion
+from tunnel_sim.physics.forward import forward_run, integrate, slow_motion
 from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives

@@ -12,8 +12,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, ClassVar, Protocol, cast
 
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.plugins import added_to, loading
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate

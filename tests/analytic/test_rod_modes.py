@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from law_cases import RIG
 
-from tunnel_sim.physics.forward import forward_run, integrate
+from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
 from tunnel_sim.physics.moment_law import parameter_vector
-from tunnel_sim.physics.rod_modes import Ringing, slow_motion
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, spring_end_angle
 from tunnel_sim.physics.steps import compensated, fit_stride
 from tunnel_sim.vocabulary.plan import AeroDerivatives

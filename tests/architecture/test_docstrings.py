@@ -5,6 +5,7 @@ The packages are walked, so nothing is forgotten; the rules themselves are tried
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import inspect
 import pkgutil
@@ -74,13 +75,13 @@ def documented_arguments(text: str) -> dict[str, str]:
     if section is None:
         return {}
     found: dict[str, str] = {}
-    name = ""
+    names: list[str] = []
     for line in section[1].splitlines():
-        start = re.match(r"[ ]{4}(\w+)(?:, \w+)*:\s*(.*)", line)
+        start = re.match(r"[ ]{4}(\w+(?:, \w+)*):\s*(.*)", line)
         if start:
-            name = start[1]
-            found[name] = start[2]
-        elif name:
+            names = start[1].split(", ")  # several of one kind share a line
+            found |= dict.fromkeys(names, start[2])
+        for name in () if start else names:
             found[name] += " " + line.strip()
     return found
 
@@ -121,6 +122,11 @@ def undescribed_fields(name: str, model: type[pydantic.BaseModel]) -> list[str]:
     ]
 
 
+def describes_itself(field: dataclasses.Field[Any]) -> bool:
+    """Whether a field carries its unit and its meaning, as the parameters of an effect do."""
+    return bool(field.metadata.get("unit") and field.metadata.get("meaning"))
+
+
 def faults(name: str, member: Any) -> list[str]:
     """What is wrong with one docstring."""
     text = member.__doc__ or ""
@@ -134,6 +140,9 @@ def faults(name: str, member: Any) -> list[str]:
     if inspect.isclass(member) and issubclass(member, pydantic.BaseModel):
         return undescribed_fields(name, member)
     known, signature = documented_arguments(text), arguments(member)
+    if inspect.isclass(member) and dataclasses.is_dataclass(member):
+        described = {field.name for field in dataclasses.fields(member) if describes_itself(field)}
+        signature = {name: kind for name, kind in signature.items() if name not in described}
     found = [argument_fault(argument, kind, known.get(argument)) for argument, kind in signature.items()]
     found += [f"documents {extra}, which it does not take" for extra in known if extra not in signature]
     return [f"{name}: {fault}" for fault in found if fault]
@@ -189,6 +198,15 @@ def without_unit(speed: float, count: int) -> float:
     return speed * count
 
 
+def without_a_shared_unit(low: float, high: float) -> float:
+    """Something.
+
+    Args:
+        low, high: ends of the band.
+    """
+    return high - low
+
+
 def promises_more(speed: float, count: int) -> float:
     """Something.
 
@@ -200,11 +218,21 @@ def promises_more(speed: float, count: int) -> float:
     return speed * count
 
 
+@dataclasses.dataclass
+class HalfDescribed:
+    """Something."""
+
+    speed: float = dataclasses.field(metadata={"unit": "m/s", "meaning": "of the wind"})
+    angle: float = dataclasses.field(metadata={"unit": "rad"})
+
+
 @pytest.mark.parametrize(
     ("function", "fault"),
     [
+        (HalfDescribed, "argument angle is not documented"),
         (undocumented_argument, "argument speed is not documented"),
         (without_unit, "argument speed has no unit"),
+        (without_a_shared_unit, "argument high has no unit"),
         (promises_more, "documents colour, which it does not take"),
         (lambda: None, "no docstring"),
     ],

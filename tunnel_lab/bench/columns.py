@@ -88,9 +88,9 @@ def columns_of(session: Session) -> list[Column]:
 def _column(channel: Channel, pairs: list[ColumnPair], choices: ImportChoices) -> Column:
     import numpy as np
 
-    from tunnel_sim.files.importing.columns import guessed_angle_unit, guessed_time_unit, is_time
+    from tunnel_sim.files.importing.columns import guessed_angle_unit, guessed_time_unit, is_stated, is_time
     from tunnel_sim.files.importing.conditions import condition_of
-    from tunnel_sim.files.importing.inputs import is_input, is_stated
+    from tunnel_sim.files.importing.tables import is_input
 
     role: Role
     if any(channel is pair.time for pair in pairs) or (not pairs and is_time(channel)):

@@ -22,9 +22,7 @@ from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.files.plan_file import (
     STEPS_PER_SECOND,
     EffectTable,
-    NotNegative,
     PlanDocument,
-    Positive,
     ReleaseAngles,
     Repeats,
     Springs,
@@ -36,7 +34,7 @@ from tunnel_sim.files.plan_file import (
 )
 from tunnel_sim.files.reading import as_described, check_count, parse_json
 from tunnel_sim.files.rig_file import parse_rig
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel
+from tunnel_sim.files.toml_input import NotNegative, OneLine, Positive, SampleRate, StrictModel
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE, CampaignPlan
 from tunnel_sim.vocabulary.rig import Rig

@@ -9,7 +9,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect, Law, with_law
+from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
 from tunnel_sim.effects.parameters import (
     EQUATION,
     Circumstances,
@@ -26,12 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 
 @dataclass(frozen=True)
 class NonlinearYawMoment(Effect):
-    """An aerodynamic yaw moment that is not linear in the yaw angle.
-
-    Args:
-        coefficient: relative change of Ka per squared angle, 1/rad2.
-        exponent: power of the angle in the factor (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
-    """
+    """An aerodynamic yaw moment that is not linear in the yaw angle."""
 
     name = "nonlinear_yaw_moment"
     place = 9
@@ -42,33 +37,18 @@ class NonlinearYawMoment(Effect):
     signature = "Like cubic stiffness, but proportional to V² and absent with the wind off."
     references = ("Mansor & Passmore, J. Wind Eng. Ind. Aerodyn. 96 (2008) 1218",)
     example = (3.0,)
+    law_terms = ("moment_cubic", "moment_cubic_exponent")
 
     coefficient: float = parameter(
-        "κa",
-        "1/rad2",
-        "relative change of Ka per squared angle",
-        scale=1.0,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-100.0,
-        fit_upper=100.0,
-    )
-
+        "κa", "1/rad2", "relative change of Ka per squared angle",
+        scale=1.0, lower=-1e6, upper=1e6, fit_lower=-100.0, fit_upper=100.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"moment_cubic": self.coefficient, "moment_cubic_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
 class NonlinearYawDamping(Effect):
-    """Aerodynamic damping that depends on the yaw angle.
-
-    Args:
-        coefficient: relative change of Ca per squared angle, 1/rad2.
-        exponent: power of the angle in the factor (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
-    """
+    """Aerodynamic damping that depends on the yaw angle."""
 
     name = "nonlinear_yaw_damping"
     place = 11
@@ -81,23 +61,13 @@ class NonlinearYawDamping(Effect):
     )
     references = ("van der Pol, Phil. Mag. 2 (1926) 978, doi 10.1080/14786442608564127",)
     example = (20.0,)
+    law_terms = ("damping_quadratic", "damping_quadratic_exponent")
 
     coefficient: float = parameter(
-        "μa",
-        "1/rad2",
-        "relative change of Ca per squared angle",
-        scale=5.0,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-500.0,
-        fit_upper=500.0,
-    )
-
+        "μa", "1/rad2", "relative change of Ca per squared angle",
+        scale=5.0, lower=-1e6, upper=1e6, fit_lower=-500.0, fit_upper=500.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the factor (unchanged at 0.2 rad)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"damping_quadratic": self.coefficient, "damping_quadratic_exponent": self.exponent}
 
 
 #: Uncertainty of Cnr as a share of the first-order effect a·Cnβ, chosen from the errors in the tuning sets.
@@ -106,11 +76,7 @@ _UNSEEN_SHARE = 0.2
 
 @dataclass(frozen=True)
 class UnsteadyAeroLag(Effect):
-    """An aerodynamic moment that lags or leads the yaw angle.
-
-    Args:
-        lag: time constant in units of l/V, l/V.
-    """
+    """An aerodynamic moment that lags or leads the yaw angle."""
 
     name = "unsteady_aero_lag"
     place = 12
@@ -129,6 +95,7 @@ class UnsteadyAeroLag(Effect):
         "Jones, NACA Report 681 (1940)",
     )
     example = (1.5,)
+    law_terms = ("aero_lag",)
     tries = 2
     caveat = (
         "The Cnr after adding the lag describes the damping term alone; the lag damps the motion as well. In a "
@@ -154,19 +121,10 @@ class UnsteadyAeroLag(Effect):
         del runs
         return 0.0, _UNSEEN_SHARE * abs(self.lag * cn_beta)
 
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"aero_lag": self.lag}
-
 
 @dataclass(frozen=True)
 class FlowMisalignment(Effect):
-    """Flow at an angle to the rig's axis, which gives a steady yaw moment.
-
-    Args:
-        angle: angle of the flow against the rig's zero (at 20 m/s where it depends on the speed), rad.
-        exponent: power of the speed in the angle, dimensionless; 0 in the textbook form.
-    """
+    """Flow at an angle to the rig's axis, which gives a steady yaw moment."""
 
     name = "flow_misalignment"
     place = 15
@@ -190,20 +148,15 @@ class FlowMisalignment(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the flow angle in the moment law."""
         del drawn
-        if stated.wind_speed <= 0.0:
-            return with_law(run, flow_angle=self.angle)
-        grown = self.angle * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
-        return with_law(run, flow_angle=grown)
+        grown = self.angle
+        if stated.wind_speed > 0.0:
+            grown *= (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
+        return run.with_parameters({"flow_angle": grown})
 
 
 @dataclass(frozen=True)
 class WindSpeedOffset(Effect):
-    """A constant error of the stated wind speed.
-
-    Args:
-        offset: true minus stated speed (at 20 m/s where it depends on the speed), m/s.
-        exponent: power of the stated speed in the offset, dimensionless; 0 in the textbook form.
-    """
+    """A constant error of the stated wind speed."""
 
     name = "wind_speed_offset"
     place = 23
@@ -245,12 +198,7 @@ _SAMPLES = 201  # of an exponential drift, linear in between: within 1e-4 of the
 
 @dataclass(frozen=True)
 class WindSpeedDrift(Effect):
-    """A wind speed that drifts during the run.
-
-    Args:
-        drift: relative gain of speed over the run, dimensionless.
-        settling: length of the run over the drift's time constant, dimensionless; 0: linear (textbook form).
-    """
+    """A wind speed that drifts during the run."""
 
     name = "wind_speed_drift"
     place = 10
@@ -289,12 +237,7 @@ _INTERVAL = 1e-3  # s between samples of the random moment
 
 @dataclass(frozen=True)
 class Buffeting(Effect):
-    """A random moment from the turbulence of the stream.
-
-    Args:
-        intensity: standard deviation of the moment coefficient, dimensionless.
-        bandwidth: corner frequency of the moment's spectrum, Hz.
-    """
+    """A random moment from the turbulence of the stream."""
 
     name = "buffeting"
     place = 13
@@ -316,23 +259,13 @@ class Buffeting(Effect):
     random = "broad_band"
 
     intensity: float = parameter(
-        "s",
-        "1",
-        "standard deviation of the moment coefficient",
-        scale=0.003,
-        lower=0.0,
-        upper=1.0,
-        per_pressure=True,
-    )
+        "s", "1", "standard deviation of the moment coefficient",
+        scale=0.003, lower=0.0, upper=1.0, per_pressure=True,
+    )  # fmt: skip
     bandwidth: float = parameter(
-        "fb",
-        "Hz",
-        "corner frequency of the moment's spectrum",
-        scale=20.0,
-        lower=0.01,
-        upper=400.0,
-        default=20.0,
-    )
+        "fb", "Hz", "corner frequency of the moment's spectrum",
+        scale=20.0, lower=0.01, upper=400.0, default=20.0,
+    )  # fmt: skip
 
     def moment_density(self, rate: float) -> float:
         """That of the random moment's spectrum at the frequency of the motion."""
@@ -360,12 +293,7 @@ class Buffeting(Effect):
 
 @dataclass(frozen=True)
 class VortexShedding(Effect):
-    """A periodic moment from vortices shed by the body.
-
-    Args:
-        amplitude: coefficient of the moment, dimensionless.
-        strouhal_number: Strouhal number based on the body's width, dimensionless.
-    """
+    """A periodic moment from vortices shed by the body."""
 
     name = "vortex_shedding"
     place = 14
@@ -384,23 +312,14 @@ class VortexShedding(Effect):
         "c", "1", "coefficient of the moment", scale=0.01, lower=0.0, upper=5.0, per_pressure=True
     )
     strouhal_number: float = parameter(
-        "St",
-        "1",
-        "Strouhal number based on the body's width",
-        scale=0.15,
-        lower=0.001,
-        upper=2.0,
-        default=0.15,
-    )
+        "St", "1", "Strouhal number based on the body's width",
+        scale=0.15, lower=0.001, upper=2.0, default=0.15,
+    )  # fmt: skip
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with the phase drawn for the run."""
         del stated
         if self.is_null:
             return run
-        return with_law(
-            run,
-            shedding_amplitude=self.amplitude,
-            strouhal_number=self.strouhal_number,
-            shedding_phase=self.drawn_number(drawn),
-        )
+        shedding = {"shedding_amplitude": self.amplitude, "strouhal_number": self.strouhal_number}
+        return run.with_parameters(shedding | {"shedding_phase": self.drawn_number(drawn)})

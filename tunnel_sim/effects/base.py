@@ -1,4 +1,7 @@
-"""The base class of all effects: parameters with units, hooks where an effect acts, traits for finding it."""
+"""The base class of all effects: parameters, hooks where an effect acts, traits for finding it; a run's chain.
+
+The hooks of the effects of a run are called by its chain and nowhere else.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,10 @@ from typing import Any, ClassVar, Literal, TypeAlias, cast
 import numpy as np
 
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
-from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
 REFERENCE_SPEED = 20.0
 """Wind speed at which a speed-dependent form equals the textbook form, m/s."""
@@ -55,22 +58,18 @@ class Effect:
 
     Traits, with defaults that an effect overrides:
 
-    - ``random``: kind of spectrum of a random moment; empty where the effect is deterministic. Vortex shedding
-      has both a line and a spectrum, because its phase may be steady or wander.
+    - ``law_terms``: the moment law's parameters that the effect's own are, in their order; empty: none.
+    - ``random``: kind of spectrum of a random moment. Vortex shedding has a line too: its phase may wander or not.
     - ``line``: what sets the frequency of a periodic effect; its phase differs from run to run.
-    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run's
-      length), so that the motion is read at other times than stated.
-    - ``autonomous``: whether its moment and its reading depend on angle and rate alone, so that a stretch of a run
-      shows it as a whole run does.
-    - ``fitted``: whether a fit of the deterministic motion can find it. The other effects are read off the
-      records (``line``, ``lattice``) or found from their spectrum (``random``).
-    - ``on_spring``: whether its moment is in proportion to the spring's stiffness, so that it vanishes without one.
+    - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run).
+    - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
+    - ``fitted``: whether a fit of the deterministic motion can find it; else it is read off records or spectra.
+    - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
-    - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty where the
-      effect is not periodic in the angle.
+    - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
     - ``tries``: how many starting points of a fit are worth trying.
     - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own.
     - ``caveat``: how to read the coefficients that are reported with it.
@@ -85,6 +84,7 @@ class Effect:
     references: ClassVar[tuple[str, ...]]
     example: ClassVar[tuple[float, ...]]
 
+    law_terms: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
     line: ClassVar[Literal["", "mains", "shedding", "ringing"]] = ""
     skips: ClassVar[bool] = False
@@ -101,25 +101,23 @@ class Effect:
     caveat: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        """Check every parameter.
-
-        Raises:
-            TunnelError: when one is not a finite number within its bounds.
-        """
+        """Refuse a parameter that is not a finite number within its bounds."""
         for info in self.parameters():
             value = getattr(self, info.name)
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not (number and info.lower <= value <= info.upper and abs(value) < math.inf):
-                raise TunnelError(
-                    f"{info.name} = {value!r} is out of range",
-                    where=f"effect {self.name}",
-                    remedy=f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}",
-                )
+                what = f"{info.name} = {value!r} is out of range"
+                remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
+                raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
 
     @classmethod
+    @functools.cache
     def parameters(cls) -> tuple[ParameterInfo, ...]:
         """The effect's parameters, the severity first."""
-        return _parameters(cls)  # type: ignore[arg-type]  # mypy takes the instances' hash for the class's
+        return tuple(
+            ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
+            for own in dataclasses.fields(cls)
+        )
 
     @property
     def severity(self) -> float:
@@ -138,100 +136,47 @@ class Effect:
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Starting values for a fit.
-
-        Args:
-            campaign: what the values depend on.
-
-        Returns:
-            Starting values, the most promising first; empty where such a campaign cannot show the effect.
-        """
+        """Starting values for a fit, the most promising first; empty where a campaign cannot show the effect."""
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
 
     def plausible(self, omega: float) -> bool:
-        """Whether a fitted effect is still what its name means.
-
-        Args:
-            omega: angular frequency of the motion, rad/s.
-
-        Returns:
-            False where its parameters make it part of the motion itself.
-        """
+        """Whether a fitted effect is still what its name means, and not the motion (at omega, rad/s) itself."""
         del omega
         return True
 
     def stands(self, stiffness: float) -> float:
-        """How far from rest the effect holds a body that has stopped.
-
-        Args:
-            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment is.
-
-        Returns:
-            The greatest such angle, rad; 0 for an effect that holds none.
-        """
+        """How far from rest (rad) the effect holds a stopped body against a stiffness in N m/rad; 0: not at all."""
         del stiffness
         return 0.0
 
     def moment_density(self, rate: float) -> float:
-        """Spectral intensity of the effect's random moment, as if it were white.
-
-        Args:
-            rate: angular frequency of the motion, rad/s.
-
-        Returns:
-            q of the moment coefficient with the wind on, ⟨c(t)c(t′)⟩ = q δ(t − t′), s; 0 without a broad spectrum.
-        """
+        """Spectral intensity of the random moment coefficient at a rate, rad/s, as if it were white, s; else 0."""
         del rate
         return 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.
+        """Standard deviations of Cnβ and Cnr, 1/rad, due to the part of the effect's form that no free decay shows.
 
         Args:
             cn_beta: Cnβ as fitted, 1/rad.
-            runs: the campaign's wind-on runs.
-
-        Returns:
-            Standard deviations of Cnβ and Cnr, 1/rad.
         """
         del cn_beta, runs
         return 0.0, 0.0
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
-        """Draw the random part of the effect in one run.
-
-        Args:
-            rng: the generator of this effect in this run.
-
-        Returns:
-            The value passed to the hooks as ``drawn``.
-        """
+        """Draw the random part of the effect in one run, which the hooks get as ``drawn``."""
         del stated
         return float(rng.uniform(0.0, 2.0 * np.pi)) if self.line else None
 
     def drawn_number(self, drawn: Drawn) -> float:
-        """The phase or instant that a run drew; without it the effect would silently do nothing.
-
-        Returns:
-            A phase in rad, or an instant as a share of the run.
-
-        Raises:
-            TunnelError: when no number was drawn.
-        """
+        """The phase (rad) or instant (share of the run) that a run drew; without it the effect would do nothing."""
         if not isinstance(drawn, float):
             raise self._undrawn()
         return drawn
 
     def drawn_numbers(self, drawn: Drawn) -> Array:
-        """The random numbers that a run drew; without them the effect would silently do nothing.
-
-        Returns:
-            The numbers, shape (n,).
-
-        Raises:
-            TunnelError: when none were drawn.
-        """
+        """The random numbers that a run drew, shape (n,); without them the effect would silently do nothing."""
         if not isinstance(drawn, np.ndarray):
             raise self._undrawn()
         return drawn
@@ -250,24 +195,17 @@ class Effect:
 
     def law(self) -> Law:
         """The effect's parameters in the moment law, by name, for an effect that is a term of the law."""
-        return {}
+        values = (getattr(self, info.name) for info in self.parameters())
+        return dict(zip(self.law_terms, values, strict=False))
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Change the physics of a run; by default, set the effect's terms of the moment law.
-
-        Args:
-            run: as the earlier effects left it.
-        """
+        """Change the physics of a run, as earlier effects left it; by default, set the terms of the moment law."""
         del stated, drawn
         law = self.law()
-        return with_law(run, **law) if law else run
+        return run.with_parameters(law) if law else run
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
-        """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.
-
-        Returns:
-            The moment (N m) as a function of time (s), angle (rad) and rate (rad/s); None: not stated.
-        """
+        """The moment, N m, without the hooks, of time (s), angle (rad) and rate (rad/s); None: not stated."""
         del stated
         return None
 
@@ -275,10 +213,7 @@ class Effect:
         """Change when the motion is read.
 
         Args:
-            time_s: by the time stamps, s, shape (n,).
-
-        Returns:
-            The true times, s, shape (n,).
+            time_s: by the time stamps, s, shape (n,); returned are the true times.
         """
         del stated, drawn
         return time_s
@@ -289,9 +224,6 @@ class Effect:
         Args:
             angle: of the rod's upper end, rad, shape (n,).
             time_s: true times, s, shape (n,).
-
-        Returns:
-            The changed angle, rad, shape (n,).
         """
         del time_s, stated, drawn
         return angle
@@ -299,14 +231,11 @@ class Effect:
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
     ) -> Array | None:
-        """An oscillation that the sensor sees beside the body's.
+        """An oscillation that the sensor sees beside the body's, shape (n,), added to the angle or its derivative.
 
         Args:
             time_s: true times since the release, s, shape (n,).
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
-
-        Returns:
-            rad, rad/s or rad/s², shape (n,), which is added to the angle or its derivative; None: none.
         """
         del time_s, stated, drawn, derivative
         return None
@@ -316,56 +245,136 @@ class Effect:
         return sensor
 
     def on_reading(self, reading: Array) -> Array:
-        """Change the reading after noise and before quantisation.
-
-        Args:
-            reading: rad, shape (n,).
-
-        Returns:
-            The changed reading, rad, shape (n,).
-        """
+        """Change the reading (rad, shape (n,)) after noise and before quantisation."""
         return reading
 
     def to_json_dict(self) -> dict[str, Any]:
         """Name and parameters as plain JSON values."""
-        return {
-            "name": self.name,
-            "parameters": {info.name: getattr(self, info.name) for info in self.parameters()},
-        }
-
-
-@functools.cache
-def _parameters(kind: type[Effect]) -> tuple[ParameterInfo, ...]:
-    return tuple(
-        ParameterInfo(name=own.name, default=cast(float, own.default), **own.metadata)
-        for own in dataclasses.fields(kind)
-    )
+        parameters = {info.name: getattr(self, info.name) for info in self.parameters()}
+        return {"name": self.name, "parameters": parameters}
 
 
 def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
-    """An effect from named parameters.
-
-    Args:
-        kind: the effect's class.
-        parameters: by name, in their units.
-
-    Raises:
-        TunnelError: when a name is unknown or a value out of range.
-    """
+    """An effect from parameters by name, in their units."""
     known = [info.name for info in kind.parameters()]
     for name in parameters:
         if name not in known:
-            raise TunnelError(
-                f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=did_you_mean(name, known)
-            )
+            remedy = did_you_mean(name, known)
+            raise TunnelError(f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=remedy)
     return kind(**parameters)
 
 
-def with_law(run: RunSettings, **values: float) -> RunSettings:
-    """A copy of a run with parameters of the moment law added or replaced.
+@dataclass(frozen=True, eq=False)
+class EffectChain:
+    """The effects that act in one run, in their order, and the random part of each in this run."""
+
+    stated: RunSettings
+    effects: tuple[Effect, ...]
+    drawn: tuple[Drawn, ...]
+
+    @classmethod
+    def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
+        """Draw the random parts of effects, which never changes what is later drawn from ``rng`` itself."""
+        motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
+        drawn = tuple(
+            effect.draw(stated, of_sensor if _overrides(effect, *_SEEN) else of_motion)
+            for effect, of_motion, of_sensor in zip(effects, motion, sensor, strict=True)
+        )
+        return cls(stated, tuple(effects), drawn)
+
+    def physics(self) -> RunSettings:
+        """The physics of the run with the effects."""
+        run = self.stated
+        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+            run = effect.on_run(run, self.stated, drawn)
+        return run
+
+    @property
+    def skips(self) -> bool:
+        """Whether the motion is read at other times than stated."""
+        return any(effect.skips and not effect.is_null for effect in self.effects)
+
+    def true_times(self, time_s: Array) -> Array:
+        """When the motion is read: true times since the release, s, shape (n,), by the time stamps."""
+        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+            time_s = effect.on_time(time_s, self.stated, drawn)
+        return time_s
+
+    def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
+        """What the sensor sees of a motion before zero and noise: the angle, rad, or its derivative, shape (n,).
+
+        Args:
+            motion: of the rod's upper end, as long as `physics` asks for.
+            time_s: of the samples by their time stamps, s, shape (n,); need not be those of the motion.
+            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+        """
+        from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
+
+        true = self.true_times(time_s)
+        path = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
+        return self.angle(np.asarray(path(true, derivative), np.float64), true, derivative)
+
+    def angle(self, angle: Array, time_s: Array, derivative: int = 0) -> Array:
+        """The angle that the sensor measures, before zero and noise are added.
+
+        Args:
+            angle: of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
+            time_s: true times since the release, s, shape (n,).
+            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+        """
+        for effect, drawn in zip(self.effects, self.drawn, strict=True):
+            beside = effect.oscillation(time_s, self.stated, drawn, derivative)
+            seen = angle if beside is None else angle + beside
+            angle = effect.on_angle(seen, time_s, self.stated, drawn)
+        return angle
+
+    def sensor(self, sensor: SensorModel) -> SensorModel:
+        """The true sensor, given the stated one."""
+        for effect in self.effects:
+            sensor = effect.on_sensor(sensor)
+        return sensor
+
+    def reading(self, reading: Array) -> Array:
+        """Change the reading (rad, shape (n,)) after noise and before quantisation."""
+        for effect in self.effects:
+            reading = effect.on_reading(reading)
+        return reading
+
+    @property
+    def reads_plainly(self) -> bool:
+        """Whether no effect changes the measured angle or the reading."""
+        return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in self.effects)
+
+
+_SEEN = ("oscillation", "on_angle")
+
+
+def _overrides(effect: Effect, *hooks: str) -> bool:
+    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
+
+
+def read_motion(
+    motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
+) -> Record:
+    """The reading y = quantised(β + zero + noise) with the effects on sensor and reading; of unlimited range."""
+    angle, time = motion.angle, motion.time_s
+    if chain is not None and chain.skips:
+        time = time[: round(chain.stated.duration / (time[1] - time[0]))]
+        angle = chain.seen(motion, time)
+    elif chain is not None:
+        angle = chain.angle(angle, time)
+    sensor = sensor if chain is None else chain.sensor(sensor)
+    reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
+    if chain is not None:
+        reading = chain.reading(reading)
+    return Record(time, quantise(reading, sensor.resolution))
+
+
+def quantise(reading: Array, step: float) -> Array:
+    """Round to a multiple of the resolution.
 
     Args:
-        run: the run's physics.
-        **values: parameters of the law by name.
+        reading: rad, any shape.
+        step: rad; 0 leaves the reading as it is.
     """
-    return run.with_parameters(values)
+    return np.round(reading / step) * step if step > 0.0 else reading

@@ -20,7 +20,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.units import dimension, in_si
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.effects_schema import OwnEffectTable
+    pass
 
 #: What changes during a run: unit, and operation of the moment law.
 _INPUTS = {"b": ("rad", "angle"), "r": ("rad/s", "rate"), "t": ("s", "time"), "V": ("m/s", "speed")}
@@ -40,11 +40,7 @@ class Quantity:
 
     Args:
         unit: as `tunnel_sim.vocabulary.units.dimension` reads it.
-        scale: a typical value, in the unit.
-        lower: least value, in the unit.
-        upper: greatest value, in the unit.
-        default: value where none is given, in the unit.
-        meaning: one clause.
+        scale, lower, upper, default: a typical value, its bounds, and the value where none is given, in the unit.
     """
 
     unit: str
@@ -126,26 +122,17 @@ def expression_effect(
     reading: str | None = None,
     summary: str = "",
 ) -> type[Effect]:
-    """An effect whose moment or reading is an expression.
+    """An effect whose moment or reading is an expression; the class is not registered.
+
+    Its first parameter is the severity. Refused where the effect acts at its null, does nothing beyond it or
+    has no value somewhere.
 
     Args:
-        name: lower-case letters, digits and underscores.
-        channel: where it acts; ``sensor`` for a reading.
-        parameters: by name; the first is the severity.
-        condition: when it acts.
         moment: on the right-hand side of the equation of motion, N m: of the angle ``b`` (rad) and rate ``r``
             (rad/s) of the rod's upper end, the time ``t`` (s) since the run's start, the wind speed ``V`` (m/s),
             the stated stiffness ``Kr`` (N m/rad), ``omega`` = √(Kr/Izz) (rad/s) and the parameters.
         reading: rad: of ``y`` (rad), the reading without the effect, of ``t``, ``V``, ``Kr`` and ``omega`` as
             above and of the parameters.
-        summary: what it is, one sentence.
-
-    Returns:
-        The class; it is not registered.
-
-    Raises:
-        TunnelError: when a name is taken, a unit is unknown or does not fit, or the effect acts at its null, does
-            nothing beyond it or has no value somewhere.
     """
     text = moment if reading is None else reading
     if text is None or (moment is not None and reading is not None):
@@ -155,17 +142,22 @@ def expression_effect(
                           remedy="use sensor for a reading, and another channel for a moment")  # fmt: skip
     _check_names(parameters)
     formula = parse(text, frozenset(parameters) | (_MOMENT if reading is None else _READING))
-    units = {own: quantity.unit for own, quantity in parameters.items()}
-    _check_units(formula, units, "N m" if reading is None else "rad")
+    expected = "N m" if reading is None else "rad"
+    units = _UNITS | {own: quantity.unit for own, quantity in parameters.items()}
+    found = formula.dimension({own: dimension(unit) for own, unit in units.items()})
+    if found != dimension(expected):
+        what = f"{text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})"
+        raise TunnelError(what, remedy="correct the expression or the units of its parameters")
+    unused = [own for own in parameters if own not in formula.names]
+    if unused:
+        raise TunnelError(f"parameter {unused[0]} is not in {text!r}", remedy="use it or leave it out")
     _check_values(formula, parameters, "0" if reading is None else "y")
-    fields = [
-        (
-            own,
-            float,
-            parameter(own, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default),
+    fields = []
+    for own, q in parameters.items():
+        field = parameter(
+            own, q.unit, q.meaning, scale=q.scale, lower=q.lower, upper=q.upper, default=q.default
         )
-        for own, q in parameters.items()
-    ]
+        fields.append((own, float, field))
     first, *others = parameters.values()
     namespace: dict[str, Any] = {
         "name": name,
@@ -188,9 +180,8 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
         if not (name.isidentifier() and name.isascii()) or keyword.iskeyword(name):
             raise TunnelError(f"{name!r} is not a parameter's name", remedy="use letters, digits and _")
         if name in _WORDS or hasattr(ExpressionEffect, name):
-            raise TunnelError(
-                f"a parameter cannot be named {name!r}", remedy="choose a name that has no other meaning"
-            )
+            remedy = "choose a name that has no other meaning"
+            raise TunnelError(f"a parameter cannot be named {name!r}", remedy=remedy)
         if not all(quantity.lower <= value <= quantity.upper for value in (quantity.default, quantity.scale)):
             raise TunnelError(
                 f"parameter {name}: the default {quantity.default:g} or the scale {quantity.scale:g} is not from "
@@ -198,30 +189,12 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
                 remedy="correct lower, upper, scale or default",
             )
         if quantity.scale == 0.0:
-            raise TunnelError(
-                f"parameter {name}: the scale is 0", remedy="state a typical value as the scale"
-            )
+            remedy = "state a typical value as the scale"
+            raise TunnelError(f"parameter {name}: the scale is 0", remedy=remedy)
     severity = next(iter(parameters.values()), None)
     if severity is None or severity.default != 0.0:
-        raise TunnelError(
-            "the first parameter is not a severity",
-            remedy="give it the default 0, which removes the effect",
-        )
-
-
-def _check_units(formula: Expression, units: Mapping[str, str], expected: str) -> None:
-    known = {name: dimension(unit) for name, unit in {**_UNITS, **units}.items()}
-    found = formula.dimension(known)
-    if found != dimension(expected):
-        raise TunnelError(
-            f"{formula.text!r} is in {in_si(found)}, not in {expected} ({in_si(dimension(expected))})",
-            remedy="correct the expression or the units of its parameters",
-        )
-    unused = [name for name in units if name not in formula.names]
-    if unused:
-        raise TunnelError(
-            f"parameter {unused[0]} is not in {formula.text!r}", remedy="use it or leave it out"
-        )
+        remedy = "give it the default 0, which removes the effect"
+        raise TunnelError("the first parameter is not a severity", remedy=remedy)
 
 
 def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null: str) -> None:
@@ -236,34 +209,22 @@ def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null:
     without = tried["y"] if null == "y" else 0.0
     at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
     if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
-        raise TunnelError(
-            f"{formula.text!r} has no finite value somewhere in the motion of a rig",
-            remedy="avoid division by zero, and roots and logarithms of negative numbers",
-        )
+        what = f"{formula.text!r} has no finite value somewhere in the motion of a rig"
+        raise TunnelError(what, remedy="avoid division by zero, and roots and logarithms of negative numbers")
     if np.any(np.abs(at_null - without) > 1e-12):
-        raise TunnelError(
-            f"{formula.text!r} is not {null} at {severity} = 0",
-            remedy="write it so that the first parameter, the severity, removes the effect",
-        )
+        remedy = "write it so that the first parameter, the severity, removes the effect"
+        raise TunnelError(f"{formula.text!r} is not {null} at {severity} = 0", remedy=remedy)
     if np.all(np.abs(beyond - without) <= 1e-300):
         raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
 
 
 def read_effects(path: Path) -> tuple[type[Effect], ...]:
-    """The effects of an effects file.
+    """The effects of an effects file (docs/how-to/add-an-effect.md) in its order; they are not registered."""
+    from tunnel_sim.files.plan_file import EffectsDocument  # only here: slow to load
+    from tunnel_sim.files.toml_input import load_toml, validate
 
-    Args:
-        path: as described in docs/how-to/add-an-effect.md.
-
-    Returns:
-        Their classes in the file's order; they are not registered.
-
-    Raises:
-        TunnelError: for the first fault, with its place.
-    """
-    from tunnel_sim.files.effects_schema import read_effect_tables  # only here: slow to load
-
-    tables = read_effect_tables(path)
+    missing = "name an effects file; docs/how-to/add-an-effect.md has an example"
+    tables = validate(EffectsDocument, load_toml(path, missing=missing), path).effects
     names = [table.name for table in tables]
     found = []
     for table in tables:
@@ -271,27 +232,17 @@ def read_effects(path: Path) -> tuple[type[Effect], ...]:
         if names.count(table.name) > 1:
             raise TunnelError("is given twice", where=where, remedy="give every effect its own name")
         try:
-            found.append(_effect(table))
+            quantities: dict[str, Quantity] = {}
+            for name, given in table.parameters.items():
+                usual = given.scale if quantities else 0.0  # the first one is the severity
+                default = usual if given.default is None else given.default
+                meaning = given.meaning or f"parameter {name}"
+                sizes = (given.scale, given.lower, given.upper, default)
+                quantities[name] = Quantity(given.unit, *sizes, meaning)
+            stated = {
+                key: getattr(table, key) for key in ("channel", "condition", "moment", "reading", "summary")
+            }
+            found.append(expression_effect(table.name, parameters=quantities, **stated))
         except TunnelError as error:
             raise TunnelError(error.what, where=where, remedy=error.remedy) from error
     return tuple(found)
-
-
-def _effect(table: OwnEffectTable) -> type[Effect]:
-    severity = next(iter(table.parameters))
-    quantities = {}
-    for name, given in table.parameters.items():
-        usual = 0.0 if name == severity else given.scale
-        default = usual if given.default is None else given.default
-        quantities[name] = Quantity(
-            given.unit, given.scale, given.lower, given.upper, default, given.meaning or f"parameter {name}"
-        )
-    return expression_effect(
-        table.name,
-        channel=table.channel,
-        condition=table.condition,
-        moment=table.moment,
-        reading=table.reading,
-        summary=table.summary,
-        parameters=quantities,
-    )

@@ -1,7 +1,6 @@
 """The parameters of effects, and what a fit passes to an effect about the runs.
 
-Parameters are dataclass fields with their units, sizes and ranges. Drifts of several effects share one form:
-linear, or exponential towards a final value. An effect returns starting values to the fit.
+Drifts of several effects share one form: linear, or exponential towards a final value.
 """
 
 from __future__ import annotations
@@ -29,16 +28,11 @@ class ParameterInfo:
     """One parameter of an effect.
 
     Args:
-        name: field name, also in TOML and JSON.
-        symbol: as in the effect's equation.
         unit: SI, angles in rad.
         scale: a typical value for this rig, for steps and starting values.
-        lower: least value allowed, in the unit.
-        upper: greatest value allowed, in the unit.
+        lower, upper: least and greatest value allowed, in the unit.
         default: value where none is given, in the unit; zero for the severity.
-        form: whether it generalises the effect's form; its default gives the textbook form.
-        fit_lower: least value a fit of swings from `SWING` on may take, in the unit.
-        fit_upper: greatest value a fit of such swings may take, in the unit.
+        fit_lower, fit_upper: least and greatest value a fit of swings from `SWING` on may take, in the unit.
         rate_exponent: name of the parameter that is the power of the rate which it multiplies; empty: none.
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
@@ -62,14 +56,11 @@ class ParameterInfo:
     per_pressure: bool
 
     def fit_range(self, swing: float) -> tuple[float, float]:
-        """Least and greatest value that a fit may take.
+        """Least and greatest value that a fit may take, in the unit.
 
         Args:
             swing: largest angle of the motion, rad. Below `SWING` a coefficient per angle may be as much greater,
                 and a least angle is as much smaller: the shares of the moments stay as they are.
-
-        Returns:
-            Both, in the unit.
         """
         if "rad" not in self.unit or not 0.0 < swing < SWING:
             return self.fit_lower, self.fit_upper
@@ -120,7 +111,6 @@ def exponent(symbol: str, meaning: str, textbook: float) -> Any:
     """A form parameter that is the exponent of a term; its default is the textbook's.
 
     Args:
-        symbol: as in the effect's equation.
         textbook: exponent of the textbook form, dimensionless.
     """
     return parameter(
@@ -133,27 +123,17 @@ EQUATION = "(1 − e^(−k t/T))/(1 − e^(−k))"
 
 def settling() -> Any:
     """The form parameter of a drift: run length over the time constant; 0: linear, the textbook form."""
-    return parameter(
-        "k",
-        "1",
-        "length of the run over the drift's time constant",
-        scale=1.0,
-        lower=-30.0,
-        upper=30.0,
-        form=True,
-    )
+    meaning = "length of the run over the drift's time constant"
+    return parameter("k", "1", meaning, scale=1.0, lower=-30.0, upper=30.0, form=True)
 
 
 def ramp(part: Array, rate: float) -> Array:
-    """The share of a drift that has developed.
+    """The share of a drift that has developed, from 0 to 1 over the run, shape (n,).
 
     Args:
         part: elapsed share of the run, t/T, shape (n,).
         rate: run length over the drift's time constant, dimensionless ratio; below 0 the drift accelerates, at 0
             it is linear.
-
-    Returns:
-        From 0 to 1 over the run, shape (n,).
     """
     if rate == 0.0:
         return part
@@ -165,9 +145,7 @@ class Circumstances:
     """What the starting values for the fit of an effect depend on.
 
     Args:
-        springs: stated stiffnesses, ascending, N m/rad.
         greatest_reading: greatest absolute reading of any run, rad.
-        normalised: whether runs are fitted per unit inertia.
         slowest_wind: least stated speed of the runs with the wind on, m/s; 0 where there are none.
     """
 
@@ -182,10 +160,7 @@ class Trial:
     """Starting values for the fit of an effect.
 
     Args:
-        values: by parameter name; the others start at their defaults.
-        scaled: name of the parameter that linear theory rescales; None where the values are used as they are.
         at_most: greatest absolute value that linear theory may give it, in its unit.
-        replaces: name of the nominal parameter that is lowered by as much, down to zero; None for none.
     """
 
     values: Mapping[str, float]
@@ -200,10 +175,8 @@ class WindOnRun:
 
     Args:
         spring_stiffness: Kr, N m/rad.
-        omega: natural frequency with the wind on, rad/s.
-        still_omega: natural frequency of the same rig in still air, rad/s.
-        per_cn_beta: ½ρV²Al, which multiplies Cnβ, N m.
-        per_cn_r: ½ρVAl², which multiplies Cnr, N m s.
+        omega, still_omega: natural frequency with the wind on, and of the same rig in still air, rad/s.
+        per_cn_beta, per_cn_r: ½ρV²Al and ½ρVAl², which multiply Cnβ and Cnr, N m and N m s.
     """
 
     spring_stiffness: float
@@ -214,12 +187,5 @@ class WindOnRun:
 
 
 def moment_scale(info: ParameterInfo, campaign: Circumstances) -> float:
-    """Factor on a parameter's typical value: in normalised form moments are divided by about 0.1 kg m².
-
-    Args:
-        campaign: says whether runs are normalised.
-
-    Returns:
-        10 for a moment in normalised form, else 1.
-    """
+    """Factor on a typical value: 10 for a moment in normalised form, divided by about 0.1 kg m², else 1."""
     return 10.0 if campaign.normalised and info.unit.startswith("N m") else 1.0

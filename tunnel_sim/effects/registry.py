@@ -13,8 +13,7 @@ from pkgutil import iter_modules
 from typing import TypeVar, get_args
 
 from tunnel_sim.effects.base import Channel, Condition, Effect, make_effect
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
-from tunnel_sim.vocabulary.plugins import added_to, loading
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
 from tunnel_sim.vocabulary.units import dimension
 
 ENTRY_POINTS = "tunnel.effects"
@@ -30,23 +29,20 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
     "effects of the diagnosis under way", default=()
 )
 
-
-def _found() -> tuple[type[Effect], ...]:
-    """The effects that the package's modules define, by their place."""
-    room = __name__.rpartition(".")[0]
-    names = [f"{room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
-    modules = [import_module(name) for name in names if name != __name__]
-    defined = {
-        kind
-        for module in modules
-        for kind in vars(module).values()
-        if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
-    }
-    return tuple(sorted((kind for kind in defined if hasattr(kind, "place")), key=lambda kind: kind.place))
-
+_room = __name__.rpartition(".")[0]
+_names = [f"{_room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
+_modules = [import_module(name) for name in _names if name != __name__]
+_defined = {
+    kind
+    for module in _modules
+    for kind in vars(module).values()
+    if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
+}
 
 #: Every built-in effect, in the order of the vocabulary: a module of this package that defines one is enough.
-ALL_EFFECTS: tuple[type[Effect], ...] = _found()
+ALL_EFFECTS: tuple[type[Effect], ...] = tuple(
+    sorted((kind for kind in _defined if hasattr(kind, "place")), key=lambda kind: kind.place)
+)
 
 
 def known_effects() -> tuple[type[Effect], ...]:
@@ -57,25 +53,14 @@ def known_effects() -> tuple[type[Effect], ...]:
 
 
 def register_effect(kind: KindT) -> KindT:
-    """Add an effect of one's own to the vocabulary; as a decorator too.
-
-    Args:
-        kind: a frozen dataclass derived from `Effect`. It replaces an earlier one of the same name.
-
-    Raises:
-        TunnelError: when it has a built-in name, no severity, or lacks what the vocabulary needs.
-    """
+    """Add a frozen dataclass derived from `Effect` to the vocabulary, or replace one; a decorator too."""
     check_kind(kind)
     _registered[kind.name] = kind
     return kind
 
 
 def check_kind(kind: object) -> None:
-    """Refuse what cannot be an effect of the vocabulary.
-
-    Raises:
-        TunnelError: for the first fault.
-    """
+    """Refuse what cannot be an effect of the vocabulary."""
     where = f"effect {one_line(getattr(kind, 'name', kind))}"
     if not (isinstance(kind, type) and issubclass(kind, Effect) and dataclasses.is_dataclass(kind)):
         raise TunnelError("is not a class derived from Effect", where=where, remedy="derive it from Effect")
@@ -89,43 +74,29 @@ def check_kind(kind: object) -> None:
         raise TunnelError("is the name of a built-in effect", where=where, remedy="choose another name")
     for text, allowed in (("channel", get_args(Channel)), ("condition", get_args(Condition))):
         if getattr(kind, text) not in allowed:
-            raise TunnelError(
-                f"unknown {text} {getattr(kind, text)!r}",
-                where=where,
-                remedy=f"use one of {', '.join(allowed)}",
-            )
-    if not _has_null(kind):
-        raise TunnelError(
-            "the first parameter is its severity, whose default must be 0 within its bounds",
-            where=where,
-            remedy="declare its parameters with tunnel_sim.effects.parameters.parameter",
-        )
-    _readable_units(kind, where)
+            what = f"unknown {text} {getattr(kind, text)!r}"
+            raise TunnelError(what, where=where, remedy=f"use one of {', '.join(allowed)}")
+    try:
+        severity = kind.parameters()[0]
+        has_null = severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
+    except (TypeError, IndexError):  # not described, or none
+        has_null = False
+    if not has_null:
+        what = "the first parameter is its severity, whose default must be 0 within its bounds"
+        remedy = "declare its parameters with tunnel_sim.effects.parameters.parameter"
+        raise TunnelError(what, where=where, remedy=remedy)
+    for info in kind.parameters():  # the answer is converted from its unit
+        try:
+            dimension(info.unit)
+        except TunnelError as error:
+            place = f"{where}, parameter {info.name}"
+            raise TunnelError(error.what, where=place, remedy=error.remedy) from None
     if kind.line or kind.skips or kind.random or kind.lattice:
         raise TunnelError(
             "line, skips, random and lattice are for built-in effects, which are found by methods of their own",
             where=where,
             remedy="leave these traits at their defaults",
         )
-
-
-def _readable_units(kind: type[Effect], where: str) -> None:
-    """Refuse a unit that the answer could not be converted from, before any work is done."""
-    for info in kind.parameters():
-        try:
-            dimension(info.unit)
-        except TunnelError as error:
-            place = f"{where}, parameter {info.name}"
-            raise TunnelError(error.what, where=place, remedy=error.remedy) from None
-
-
-def _has_null(kind: type[Effect]) -> bool:
-    """Whether the parameters are described, and the severity can be zero."""
-    try:
-        severity = kind.parameters()[0]
-    except (TypeError, IndexError):
-        return False
-    return severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
 
 
 @functools.cache
@@ -138,14 +109,7 @@ def _load_entry_points() -> None:
 
 @contextmanager
 def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
-    """Within the block, effects that nobody registered are known by name.
-
-    Args:
-        kinds: the effects that a diagnosis may answer with.
-
-    Raises:
-        TunnelError: when one cannot be an effect of the vocabulary, or two have one name.
-    """
+    """Within the block, effects that nobody registered but a diagnosis may answer with are known by name."""
     own = [kind for kind in kinds if kind not in ALL_EFFECTS]
     for kind in own:
         check_kind(kind)
@@ -161,31 +125,16 @@ def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
 
 
 def effect_class(name: str) -> type[Effect]:
-    """The class of the effect with a given name.
-
-    Args:
-        name: such as ``coulomb_friction``.
-
-    Raises:
-        TunnelError: when there is none; the message suggests the closest name.
-    """
+    """The class of the effect with a given name, such as ``coulomb_friction``."""
     for kind in known_effects():
         if kind.name == name:
             return kind
-    raise TunnelError(
-        f"unknown effect {name!r}", remedy=did_you_mean(name, [kind.name for kind in known_effects()])
-    )
+    remedy = did_you_mean(name, [kind.name for kind in known_effects()])
+    raise TunnelError(f"unknown effect {name!r}", remedy=remedy)
 
 
 def the_effect(**traits: object) -> type[Effect]:
-    """The class of the only built-in effect with given traits.
-
-    Args:
-        **traits: as listed in `Effect`.
-
-    Raises:
-        LookupError: when there is none, or more than one.
-    """
+    """The class of the only built-in effect with given traits of `Effect`; a LookupError where there is not one."""
     found = [kind for kind in ALL_EFFECTS if all(getattr(kind, t) == v for t, v in traits.items())]
     if len(found) != 1:
         raise LookupError(f"{len(found)} effects have the traits {traits}")
@@ -193,13 +142,5 @@ def the_effect(**traits: object) -> type[Effect]:
 
 
 def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
-    """An effect by name.
-
-    Args:
-        name: such as ``coulomb_friction``.
-        parameters: by name, in their units; the others take their defaults.
-
-    Raises:
-        TunnelError: when a name is unknown or a value out of range.
-    """
+    """An effect by name, with parameters in their units; the others take their defaults."""
     return make_effect(effect_class(name), parameters)

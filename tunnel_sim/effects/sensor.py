@@ -1,4 +1,4 @@
-"""Effects of the sensor and its logger, and a second oscillation in the reading."""
+"""Effects of the sensor, its logger and the clock of the input, and a second oscillation in the reading."""
 
 from __future__ import annotations
 
@@ -20,13 +20,7 @@ _REFERENCE = 0.2  # rad: angle at which every exponent gives the same error
 
 @dataclass(frozen=True)
 class SensorNonlinearity(Effect):
-    """A sensor whose gain changes with the angle.
-
-    Args:
-        coefficient: cubic coefficient, 1/rad2.
-        exponent: power of the angle in the error (unchanged at 0.2 rad), dimensionless; 3 in the textbook form.
-        quadratic: coefficient of an additional quadratic error, 1/rad; 0 in the textbook form.
-    """
+    """A sensor whose gain changes with the angle."""
 
     name = "sensor_nonlinearity"
     place = 16
@@ -44,20 +38,11 @@ class SensorNonlinearity(Effect):
     coefficient: float = parameter(
         "s", "1/rad2", "cubic coefficient", scale=0.05, lower=-1e6, upper=1e6, fit_lower=-1.0, fit_upper=1.0
     )
-
     exponent: float = exponent("p", "power of the angle in the error (unchanged at 0.2 rad)", 3.0)
-
     quadratic: float = parameter(
-        "q",
-        "1/rad",
-        "coefficient of an additional quadratic error",
-        scale=0.02,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-1.0,
-        fit_upper=1.0,
-        form=True,
-    )
+        "q", "1/rad", "coefficient of an additional quadratic error",
+        scale=0.02, lower=-1e6, upper=1e6, fit_lower=-1.0, fit_upper=1.0, form=True,
+    )  # fmt: skip
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -81,13 +66,7 @@ class SensorNonlinearity(Effect):
 
 @dataclass(frozen=True)
 class SensorHysteresis(Effect):
-    """Backlash between rod and sensor.
-
-    Args:
-        half_width: half width of the play, rad.
-        roundness: relative difference k of two plays, (1 ± k) times as wide, whose mean is read, dimensionless;
-            0 in the textbook form.
-    """
+    """Backlash between rod and sensor."""
 
     name = "sensor_hysteresis"
     place = 18
@@ -108,14 +87,9 @@ class SensorHysteresis(Effect):
 
     half_width: float = parameter("w", "rad", "half width of the play", scale=0.001, lower=0.0, upper=0.2)
     roundness: float = parameter(
-        "k",
-        "1",
-        "relative difference of two plays whose mean is read",
-        scale=0.3,
-        lower=0.0,
-        upper=1.0,
-        form=True,
-    )
+        "k", "1", "relative difference of two plays whose mean is read",
+        scale=0.3, lower=0.0, upper=1.0, form=True,
+    )  # fmt: skip
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Follow when pushed; the release has just pushed the reading outward."""
@@ -129,12 +103,7 @@ class SensorHysteresis(Effect):
 
 @dataclass(frozen=True)
 class SensorDrift(Effect):
-    """A sensor zero that drifts during the run.
-
-    Args:
-        drift: drift over the run, rad.
-        settling: length of the run over the drift's time constant, dimensionless; 0: linear (textbook form).
-    """
+    """A sensor zero that drifts during the run."""
 
     name = "sensor_drift"
     place = 19
@@ -165,13 +134,7 @@ _FAR = 2.0  # rad: the other limit, where only one side clips
 
 @dataclass(frozen=True)
 class SensorClipping(Effect):
-    """A reading that saturates.
-
-    Args:
-        limit: greatest possible reading, rad; 0: no limit.
-        centre: middle of the possible readings, rad; 0 in the textbook form.
-        knee: share of the limit over which the reading saturates gradually, dimensionless; 0 in the textbook form.
-    """
+    """A reading that saturates."""
 
     name = "sensor_clipping"
     place = 21
@@ -191,14 +154,9 @@ class SensorClipping(Effect):
         "c", "rad", "middle of the possible readings", scale=0.05, lower=-5.0, upper=5.0, form=True
     )
     knee: float = parameter(
-        "k",
-        "1",
-        "share of the limit over which the reading saturates gradually",
-        scale=0.05,
-        lower=0.0,
-        upper=0.9,
-        form=True,
-    )
+        "k", "1", "share of the limit over which the reading saturates gradually",
+        scale=0.05, lower=0.0, upper=0.9, form=True,
+    )  # fmt: skip
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -228,11 +186,7 @@ class SensorClipping(Effect):
 
 @dataclass(frozen=True)
 class SensorQuantisation(Effect):
-    """A resolution that is coarser than stated.
-
-    Args:
-        step: true step of the reading, rad.
-    """
+    """A resolution that is coarser than stated."""
 
     name = "sensor_quantisation"
     place = 17
@@ -260,11 +214,7 @@ _MARGIN = 0.1  # s of motion beyond what is read: samples need not divide the ti
 
 @dataclass(frozen=True)
 class DroppedSamples(Effect):
-    """Samples missing without a gap in the time stamps.
-
-    Args:
-        lost_time: time that the missing samples would have taken, s; an equal part at each instant.
-    """
+    """Samples missing without a gap in the time stamps."""
 
     name = "dropped_samples"
     place = 25
@@ -316,12 +266,7 @@ class DroppedSamples(Effect):
 
 @dataclass(frozen=True)
 class MainsHum(Effect):
-    """Mains hum in the reading.
-
-    Args:
-        amplitude: amplitude of the hum, rad.
-        frequency: mains frequency, Hz.
-    """
+    """Mains hum in the reading."""
 
     name = "mains_hum"
     place = 20
@@ -358,14 +303,7 @@ _REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
 
 @dataclass(frozen=True)
 class SecondMode(Effect):
-    """A second oscillation beside the first, as of a bending sting or a coupled freedom.
-
-    Args:
-        amplitude: amplitude at the release, rad.
-        frequency: undamped angular frequency, rad/s.
-        damping_ratio: share of critical damping, dimensionless.
-        exponent: power of the release angle that the amplitude follows, dimensionless; 0 is the textbook's.
-    """
+    """A second oscillation beside the first, as of a bending sting or a coupled freedom."""
 
     name = "second_mode"
     place = 24
@@ -390,16 +328,9 @@ class SecondMode(Effect):
         "ω2", "rad/s", "undamped angular frequency", scale=50.0, lower=0.01, upper=1e5, default=50.0
     )
     damping_ratio: float = parameter(
-        "ζ2",
-        "1",
-        "share of critical damping",
-        scale=0.01,
-        lower=0.0,
-        upper=0.9,
-        default=0.01,
-        fit_lower=_LEAST_DAMPING,
-        fit_upper=0.2,
-    )
+        "ζ2", "1", "share of critical damping",
+        scale=0.01, lower=0.0, upper=0.9, default=0.01, fit_lower=_LEAST_DAMPING, fit_upper=0.2,
+    )  # fmt: skip
     exponent: float = parameter(
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
     )
@@ -433,3 +364,48 @@ class SecondMode(Effect):
             * np.cos(turn + phase + derivative * lead)
         )
         return np.asarray(wave if derivative == 0 else np.where(time_s >= 0.0, wave, 0.0), np.float64)
+
+
+@dataclass(frozen=True)
+class InputDelay(Effect):
+    """An input that acts later than its time stamps say.
+
+    It is exact for both holds and any delay: the integrator ends a step at each kink. Beyond its samples the
+    input keeps its first and its last value.
+    """
+
+    name = "input_delay"
+    place = 26
+    channel = "calibration"
+    condition = "always"
+    advice = (
+        "Record input and angle with one clock and equal filters, or correct the stamps of the input by τ"
+    )
+    equation = "u(t − τ) instead of the stated input u(t), in driven runs"
+    signature = (
+        "In driven runs the phase between input and angle falls by ωτ, over the whole band and in proportion to "
+        "the frequency; a free decay does not change."
+    )
+    references = ("Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall 1999",)
+    example = (0.02,)
+    autonomous = False
+    driven = True
+
+    delay: float = parameter(
+        "τ",
+        "s",
+        "time by which the input acts later than its stamp",
+        scale=0.002,
+        lower=-1.0,
+        upper=1.0,
+        fit_lower=-0.05,  # s, of a resonance of 2 Hz: a tenth of a period early
+        fit_upper=0.2,  # and four tenths of one late, below the delay that turns the phase by half a turn
+    )
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Shift the input; a free decay has none."""
+        del stated, drawn
+        if self.is_null or run.drive is None:
+            return run
+        later = dataclasses.replace(run.drive, delay=run.drive.delay + self.delay)
+        return dataclasses.replace(run, drive=later)

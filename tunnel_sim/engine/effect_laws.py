@@ -12,8 +12,7 @@ from functools import cache
 import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.base import make_effect
-from tunnel_sim.effects.chain import read_motion
+from tunnel_sim.effects.base import make_effect, read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
@@ -45,24 +44,16 @@ DRIVE = DriveMoment(_TIME, np.sin(2.0 * np.pi * (1.0 + 2.0 * _TIME) * _TIME))
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an effect obeys a law.
-
-    Args:
-        law: what is demanded.
-        fault: how it is violated; empty where it is obeyed.
-    """
+    """Whether an effect obeys a law; the fault is how it is violated, empty where it is obeyed."""
 
     law: str
     fault: str = ""
 
 
-def example(kind: type[Effect]) -> Effect:
-    """The effect with the values at which its class says that it is visible."""
-    return make_effect(kind, _values(kind))
-
-
-def _values(kind: type[Effect]) -> dict[str, float]:
-    return dict(zip((info.name for info in kind.parameters()), kind.example, strict=False))
+def example(kind: type[Effect], **changed: float) -> Effect:
+    """The effect with the values at which its class says that it is visible, some of them changed."""
+    values = dict(zip((info.name for info in kind.parameters()), kind.example, strict=False))
+    return make_effect(kind, values | changed)
 
 
 def stated(kind: type[Effect], run: RunSettings = WIND_ON) -> RunSettings:
@@ -100,7 +91,7 @@ def _same(one: Record, other: Record) -> bool:
 
 def null(kind: type[Effect]) -> str:
     """At zero severity the record is bit-identical to one without the effect."""
-    elsewhere = make_effect(kind, {**_values(kind), kind.parameters()[0].name: 0.0})
+    elsewhere = example(kind, **{kind.parameters()[0].name: 0.0})
     bare = _bare(windy=True, driven=kind.driven)
     changed = [not _same(_record((effect,), stated(kind)), bare) for effect in (kind(), elsewhere)]
     return "the record changes although the severity is 0" if any(changed) else ""
@@ -230,23 +221,15 @@ LAWS: Mapping[str, Callable[[type[Effect]], str]] = {
 
 
 def check(kind: type[Effect]) -> list[Verdict]:
-    """Hold an effect to every law.
-
-    Args:
-        kind: the effect, registered or not.
-
-    Returns:
-        One verdict for each of `LAWS`, in their order; none for the oracle where the class states none, and none
-        for free decays where the effect acts on them. An exception of the effect's own code is a fault.
-    """
+    """Hold an effect to every law that applies to it, in the order of `LAWS`; an exception is a fault."""
     unstated = kind.moment_oracle is Effect.moment_oracle
     left_out = [law for law, absent in ((oracle, unstated), (free, not kind.driven)) if absent]
-    return [_verdict(kind, holds) for holds in LAWS.values() if holds not in left_out]
-
-
-def _verdict(kind: type[Effect], holds: Callable[[type[Effect]], str]) -> Verdict:
-    try:
-        fault = holds(kind)
-    except Exception as error:  # code of others: whatever it raises is a fault of it
-        fault = one_line(str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}")
-    return Verdict(" ".join((holds.__doc__ or "").split()).rstrip("."), fault)
+    verdicts = []
+    for law in (law for law in LAWS.values() if law not in left_out):
+        try:
+            fault = law(kind)
+        except Exception as error:  # code of others: whatever it raises is a fault of it
+            name = "" if isinstance(error, TunnelError) else f"{type(error).__name__}: "
+            fault = one_line(f"{name}{error}")
+        verdicts.append(Verdict(" ".join((law.__doc__ or "").split()).rstrip("."), fault))
+    return verdicts

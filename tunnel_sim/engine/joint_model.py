@@ -1,10 +1,20 @@
-"""A model of one's own, MJCF or URDF, with one joint that moves: reading it, and the law of that joint."""
+"""A model of one's own, MJCF or URDF, with one joint that moves: its files, and the law of that joint.
+
+The files are found by the names in the text, and read before MuJoCo sees any of them. MuJoCo is given their
+content, so it opens no file, and the model stays the same however often it is compiled.
+"""
 
 from __future__ import annotations
 
+import html
 import json
 import math
-from collections.abc import Sequence
+import os
+import posixpath  # MuJoCo's names have slashes everywhere
+import re
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -13,13 +23,151 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.engine.model import load_plugin
-from tunnel_sim.engine.model_files import ModelFiles, engine_refusals, read_model_files
 from tunnel_sim.engine.simulate import no_log
+from tunnel_sim.files.reading import check_count, decoded, read_regular, read_text
 from tunnel_sim.processes import LimitReached, in_limited_process
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import FREE_PARAMETERS, JointLaw, Term
+
+_VALUE = r"\s*=\s*(\"[^\"]*\"|'[^']*')"
+_DOCUMENT = re.compile(r"<(?:include|model)\s[^<>]*?\bfile" + _VALUE)
+_FILE = re.compile(r"\bfile(?:name|up|down|left|right|front|back)?" + _VALUE)
+_FOLDER = re.compile(r"\b(?:asset|mesh|texture)dir" + _VALUE)
+_STRIPPED = re.compile(
+    r"<robot\b|\bstrippath\s*=\s*[\"']true"
+)  # MuJoCo takes the last part of a URDF's names
+_MOST_FOLDERS = 20  # of a model: each name is looked for in each
+_SMALLER = "leave out what the motion of the joint does not need"
+
+
+@dataclass(frozen=True)
+class ModelFiles:
+    """The content of a model's files: its MJCF or URDF, and further XML and assets by the name MuJoCo asks for."""
+
+    text: str
+    documents: Mapping[str, bytes]
+    assets: Mapping[str, bytes]
+
+    def spec(self) -> mujoco.MjSpec:
+        """The model's specification, read again."""
+        load_plugin()
+        with engine_refusals("MuJoCo cannot load it", "correct the file"):
+            return mujoco.MjSpec.from_string(self.text, include=self.documents, assets=dict(self.assets))
+
+    def to_bytes(self) -> bytes:
+        """The sizes in one line of JSON, then the contents."""
+        parts = [{"": self.text.encode()}, self.documents, self.assets]
+        sizes = [{name: len(content) for name, content in part.items()} for part in parts]
+        contents = [content for part in parts for content in part.values()]
+        return b"".join([json.dumps(sizes).encode(), b"\n", *contents])
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> ModelFiles:
+        """The files of `to_bytes`."""
+        at = content.index(b"\n") + 1
+        parts: list[dict[str, bytes]] = []
+        for sizes in json.loads(content[:at]):
+            parts.append({})
+            for name, size in sizes.items():
+                parts[-1][name] = content[at : at + size]
+                at += size
+        return cls(parts[0][""].decode(), parts[1], parts[2])
+
+
+def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
+    """Read a model and the files that it names, from its own folder or the further one."""
+    text, where = read_text(path, limits.MODEL_BYTES, missing="name an MJCF or URDF file"), shown(path)
+    folders, stripped = {""}, False
+    names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
+    documents: dict[str, bytes] = {}
+    assets: dict[str, bytes] = {}
+    left = [("", text)]
+    while left:
+        folder, document = left.pop()
+        first, *others = document.split("<!--")
+        document = first + "".join(one.partition("-->")[2] for one in others)
+        folders.update(_values(_FOLDER, document))
+        stripped |= _STRIPPED.search(document) is not None
+        inner = _values(_DOCUMENT, document)
+        names |= dict.fromkeys((folder, name) for name in _values(_FILE, document) if name not in inner)
+        count = len(names) + len(documents) + len(inner)
+        check_count(count, limits.MODEL_FILES, "names of files", where, _SMALLER)
+        for place in (place for name in inner for place in _places(name, ("", folder), ("",))):
+            content = None if place in documents else _content(path, asset_dir, place, limits.MODEL_BYTES)
+            if content is not None:
+                documents[place] = content
+                size = sum(map(len, documents.values()))
+                check_count(size, limits.MODEL_BYTES, "bytes of XML", where, _SMALLER)
+                left.append((posixpath.dirname(place), decoded(content, shown(path.parent / place))))
+    if len(folders) > _MOST_FOLDERS:
+        raise TunnelError(f"names {len(folders) - 1} folders", where=where, remedy="use one meshdir")
+    missing = []
+    for folder, name in names:
+        own = (name, posixpath.basename(name)) if stripped else (name,)
+        places = {place: None for one in own for place in _places(one, ("", folder), folders)}
+        for place in places.keys() - assets.keys():
+            content = _content(path, asset_dir, place, limits.ASSET_BYTES)
+            if content is not None:
+                assets[place] = content
+                size = sum(map(len, assets.values()))
+                check_count(size, limits.ASSET_BYTES, "bytes of meshes and images", where, _SMALLER)
+        if not places.keys() & assets.keys():
+            missing.append(name)
+    # MuJoCo would take a file of the same name from another folder in its place.
+    taken = {posixpath.basename(place).lower() for place in assets}
+    for name in missing:
+        if posixpath.basename(name).lower() in taken:
+            what = f"names {one_line(name)!r}, which is not there"
+            raise TunnelError(what, where=where, remedy="check the path")
+    return ModelFiles(text, documents, assets)
+
+
+def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> bytes | None:
+    """The content of a file of a model; None where there is none."""
+    path = model.parent / place
+    try:
+        if not os.path.lexists(path):
+            return None
+        real = Path(os.path.realpath(path))
+    except ValueError:
+        return None
+    if path.is_dir():  # a name that is put together from a folder of other files
+        return None
+    roots = [Path(os.path.realpath(one)) for one in (model.parent, asset_dir) if one is not None]
+    if not any(real.is_relative_to(root) for root in roots):
+        what = f"names {one_line(place)!r}, which is outside the model's folder"
+        remedy = "move it there, or name its folder with --asset-dir"
+        raise TunnelError(what, where=shown(model), remedy=remedy)
+    return read_regular(path, limit)
+
+
+def _places(name: str, bases: Sequence[str], folders: Iterable[str]) -> list[str]:
+    """Where a file may be, as MuJoCo would name it from the model's folder."""
+    name = name.replace("\\", "/")
+    found = (posixpath.join(base, folder, name) for base in bases for folder in folders)
+    return list(dict.fromkeys(posixpath.normpath(one) for one in found))
+
+
+def _values(pattern: re.Pattern[str], text: str) -> set[str]:
+    """The values of an attribute, those that are empty left out."""
+    return {html.unescape(found[1][1:-1]) for found in pattern.finditer(text)} - {""}
+
+
+@contextmanager
+def engine_refusals(what: str, remedy: str, where: str = "") -> Iterator[None]:
+    """Convert what MuJoCo raises for a model; its warnings are left out."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        said = one_line(" ".join(str(error).split()), 300)
+        if isinstance(error, MemoryError) or "unknown exception" in said:  # std::bad_alloc, std::length_error
+            said = "not enough memory, or a size out of range"
+        raise TunnelError(f"{what} ({said})", where=where, remedy=remedy) from error
+
 
 _GRID = 361  # positions at which the moment is tabulated
 _EXACT = 1e-8  # of the greatest moment: what the terms of the law may leave, the engine's own rounding
@@ -38,14 +186,7 @@ _TYPES = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_S
 
 @dataclass(frozen=True, eq=False)
 class JointModel:
-    """A model whose only joint that moves is the one recorded.
-
-    Args:
-        path: of the file.
-        joint: its name.
-        law: of the joint.
-        files: the content of the file and of those that it names.
-    """
+    """A model whose only joint that moves is the one recorded."""
 
     path: Path
     joint: str
@@ -62,45 +203,40 @@ def read_joint_model(
 ) -> JointModel:
     """Read a model, and the law of one joint from the engine's moments, in a process with limits.
 
+    The law is exact: the restoring moment is that of gravity and springs over the whole turn (for a slide,
+    over twice the reach).
+
     Args:
-        path: MJCF, or URDF that MuJoCo loads.
-        joint: a hinge or slide, the only joint that moves.
         reach: greatest displacement from rest in the records, rad (m for a slide).
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
             where the joint has a spring beside gravity.
-        asset_dir: a further folder in which its files may be, beside the model's own.
-
-    Returns:
-        The model. Its law is exact: the restoring moment is that of gravity and springs over the whole turn (for a
-        slide, over twice the reach).
-
-    Raises:
-        TunnelError: when a file of it is refused, MuJoCo refuses it, another joint moves, there is contact, a limit
-            or another constraint in the path, the joint does not oscillate, its moment is not of a kind that the
-            law has, or all this takes longer or more memory than the limits allow.
     """
     files = read_model_files(path, asset_dir)
     request = json.dumps([joint, reach]).encode() + b"\n" + files.to_bytes()
     try:
-        answer = json.loads(
-            in_limited_process(
-                law_of_request,
-                request,
-                prepare=prepare,
-                seconds=limits.MODEL_SECONDS,
-                memory=limits.MODEL_MEMORY,
-            )
+        found = in_limited_process(
+            law_of_request, request, prepare=prepare, seconds=limits.MODEL_SECONDS, memory=limits.MODEL_MEMORY
         )
     except LimitReached as error:
         remedy = "leave out what the motion of the joint does not need"
         raise TunnelError(f"loading it {error}", where=shown(path), remedy=remedy) from None
+    answer = json.loads(found)
     if "what" in answer:
         where = f"{shown(path)}, joint {one_line(joint)!r}"
         raise TunnelError(answer["what"], where=where, remedy=answer["remedy"])
     law = JointLaw(**{**answer["law"], "terms": tuple(Term(**one) for one in answer["law"]["terms"])})
     gravity = any(term.expression.startswith(("sin", "cos")) for term in law.terms)
     usual = ("inertia", "damping", *(("stiffness",) if answer["spring"] and gravity else ()), "rest")
-    return JointModel(path, joint, _with_free(law, usual if free is None else tuple(free)), files)
+    fitted = usual if free is None else tuple(free)
+    for name in fitted:
+        if name not in FREE_PARAMETERS:
+            what, remedy = f"unknown parameter {one_line(name)!r}", did_you_mean(name, FREE_PARAMETERS)
+            raise TunnelError(what, where="--free", remedy=remedy)
+    if {"inertia", "stiffness"} <= set(fitted) and not law.terms:
+        what = "inertia and stiffness of a linear spring cannot both be found from free decays"
+        raise TunnelError(what, where="--free", remedy="name one of the two")
+    law = replace(law, free=tuple(name for name in FREE_PARAMETERS if name in fitted))
+    return JointModel(path, joint, law, files)
 
 
 def prepare() -> None:
@@ -111,74 +247,35 @@ def prepare() -> None:
 
 
 def law_of_request(request: bytes) -> bytes:
-    """The law of a joint, for `read_joint_model` in a process with limits.
-
-    Args:
-        request: joint and reach as JSON in a line, then the files.
-
-    Returns:
-        As JSON the law, and whether the joint has a spring; or what is refused, and the remedy.
-    """
+    """The law of a joint, or what is refused, as JSON; the request is joint and reach as JSON, then the files."""
     at = request.index(b"\n") + 1
     joint, reach = json.loads(request[:at])
     try:
         with no_log(), np.errstate(all="ignore"):
             with engine_refusals("MuJoCo cannot load it", "correct the file"):
                 model = ModelFiles.from_bytes(request[at:]).spec().compile()
-            law = _law(model, reach, slide=_checked_joint(model, joint) == "slide")
+            if not model.opt.timestep > 0.0:
+                remedy = "correct the model's option"
+                raise TunnelError(f"its timestep of {model.opt.timestep} s is not above zero", remedy=remedy)
+            names = [model.joint(i).name for i in range(model.njnt)]
+            if joint not in names:
+                known = [name for name in names if name]
+                remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
+                raise TunnelError("there is no such joint", remedy=remedy)
+            others = [name or "without a name" for name in names if name != joint]
+            if others:
+                remedy = "remove them, so that the bodies are welded; one joint is recorded"
+                raise TunnelError(f"other joints move too: {one_line(', '.join(others), 200)}", remedy=remedy)
+            if model.neq or model.nflex or model.na:
+                what = "equality constraints, deformable bodies and actuators with states cannot be part of the law"
+                raise TunnelError(what, remedy="remove them")
+            kind = _TYPES.get(int(model.jnt_type[0]))
+            if kind is None:
+                raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
+            law = _law(model, reach, slide=kind == "slide")
     except TunnelError as error:
         return json.dumps({"what": error.what, "remedy": error.remedy}).encode()
     return json.dumps({"law": asdict(law), "spring": bool(model.jnt_stiffness[0])}).encode()
-
-
-def _with_free(law: JointLaw, free: tuple[str, ...]) -> JointLaw:
-    for name in free:
-        if name not in FREE_PARAMETERS:
-            raise TunnelError(
-                f"unknown parameter {one_line(name)!r}",
-                where="--free",
-                remedy=did_you_mean(name, FREE_PARAMETERS),
-            )
-    if {"inertia", "stiffness"} <= set(free) and not law.terms:
-        raise TunnelError(
-            "inertia and stiffness of a linear spring cannot both be found from free decays",
-            where="--free",
-            remedy="name one of the two",
-        )
-    return replace(law, free=tuple(name for name in FREE_PARAMETERS if name in free))
-
-
-def _checked_joint(model: mujoco.MjModel, joint: str) -> str:
-    """The kind of the only joint.
-
-    Raises:
-        TunnelError: when the joint is missing, of another kind, or not the only one, or a constraint holds it, or
-            the model cannot be simulated.
-    """
-    if not model.opt.timestep > 0.0:
-        raise TunnelError(
-            f"its timestep of {model.opt.timestep} s is not above zero", remedy="correct the model's option"
-        )
-    names = [model.joint(i).name for i in range(model.njnt)]
-    if joint not in names:
-        known = [name for name in names if name]
-        remedy = did_you_mean(joint, known) if known else "give the joint a name in the file"
-        raise TunnelError("there is no such joint", remedy=remedy)
-    others = [name or "without a name" for name in names if name != joint]
-    if others:
-        raise TunnelError(
-            f"other joints move too: {one_line(', '.join(others), 200)}",
-            remedy="remove them, so that the bodies are welded; one joint is recorded",
-        )
-    if model.neq or model.nflex or model.na:
-        raise TunnelError(
-            "equality constraints, deformable bodies and actuators with states cannot be part of the law",
-            remedy="remove them",
-        )
-    kind = _TYPES.get(int(model.jnt_type[0]))
-    if kind is None:
-        raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
-    return kind
 
 
 class _Engine:
@@ -193,9 +290,8 @@ class _Engine:
         mujoco.mj_forward(self.model, self.data)
         moment = float(self.data.qfrc_passive[0] + self.data.qfrc_actuator[0] - self.data.qfrc_bias[0])
         if not abs(moment) <= limits.LARGEST_NUMBER:
-            raise TunnelError(
-                "its moment overflows", remedy="correct gravity, masses and stiffness, in SI units"
-            )
+            remedy = "correct gravity, masses and stiffness, in SI units"
+            raise TunnelError("its moment overflows", remedy=remedy)
         return moment
 
     def inertia(self) -> float:
@@ -206,30 +302,60 @@ class _Engine:
 
 
 def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
+    from scipy.optimize import brentq  # only here: slow to load
+
     engine = _Engine(model)
     centre = float(model.qpos0[0])
-    rest = _rest(engine, centre, 10.0 * reach if slide else math.pi)
+    # The stable rest position closest to the model's own configuration.
+    around = 10.0 * reach if slide else math.pi
+    grid = centre + np.linspace(-around, around, _GRID) * (1.0 + 1e-9)
+    moments = np.array([engine.moment(x) for x in grid])
+    moments[np.abs(moments) < 1e-12 * np.max(np.abs(moments))] = 0.0
+    falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
+    if falls.size == 0:
+        what = "does not oscillate: it has no stable rest position nearby"
+        raise TunnelError(what, remedy="add the spring, or gravity, that restores it")
+    at = falls[np.argmin(np.abs(grid[falls] - centre))]
+    rest = float(grid[at])
+    if engine.moment(rest) > 0.0:  # rest lies between the grid's positions
+        rest = float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
     span = 2.0 * reach if slide else math.pi
     b = np.linspace(-span, span, _GRID)
     restoring = np.array([-engine.moment(rest + x) for x in b])
     terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
     if terms is None:
-        raise TunnelError(
-            "its restoring moment is not that of gravity and of springs up to the third power",
-            remedy="write tendons, dead bands and actuators as the joint's own stiffness",
-        )
+        what = "its restoring moment is not that of gravity and of springs up to the third power"
+        raise TunnelError(what, remedy="write tendons, dead bands and actuators as the joint's own stiffness")
     stiffness = terms.pop("b", 0.0)
-    _check_path(engine, rest, reach)
+    own = int(model.dof_frictionloss[0] > 0.0)
+    for x in np.linspace(-reach, reach, _GRID // 4):  # nothing else may act within the records' reach
+        engine.moment(rest + float(x))
+        if engine.data.ncon:
+            pair = [model.geom(g).name or f"geom {g}" for g in engine.data.contact.geom[0]]
+            raise TunnelError(
+                f"{' and '.join(map(one_line, pair))} touch at {rest + x:.3g} rad, within the records' reach",
+                remedy="exclude the contact, or set contype and conaffinity to 0",
+            )
+        if engine.data.nefc > own:
+            what = f"a limit or another constraint acts at {rest + x:.3g} rad, within the records' reach"
+            raise TunnelError(what, remedy="widen the joint's range, or check the units of range and records")
     inertias = [(engine.moment(rest + x), engine.inertia())[1] for x in (0.0, 0.4 * span, -0.7 * span)]
     if not limits.SMALLEST_NUMBER <= inertias[0] <= limits.LARGEST_NUMBER:
-        raise TunnelError(
-            f"its inertia is {inertias[0]:g} kg m2", remedy="correct its axis and the masses, in SI units"
-        )
+        remedy = "correct its axis and the masses, in SI units"
+        raise TunnelError(f"its inertia is {inertias[0]:g} kg m2", remedy=remedy)
     if np.ptp(inertias) > _EXACT * inertias[0]:
         raise TunnelError("its inertia changes with its position", remedy="remove the tendon's armature")
     if not stiffness > 0.0:
         raise TunnelError("does not oscillate: nothing restores it", remedy="add the spring, or gravity")
-    damping = _damping(engine, rest, math.sqrt(stiffness / inertias[0]) * reach, stiffness * reach)
+    rates, scale = _RATES * (math.sqrt(stiffness / inertias[0]) * reach), stiffness * reach
+    lost = np.array([engine.moment(rest) - engine.moment(rest, r) for r in rates])
+    damping = _fitted(_DAMPING, {"r": rates}, lost, scale)
+    elsewhere = engine.moment(rest + 0.1) - engine.moment(rest + 0.1, rates[-1])
+    if damping is None or abs(elsewhere - lost[-1]) > _EXACT * scale:
+        raise TunnelError(
+            "it has losses other than the joint's own damping and frictionloss, such as a fluid's",
+            remedy="write them as damping, or leave them out: the diagnosis looks for them",
+        )
     linear = damping.pop("r", 0.0)
     units = dict((*_MOMENTS, *_DAMPING))
     return JointLaw(
@@ -241,25 +367,6 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
         tuple(Term(text, value, units[text]) for text, value in {**terms, **damping}.items()),
         slide=slide,
     )
-
-
-def _rest(engine: _Engine, centre: float, span: float) -> float:
-    """The stable rest position closest to the model's own configuration."""
-    from scipy.optimize import brentq  # only here: slow to load
-
-    grid = centre + np.linspace(-span, span, _GRID) * (1.0 + 1e-9)
-    moments = np.array([engine.moment(x) for x in grid])
-    moments[np.abs(moments) < 1e-12 * np.max(np.abs(moments))] = 0.0
-    falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
-    if falls.size == 0:
-        raise TunnelError(
-            "does not oscillate: it has no stable rest position nearby",
-            remedy="add the spring, or gravity, that restores it",
-        )
-    at = falls[np.argmin(np.abs(grid[falls] - centre))]
-    if engine.moment(grid[at]) <= 0.0:  # rest lies on the grid
-        return float(grid[at])
-    return float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
 
 
 def _fitted(
@@ -282,35 +389,3 @@ def _fitted(
     if np.max(np.abs(columns @ found - wanted)) > _EXACT * scale:
         return None
     return {text: float(value) for (text, _), value in zip(forms, found, strict=True) if value != 0.0}
-
-
-def _damping(engine: _Engine, rest: float, rate: float, scale: float) -> dict[str, float]:
-    rates = _RATES * rate
-    lost = np.array([engine.moment(rest) - engine.moment(rest, r) for r in rates])
-    found = _fitted(_DAMPING, {"r": rates}, lost, scale)
-    elsewhere = engine.moment(rest + 0.1) - engine.moment(rest + 0.1, rates[-1])
-    if found is None or abs(elsewhere - lost[-1]) > _EXACT * scale:
-        raise TunnelError(
-            "it has losses other than the joint's own damping and frictionloss, such as a fluid's",
-            remedy="write them as damping, or leave them out: the diagnosis looks for them",
-        )
-    return found
-
-
-def _check_path(engine: _Engine, rest: float, reach: float) -> None:
-    """Refuse contacts, limits and other constraints within the records' reach."""
-    model, data = engine.model, engine.data
-    own = int(model.dof_frictionloss[0] > 0.0)
-    for x in np.linspace(-reach, reach, _GRID // 4):
-        engine.moment(rest + float(x))
-        if data.ncon:
-            pair = [model.geom(g).name or f"geom {g}" for g in data.contact.geom[0]]
-            raise TunnelError(
-                f"{' and '.join(map(one_line, pair))} touch at {rest + x:.3g} rad, within the records' reach",
-                remedy="exclude the contact, or set contype and conaffinity to 0",
-            )
-        if data.nefc > own:
-            raise TunnelError(
-                f"a limit or another constraint acts at {rest + x:.3g} rad, within the records' reach",
-                remedy="widen the joint's range, or check the units of range and records",
-            )

@@ -12,22 +12,15 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from tunnel_sim.engine.joint_model import JointModel
-from tunnel_sim.engine.model_files import engine_refusals
+from tunnel_sim.engine.joint_model import JointModel, engine_refusals
 from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
-_AIR = (
-    "air_density",
-    "wind_speed",
-    "frontal_area",
-    "reference_length",
-    "cn_beta",
-    "cn_r",
-)  # the plugin wants them
+# the plugin wants them
+_AIR = ("air_density", "wind_speed", "frontal_area", "reference_length", "cn_beta", "cn_r")
 _STIFF_STEPS = 2.0  # time constant of frictionloss in steps: the shortest that MuJoCo accepts
 
 
@@ -58,8 +51,7 @@ class Start:
 
     Args:
         time: since the start of the record, s.
-        angle: displacement from rest, rad.
-        rate: rad/s.
+        angle, rate: displacement from rest, rad, and its rate, rad/s.
     """
 
     run: str
@@ -70,14 +62,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Written:
-    """An attribute that was written.
-
-    Args:
-        name: element and attribute.
-        before: its value in the model given, in the unit.
-        after: its value in the patched model, in the unit.
-        unit: SI.
-    """
+    """An attribute that was written, in SI units: its element and name, its values before and after, the unit."""
 
     name: str
     before: tuple[float, ...]
@@ -88,33 +73,36 @@ class Written:
 def patched(
     model: JointModel, patch: JointPatch, starts: Sequence[Start] = ()
 ) -> tuple[mujoco.MjSpec, tuple[Written, ...]]:
-    """The model with a law written into it.
-
-    Args:
-        patch: the law.
-        starts: of the runs, written as keyframes.
-
-    Returns:
-        The specification, and what was written.
-
-    Raises:
-        TunnelError: when MuJoCo refuses the patched model.
-    """
+    """The model with a law written into it, its runs' starts as keyframes, and what was written."""
     spec = model.spec()
     before = spec.compile()
     joint = spec.joint(model.joint)
     joint.springdamper = (0.0, 0.0)  # stiffness and damping are written themselves
     weight = _write_inertia(spec, before, model, patch)
     _write_spring(spec, before, model, patch, weight)
-    own = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]])
-    joint.damping = own + patch.damping
+    joint.damping = np.array([before.dof_damping[0], *before.dof_dampingpoly[0]]) + patch.damping
     joint.damping[0] = max(joint.damping[0], 0.0)  # a damping fitted as 0 less the model's own, rounded
     joint.frictionloss = patch.friction
     if patch.friction != before.dof_frictionloss[0]:
         joint.solref_friction = (_STIFF_STEPS * spec.option.timestep, 1.0)
     if patch.program:
-        _write_program(spec, model, patch.program)
-    _write_sensor(spec, model, patch.noise)
+        if model.law.slide:
+            raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
+        plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
+        plugin.config = {"joint": model.joint}
+        spec.activate_plugin("vwt.yaw_moment")
+        for name in _AIR:
+            spec.add_numeric(name=name, data=[0.0], size=1)
+        spec.add_numeric(name="moment_program", data=list(patch.program), size=len(patch.program))
+    if patch.noise != 0.0:  # on the joint's position sensor, which is added where there is none
+        kind = mujoco.mjtSensor.mjSENS_JOINTPOS
+        own = (one for one in spec.sensors if one.type == kind and one.objname == model.joint)
+        if (sensor := next(own, None)) is None:
+            joint_type = mujoco.mjtObj.mjOBJ_JOINT
+            sensor = spec.add_sensor(
+                name=f"{model.joint}_reading", type=kind, objtype=joint_type, objname=model.joint
+            )
+        sensor.noise = patch.noise
     for start in starts:
         name = f"{start.run} at {start.time:.6g} s"
         if (known := spec.key(name)) is not None:
@@ -122,7 +110,14 @@ def patched(
         spec.add_key(name=name, qpos=[model.law.rest + start.angle], qvel=[start.rate])
     with _refusals(model):
         after = spec.compile()
-    return spec, _differences(before, after)
+    old, new = _attributes(before), _attributes(after)
+    spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
+    return spec, tuple(
+        Written(name, old[name, unit], value, unit)
+        for (name, unit), value in new.items()
+        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
+        and (spring or name != "joint springref")
+    )
 
 
 def _refusals(model: JointModel) -> AbstractContextManager[None]:
@@ -130,19 +125,7 @@ def _refusals(model: JointModel) -> AbstractContextManager[None]:
 
 
 def patched_xml(spec: mujoco.MjSpec, model: JointModel, folder: Path) -> str:
-    """The text of a patched model.
-
-    Args:
-        spec: from `patched`.
-        model: it was made of.
-        folder: where the text will be, for the paths of its meshes.
-
-    Returns:
-        MJCF.
-
-    Raises:
-        TunnelError: when MuJoCo cannot write it.
-    """
+    """The MJCF of a model from `patched`; the paths of its meshes are those from ``folder``."""
     for name in ("meshdir", "texturedir") if spec.meshes or spec.textures or spec.hfields else ():
         assets = model.path.parent.resolve() / getattr(spec.compiler, name)
         setattr(spec.compiler, name, os.path.relpath(assets, folder.resolve()))
@@ -187,11 +170,7 @@ def _write_inertia(
 def _write_spring(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
-    """The sum of the joint's own spring and the added one, about the position at which it vanishes.
-
-    Raises:
-        TunnelError: when it vanishes nowhere.
-    """
+    """The sum of the joint's own spring and the added one, about the position at which it vanishes."""
     own = np.polynomial.Polynomial([0.0, before.jnt_stiffness[0], *before.jnt_stiffnesspoly[0]])
     offset = model.law.rest - float(before.qpos_spring[0])
     total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
@@ -200,9 +179,8 @@ def _write_spring(
     roots = total.roots() if total.degree() else np.array([0.0])
     real = roots.real[np.abs(roots.imag) < 1e-6]
     if real.size == 0:
-        raise TunnelError(
-            "the patched model would have no position of rest", remedy="give it a spring of its own"
-        )
+        remedy = "give it a spring of its own"
+        raise TunnelError("the patched model would have no position of rest", remedy=remedy)
     usual = -offset if np.any(own.coef) else 0.0
     zero = float(real[np.argmin(np.abs(real - usual))])
     about = total(np.polynomial.Polynomial([zero, 1.0])).coef
@@ -212,79 +190,30 @@ def _write_spring(
     joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
 
 
-def _write_program(spec: mujoco.MjSpec, model: JointModel, program: tuple[float, ...]) -> None:
-    if model.law.slide:
-        raise TunnelError("the plugin acts on hinges only", remedy="leave out --patch")
-    plugin = spec.add_plugin(name="tunnel", plugin_name="vwt.yaw_moment", active=True)
-    plugin.config = {"joint": model.joint}
-    spec.activate_plugin("vwt.yaw_moment")
-    for name in _AIR:
-        spec.add_numeric(name=name, data=[0.0], size=1)
-    spec.add_numeric(name="moment_program", data=list(program), size=len(program))
-
-
-def _write_sensor(spec: mujoco.MjSpec, model: JointModel, noise: float) -> None:
-    """The noise on the joint's position sensor, which is added where there is none."""
-    if noise == 0.0:
-        return
-    kind = mujoco.mjtSensor.mjSENS_JOINTPOS
-    for sensor in spec.sensors:
-        if sensor.type == kind and sensor.objname == model.joint:
-            sensor.noise = noise
-            return
-    spec.add_sensor(
-        name=f"{model.joint}_reading",
-        type=kind,
-        objtype=mujoco.mjtObj.mjOBJ_JOINT,
-        objname=model.joint,
-        noise=noise,
-    )
-
-
-def _differences(before: mujoco.MjModel, after: mujoco.MjModel) -> tuple[Written, ...]:
-    def of(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
-        moving = [i for i in range(model.nbody) if model.body_weldid[i]]
-        return {
-            ("joint armature", "kg m2"): (float(model.dof_armature[0]),),
-            ("joint stiffness", "N m/rad, /rad2, /rad3"): (
-                float(model.jnt_stiffness[0]),
-                *map(float, model.jnt_stiffnesspoly[0]),
-            ),
-            ("joint springref", "rad"): (float(model.qpos_spring[0]),),
-            ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): (
-                float(model.dof_damping[0]),
-                *map(float, model.dof_dampingpoly[0]),
-            ),
-            ("joint frictionloss", "N m"): (float(model.dof_frictionloss[0]),),
-            **{(f"body {model.body(i).name or i} mass", "kg"): (float(model.body_mass[i]),) for i in moving},
-            ("sensor noise", "rad"): (float(np.max(model.sensor_noise, initial=0.0)),),
-            ("plugin vwt.yaw_moment", "1"): (float(model.nplugin),),
-        }
-
-    old, new = of(before), of(after)
-    spring = any(new["joint stiffness", "N m/rad, /rad2, /rad3"])
-    return tuple(
-        Written(name, old[name, unit], value, unit)
-        for (name, unit), value in new.items()
-        if not np.allclose(value, old[name, unit], rtol=1e-9, atol=0.0)
-        and (spring or name != "joint springref")
-    )
+def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
+    """What may be written into a model, by name and unit."""
+    moving = [i for i in range(model.nbody) if model.body_weldid[i]]
+    spring = model.jnt_stiffness[0], *model.jnt_stiffnesspoly[0]
+    damping = model.dof_damping[0], *model.dof_dampingpoly[0]
+    found = {
+        ("joint armature", "kg m2"): [model.dof_armature[0]],
+        ("joint stiffness", "N m/rad, /rad2, /rad3"): spring,
+        ("joint springref", "rad"): [model.qpos_spring[0]],
+        ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): damping,
+        ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
+        **{(f"body {model.body(i).name or i} mass", "kg"): [model.body_mass[i]] for i in moving},
+        ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
+        ("plugin vwt.yaw_moment", "1"): [model.nplugin],
+    }
+    return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
 def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duration: float) -> Motion:
-    """Simulate one run with the model's own integrator and steps.
+    """Simulate one run of a patched model, by displacement from rest, with the model's own integrator and steps.
 
     Args:
-        model: patched.
         law_rest: the joint's position at rest, rad.
-        start: where the run starts.
         duration: s.
-
-    Returns:
-        The displacement from rest and its rate at every step.
-
-    Raises:
-        TunnelError: when the motion grows without bound, or its steps are too many.
     """
     steps = duration / model.opt.timestep
     remedy = "lengthen the model's timestep"
@@ -298,9 +227,6 @@ def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duratio
             angle[i], rate[i] = data.qpos[0], data.qvel[0]
             mujoco.mj_step(model, data)
     if data.time < 0.5 * count * model.opt.timestep:  # the engine has reset a motion that grew without bound
-        raise TunnelError(
-            "the patched model's motion grows without bound",
-            where=f"run {start.run}",
-            remedy="shorten its timestep",
-        )
+        what = "the patched model's motion grows without bound"
+        raise TunnelError(what, where=f"run {start.run}", remedy="shorten its timestep")
     return Motion(np.arange(count) * model.opt.timestep, angle - law_rest, rate)

@@ -1,15 +1,14 @@
 """The rig's MuJoCo model: the structure comes from ``mjcf/rig.xml``, the numbers from the rig description.
 
-Shapes that are drawn do not affect the motion: the working section, its marks, the spring. Each is a single
-mesh, because MuJoCo computes the pose of every geom in every step.
+Shapes that are drawn do not affect the motion. Each is a single mesh, because MuJoCo computes the pose of
+every geom in every step.
 """
 
 from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from math import cos, pi, radians, sin
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import native_library, state_vector
-from tunnel_sim.physics.run_settings import DriveMoment, RunSettings, spring_end_angle
+from tunnel_sim.physics.run_settings import RunSettings, spring_end_angle
 from tunnel_sim.physics.steps import check_stable
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
@@ -28,11 +27,7 @@ from tunnel_sim.vocabulary.rig import Rig, WorkingSection, davis_vertices
 
 @functools.cache
 def load_plugin() -> None:
-    """Register the plugin with MuJoCo; a second call does nothing.
-
-    Raises:
-        TunnelError: when the library is missing.
-    """
+    """Register the plugin with MuJoCo; a second call does nothing."""
     mujoco.mj_loadPluginLibrary(str(native_library("vwt_plugin")))
 
 
@@ -62,8 +57,7 @@ def box_mesh(low: tuple[float, float, float], high: tuple[float, float, float], 
     """A box between two corners, rotated about the vertical axis.
 
     Args:
-        low: least x, y and z, m.
-        high: greatest x, y and z, m.
+        low, high: least and greatest x, y and z, m.
         turn: rotation, rad, counter-clockwise seen from above.
     """
     vertices = np.asarray(low) + np.array(_CORNERS, dtype=float) * (np.asarray(high) - np.asarray(low))
@@ -82,11 +76,8 @@ def coil_mesh(radius: float, wire: float, low: float, high: float, turns: int) -
     """A coil spring about the vertical axis.
 
     Args:
-        radius: of the coil, m.
-        wire: radius of the wire, m.
-        low: height of the lower end, m.
-        high: height of the upper end, m.
-        turns: number of turns.
+        radius, wire: radii of the coil and of its wire, m.
+        low, high: heights of its ends, m.
     """
     around, along = 8, 24 * turns + 1
     turn = np.linspace(0.0, 2 * pi * turns, along)[:, None]
@@ -138,11 +129,8 @@ def frame_mesh(rig: Rig) -> Mesh:
 def marks_mesh(rig: Rig) -> Mesh:
     """Lines on the floor: the wind direction, and a mark every ten degrees of yaw around the body."""
     reach, height = 0.62 * rig.body.length, 0.002
-    parts = [
-        box_mesh(
-            (-rig.working_section.length / 2, -0.003, 0.0), (rig.working_section.length / 2, 0.003, height)
-        )
-    ]
+    x = rig.working_section.length / 2
+    parts = [box_mesh((-x, -0.003, 0.0), (x, 0.003, height))]
     for degrees in range(-60, 61, 10):
         length = 0.07 if degrees % 30 == 0 else 0.04
         for turn in (radians(degrees), radians(degrees) + pi):
@@ -176,17 +164,7 @@ class Model:
         return int(self.mj.joint("yaw").qposadr[0])
 
     def with_settings(self, settings: RunSettings) -> Model:
-        """The same model with the numbers of another run, without compiling again.
-
-        Args:
-            settings: must have the same layout: see `RunSettings.layout`.
-
-        Returns:
-            A model whose physics is bit-identical to that of one compiled from ``build_spec(rig, settings)``.
-
-        Raises:
-            TunnelError: when the plugin refuses the numbers, or the steps are too long for them.
-        """
+        """The model of another run of the same `RunSettings.layout`, bit-identical to one compiled anew."""
         check_stable(self.rig, settings)
         mj = copy.copy(self.mj)
         twist = settings.rod_twist
@@ -198,7 +176,10 @@ class Model:
             mj.joint("rod_twist").stiffness = 1.0 / twist.compliance
             mj.joint("rod_twist").damping = twist.damping(settings.yaw_inertia)
             mj.body("rod_end").inertia = _inertia(self.rig, settings.yaw_inertia * share)
-        mj.numeric_data[:] = numeric_vector(mj, numerics(self.rig, settings))
+        for name, value in numerics(self.rig, settings).items():
+            numeric = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+            start = mj.numeric_adr[numeric]
+            mj.numeric_data[start : start + mj.numeric_size[numeric]] = value
         try:
             mujoco.mj_setConst(mj, mujoco.MjData(mj))
         except (ValueError, mujoco.FatalError) as error:
@@ -206,12 +187,7 @@ class Model:
         return Model(mj, self.rig, settings)
 
     def release_state(self) -> mujoco.MjData:
-        """The state at the release, where the body has been held at its angle until now.
-
-        With a flexible rod the body is at the release angle, and the rod's upper end is in equilibrium between
-        spring and twisted rod. The plugin's state starts there too: the lag at the body's angle, the deflection
-        of the friction contact at zero.
-        """
+        """The state at the release, where the body has been held and rod and spring are in equilibrium."""
         data = mujoco.MjData(self.mj)
         release = self.settings.release_angle
         end = spring_end_angle(self.settings)
@@ -225,16 +201,7 @@ class Model:
 
 
 def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model:
-    """Build the model of one run; compiled, which takes nearly all of the time, once for all runs of a layout.
-
-    Args:
-        settings: spring, damper, inertia, air and every further term of the moment law.
-        drawn: with the shapes, lights and cameras. The motion is bit-identical without them, and a step takes four
-            fifths of the time.
-
-    Raises:
-        TunnelError: when MuJoCo or the plugin refuses the settings, or the steps are too long for them.
-    """
+    """Build the model of a run, compiled once for its layout; without shapes it moves the same, faster."""
     check_stable(rig, settings)
     key = (repr(rig), settings.layout(), drawn)
     compiled = _COMPILED.get(key)
@@ -242,7 +209,10 @@ def build_model(rig: Rig, settings: RunSettings, *, drawn: bool = True) -> Model
         try:
             spec = build_spec(rig, settings)
             if not drawn:
-                _undraw(spec)
+                shapes = (*spec.geoms, *spec.sites, *spec.meshes, *spec.materials, *spec.textures)
+                bodies = (spec.body("view_centre"), spec.body("working_section"))
+                for part in (*shapes, *spec.lights, *spec.cameras, *bodies):
+                    spec.delete(part)
             compiled = spec.compile()
         except (ValueError, mujoco.FatalError) as error:
             raise _refusal(error) from error
@@ -263,10 +233,21 @@ def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
     with resources.as_file(resources.files("mjcf") / "rig.xml") as path:
         spec = mujoco.MjSpec.from_file(str(path))
     spec.option.timestep = settings.timestep
-    _place_scenery(spec, rig)
-    body = rig.body
+    section, body = rig.working_section, rig.body
+    spring = coil_mesh(
+        2.4 * rig.rod.diameter,
+        rig.rod.diameter / 4,
+        section.height + 0.25 * rig.rod.length_above_ceiling,
+        section.height + 0.9 * rig.rod.length_above_ceiling,
+        turns=7,
+    )
+    scenery = {"floor": floor_mesh(section), "glass": glass_mesh(section), "frame": frame_mesh(rig)}
+    for name, piece in {**scenery, "marks": marks_mesh(rig), "spring": spring}.items():
+        mesh = spec.mesh(name)
+        mesh.uservert, mesh.userface = piece.vertices.ravel(), piece.faces.ravel()
+    spec.body("view_centre").pos = (0.0, 0.0, 0.45 * section.height)
     centre = body.ground_clearance + body.height / 2
-    top = rig.working_section.height + 1.2 * rig.rod.length_above_ceiling  # the pointer turns above the yoke
+    top = section.height + 1.2 * rig.rod.length_above_ceiling  # the pointer turns above the yoke
     spec.body("davis").pos = (0.0, 0.0, centre)
     spec.site("nose").pos = (body.length / 2, 0.0, 0.0)
     spec.mesh("davis_body").uservert = davis_vertices(body).ravel()
@@ -276,39 +257,6 @@ def build_spec(rig: Rig, settings: RunSettings) -> mujoco.MjSpec:
     pointer = spec.geom("pointer")
     pointer.size = (0.07, rig.rod.diameter / 5, rig.rod.diameter / 5)
     pointer.pos = (0.07, 0.0, top)
-    _set_dynamics(spec, rig, settings)
-    for name, values in numerics(rig, settings).items():
-        spec.add_numeric(name=name, data=list(values), size=len(values))
-    return spec
-
-
-def _undraw(spec: mujoco.MjSpec) -> None:
-    shapes = (*spec.geoms, *spec.sites, *spec.meshes, *spec.materials, *spec.textures)
-    bodies = (spec.body("view_centre"), spec.body("working_section"))
-    for part in (*shapes, *spec.lights, *spec.cameras, *bodies):
-        spec.delete(part)
-
-
-def _place_scenery(spec: mujoco.MjSpec, rig: Rig) -> None:
-    section, rod = rig.working_section, rig.rod
-    spring = coil_mesh(
-        2.4 * rod.diameter, rod.diameter / 4, section.height + 0.25 * rod.length_above_ceiling,
-        section.height + 0.9 * rod.length_above_ceiling, turns=7,
-    )  # fmt: skip
-    pieces = {
-        "floor": floor_mesh(section),
-        "glass": glass_mesh(section),
-        "frame": frame_mesh(rig),
-        "marks": marks_mesh(rig),
-        "spring": spring,
-    }
-    for name, piece in pieces.items():
-        mesh = spec.mesh(name)
-        mesh.uservert, mesh.userface = piece.vertices.ravel(), piece.faces.ravel()
-    spec.body("view_centre").pos = (0.0, 0.0, 0.45 * section.height)
-
-
-def _set_dynamics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
     for geom in spec.geoms:
         geom.mass = 0.0  # mass and inertia are set below, not derived from the shapes
     twist = settings.rod_twist
@@ -322,6 +270,9 @@ def _set_dynamics(spec: mujoco.MjSpec, rig: Rig, settings: RunSettings) -> None:
         spec.joint("rod_twist").stiffness[0] = 1.0 / twist.compliance
         spec.joint("rod_twist").damping[0] = twist.damping(settings.yaw_inertia)
         spec.plugins[0].config = {"joint": "yaw", "twist_joint": "rod_twist"}
+    for name, values in numerics(rig, settings).items():
+        spec.add_numeric(name=name, data=list(values), size=len(values))
+    return spec
 
 
 def _set_inertia(body: mujoco.MjsBody, rig: Rig, yaw_inertia: float, mass: float) -> None:
@@ -340,21 +291,9 @@ def _inertia(rig: Rig, yaw_inertia: float) -> tuple[float, float, float]:
 
 
 def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
-    """The ``<numeric>`` elements of the MJCF: the moment law's parameters, sampled inputs and program.
-
-    Args:
-        rig: gives frontal area, reference length and width.
-
-    Returns:
-        Values by name, without those that are attributes of joint and body.
-
-    Raises:
-        TunnelError: when a series has an unknown name, or the steps do not end at the samples of the drive.
-    """
-    law = settings.law(rig)
-    values: dict[str, tuple[float, ...]] = {
-        name: (value,) for name, value in law.items() if name not in _NATIVE
-    }
+    """The ``<numeric>`` elements of the MJCF by name: the law's other parameters, series and program."""
+    law = settings.law(rig).items()
+    values: dict[str, tuple[float, ...]] = {name: (value,) for name, value in law if name not in _NATIVE}
     values["wind_speed"] = (settings.wind_speed,)
     for name, series in settings.series.items():
         if name not in _SERIES:
@@ -363,56 +302,32 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
         values[f"{name}_interval"] = (series.interval,)
     if settings.program:
         values["moment_program"] = settings.program
-    return values if settings.drive is None else values | _drive_numerics(settings.drive, settings.timestep)
-
-
-def _drive_numerics(drive: DriveMoment, timestep: float) -> dict[str, tuple[float, ...]]:
-    """The moment of a drive, N m, at samples from time 0 on, and how it acts."""
-    drive = drive if drive.delay == 0.0 else _mean_by_step(drive, timestep)
-    times = drive.time_s
+    drive = settings.drive
+    if drive is None:
+        return values
+    times, given, held, step = drive.time_s, drive.values, drive.held, settings.timestep
+    if drive.delay != 0.0:
+        # As its mean over every step: its impulse is kept, and what is lost is of second order.
+        ends = step * np.arange(round((times[-1] + max(drive.delay, 0.0)) / step) + 2) - drive.delay
+        before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
+        now = given[before] if held else np.interp(ends, times, given)
+        until = np.diff(times) * (given[:-1] if held else 0.5 * (given[:-1] + given[1:]))
+        integral = np.append(0.0, np.cumsum(until))[before]
+        integral += 0.5 * (given[before] + now) * (ends - times[before])
+        given, held = np.diff(integral) / step, True
+        times = step * np.arange(given.size, dtype=np.float64)
     interval = float(times[-1]) / max(1, times.size - 1)
-    even = times.size > 1 and np.allclose(
-        times, interval * np.arange(times.size), rtol=0.0, atol=1e-6 * interval
-    )
-    steps = interval / timestep
+    at = interval * np.arange(times.size)
+    even = times.size > 1 and np.allclose(times, at, rtol=0.0, atol=1e-6 * interval)
+    steps = interval / step
     if not even or abs(steps - round(steps)) > 1e-6 * steps or round(steps) < 1:
         raise TunnelError(
             "the samples of the drive are not at even times from 0 on, a whole number of steps apart",
             remedy="give it at the times of the record, and a timestep that divides their interval",
         )
-    return {
-        "drive": tuple((drive.scale * drive.values).tolist()),
+    return values | {
+        "drive": tuple((drive.scale * given).tolist()),
         "drive_interval": (interval,),
-        "drive_held": (float(drive.held),),
+        "drive_held": (float(held),),
         "drive_on_end": (float(not drive.on_body),),
     }
-
-
-def _mean_by_step(drive: DriveMoment, timestep: float) -> DriveMoment:
-    """A delayed drive as its mean over every step: its impulse is kept, and what is lost is of second order."""
-    at, values = drive.time_s, drive.values
-    ends = timestep * np.arange(round((at[-1] + max(drive.delay, 0.0)) / timestep) + 2) - drive.delay
-    before = np.clip(np.searchsorted(at, ends, side="right") - 1, 0, at.size - 1)
-    now = values[before] if drive.held else np.interp(ends, at, values)
-    until = np.diff(at) * (values[:-1] if drive.held else 0.5 * (values[:-1] + values[1:]))
-    integral = np.append(0.0, np.cumsum(until))[before] + 0.5 * (values[before] + now) * (ends - at[before])
-    means = np.diff(integral) / timestep
-    starts = timestep * np.arange(means.size, dtype=np.float64)
-    return replace(drive, time_s=starts, values=means, delay=0.0, held=True)
-
-
-def numeric_vector(model: mujoco.MjModel, values: Mapping[str, Sequence[float]]) -> Array:
-    """A model's ``numeric_data`` with some values changed.
-
-    Args:
-        values: by name: a new number, or a series of the same length.
-
-    Returns:
-        Array of shape (nnumericdata,).
-    """
-    data = np.array(model.numeric_data)
-    for name, value in values.items():
-        numeric = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
-        start = model.numeric_adr[numeric]
-        data[start : start + model.numeric_size[numeric]] = value
-    return data

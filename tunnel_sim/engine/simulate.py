@@ -13,7 +13,7 @@ import numpy as np
 from mujoco import batch as mujoco_batch
 
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.chain import read_motion
+from tunnel_sim.effects.base import read_motion
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.physics.moment_law import forward_library
 from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling
@@ -37,9 +37,6 @@ def simulate_motion(model: Model, sample_rate: float) -> Motion:
 
     Args:
         sample_rate: Hz.
-
-    Raises:
-        TunnelError: when the motion grows without bound.
     """
     samples, steps = sampling(model.settings, sample_rate)
     data = model.release_state()
@@ -62,11 +59,7 @@ def simulate(
     *,
     effects: Sequence[Effect] = (),
 ) -> Record:
-    """Simulate one run as the sensor sees it.
-
-    Raises:
-        TunnelError: when the motion grows without bound or the settings are refused.
-    """
+    """Simulate one run as the sensor sees it."""
     chain = EffectChain.draw(settings, effects, rng)
     motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
     return read_motion(motion, sensor, rng, chain)
@@ -85,63 +78,37 @@ def simulate_motions(
     Args:
         sample_rate: Hz.
         nthread: number of threads; 0 uses all processors.
-        progress: called with (runs done, runs in all).
-
-    Raises:
-        TunnelError: when the motion of a run grows without bound, its settings are refused, or its fastest motion
-            requires too many steps.
     """
-    motions: dict[int, Motion] = {}
-    settings = [_followed(rig, run, number) for number, run in enumerate(settings, 1)]
-    for group in _groups(settings):
-        samples, steps = sampling(settings[group[0]], sample_rate)
-        size = max(1, _CHUNK_STEPS // (samples * steps))
-        for start in range(0, len(group), size):
-            chunk = group[start : start + size]
-            done = _integrate_chunk(rig, [settings[i] for i in chunk], sample_rate, nthread)
-            for index, motion in zip(chunk, done, strict=True):
-                _check_finite(motion.angle, f"run {index + 1}")
-                motions[index] = motion
-            if progress is not None:
-                progress(len(motions), len(settings))
-    return [motions[i] for i in range(len(settings))]
-
-
-def _followed(rig: Rig, run: RunSettings, number: int) -> RunSettings:
-    try:
-        return follow_fastest(rig, run)
-    except TunnelError as error:
-        raise TunnelError(error.what, where=f"run {number}", remedy=error.remedy) from error
-
-
-def _groups(settings: Sequence[RunSettings]) -> list[list[int]]:
-    """Indices of the runs that can share one compiled model."""
-    groups: dict[tuple[object, ...], list[int]] = {}
-    for i, run in enumerate(settings):
+    runs: list[RunSettings] = []
+    groups: dict[tuple[object, ...], list[int]] = {}  # of runs that can share one compiled model
+    for i, stated in enumerate(settings):
+        try:
+            run = follow_fastest(rig, stated)
+        except TunnelError as error:
+            raise TunnelError(error.what, where=f"run {i + 1}", remedy=error.remedy) from error
+        runs.append(run)
         groups.setdefault((run.duration, *run.layout()), []).append(i)
-    return list(groups.values())
-
-
-def _integrate_chunk(rig: Rig, runs: list[RunSettings], sample_rate: float, nthread: int) -> list[Motion]:
-    model = build_model(rig, runs[0], drawn=False)
-    samples, steps = sampling(runs[0], sample_rate)
-    batch = RunBatch(model, len(runs), steps, nthread)
-    first = np.array([batch.start(row, model.with_settings(run)) for row, run in enumerate(runs)]).T
-    with no_log(), no_timers():
-        angle, rate = batch.advance(samples - 1, first)
-    time = np.arange(samples) / sample_rate
-    return [Motion(time, angle[i], rate[i]) for i in range(len(runs))]
+    motions: dict[int, Motion] = {}
+    for group in groups.values():
+        samples, steps = sampling(runs[group[0]], sample_rate)
+        time = np.arange(samples) / sample_rate
+        size = max(1, _CHUNK_STEPS // (samples * steps))
+        for chunk in (group[at : at + size] for at in range(0, len(group), size)):
+            model = build_model(rig, runs[chunk[0]], drawn=False)
+            batch = RunBatch(model, len(chunk), steps, nthread)
+            first = [batch.start(row, model.with_settings(runs[i])) for row, i in enumerate(chunk)]
+            with no_log(), no_timers():
+                angle, rate = batch.advance(samples - 1, np.array(first).T)
+            for row, i in enumerate(chunk):
+                _check_finite(angle[row], f"run {i + 1}")
+                motions[i] = Motion(time, angle[row], rate[row])
+            if progress is not None:
+                progress(len(motions), len(runs))
+    return [motions[i] for i in range(len(runs))]
 
 
 class RunBatch:
-    """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run.
-
-    Args:
-        model: of any of the runs.
-        count: number of runs.
-        steps: number of integration steps between two samples.
-        nthread: number of threads; 0 uses all processors. The result does not depend on it.
-    """
+    """Runs of one layout on ``mujoco.batch``, each with numbers of its own; ``row`` is the index of a run."""
 
     def __init__(self, model: Model, count: int, steps: int, nthread: int) -> None:
         self._batch = mujoco_batch.Batch(model.mj, nsim=count, nthread=nthread)
@@ -167,11 +134,7 @@ class RunBatch:
         return tuple(float(self._states[name][row, self._address]) for name in ("qpos", "qvel"))  # type: ignore[return-value]
 
     def start(self, row: int, model: Model) -> tuple[float, float]:
-        """Start a run at its release; result as of `now`.
-
-        Args:
-            model: of the run, with the layout of the batch.
-        """
+        """Start the run of a model at its release; result as of `now`."""
         data = model.release_state()
         for name in _VARIED:
             self._fields[name][row] = getattr(model.mj, name)
@@ -180,11 +143,7 @@ class RunBatch:
         return float(data.qpos[self._address]), float(data.qvel[self._address])
 
     def advance(
-        self,
-        samples: int,
-        first: Array,
-        rows: Any = None,
-        control: tuple[Array, Array] | None = None,
+        self, samples: int, first: Array, rows: Any = None, control: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
         """Integrate runs over some samples.
 
@@ -252,8 +211,5 @@ def _no_clock() -> Callable[[], float]:
 
 def _check_finite(angle: Array, where: str) -> None:
     if not np.all(np.isfinite(angle)) or np.max(np.abs(angle)) > 1e3:
-        raise TunnelError(
-            "the motion grows without bound",
-            where=where,
-            remedy="check the sign of the damping, and that the total stiffness is positive (Kr > Ka)",
-        )
+        remedy = "check the sign of the damping, and that the total stiffness is positive (Kr > Ka)"
+        raise TunnelError("the motion grows without bound", where=where, remedy=remedy)

@@ -10,6 +10,18 @@ from __future__ import annotations
 # The environments' modules, and MuJoCo with them, are imported when an environment is made.
 from gymnasium.envs.registration import register, registry
 
+from tunnel_sim.vocabulary.errors import TunnelError
+
+
+class EnvError(TunnelError, ValueError):
+    """A bad argument, option or action of an environment, described in one line."""
+
+
+def as_env_error(error: TunnelError, where: str) -> EnvError:
+    """Convert an error of a lower layer to an `EnvError`, which concerns ``where`` if it does not say itself."""
+    return EnvError(error.what, where=error.where or where, remedy=error.remedy)
+
+
 #: Entry points by identifier: of the environment, and of its native vector environment or None.
 ENVIRONMENTS: dict[str, tuple[str, str | None]] = {
     "tunnel_sim/FreeDecay-v0": (

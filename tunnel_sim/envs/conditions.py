@@ -11,12 +11,11 @@ from typing import Any, Literal
 import numpy as np
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings, stated_run
-from tunnel_sim.envs.errors import EnvError, as_env_error
+from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
+from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import (
     POTENTIOMETER_RESOLUTION,
@@ -27,7 +26,6 @@ from tunnel_sim.vocabulary.plan import (
     Truth,
     aerodynamic_stiffness,
 )
-from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 
 PRESETS = ("operator", "plain")
@@ -53,8 +51,6 @@ class FreeDecayConfig:
         moment_limit: greatest moment that the operator can apply, N m.
         effect_probability: probability that an episode draws an effect, if its options do not name effects.
         prior: changes to `Prior` by name, in its units.
-        expose_truth: whether ``info`` contains the truth.
-        rig_file: a rig description; None: the packaged one.
     """
 
     preset: Literal["plain", "operator"] = "operator"
@@ -72,16 +68,17 @@ class FreeDecayConfig:
     rig_file: str | None = None
 
     def __post_init__(self) -> None:
-        """Check every argument.
-
-        Raises:
-            EnvError: when one is out of range, or a duration is not a whole number of the shorter interval.
-        """
+        """Refuse an argument out of range, or a duration that is not a whole number of the shorter interval."""
         if self.preset not in PRESETS:
             raise EnvError(f"unknown preset {self.preset!r}", remedy=did_you_mean(str(self.preset), PRESETS))
         for item in fields(self):
             if item.type == "float":
-                _check_number(item.name, getattr(self, item.name))
+                name, value = item.name, getattr(self, item.name)
+                number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+                if not number or value < 0.0 or (value == 0.0 and name not in _MAY_BE_ZERO):
+                    least = "0 or more" if name in _MAY_BE_ZERO else "above 0"
+                    remedy = f"give a finite number {least} (SI)"
+                    raise EnvError(f"{name} = {value!r} is out of range", remedy=remedy)
         if self.effect_probability > 1.0:
             raise EnvError("effect_probability is above 1", remedy="give a probability")
         if self.reading_variance < LEAST_DEVIATION**2:
@@ -106,11 +103,6 @@ class FreeDecayConfig:
         return round(self.duration / self.control_period)
 
     @property
-    def sample_times(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Sample times of a whole run, s, as in `tunnel_sim.engine.simulate`."""
-        return np.arange(self.steps * self.samples_per_step) / self.sample_rate
-
-    @property
     def reading_variance(self) -> float:
         """Variance of one reading, its quantisation included, rad²."""
         return self.noise_std**2 + self.resolution**2 / 12.0
@@ -130,25 +122,13 @@ def angle_limit(rig: Rig) -> float:
 
 
 def free_decay_config(arguments: Mapping[str, Any]) -> FreeDecayConfig:
-    """The configuration of an environment from its keyword arguments.
-
-    Raises:
-        EnvError: when a name is unknown or a value out of range.
-    """
+    """The configuration of an environment from its keyword arguments."""
     known = [item.name for item in fields(FreeDecayConfig)]
     for name in arguments:
         if name not in known:
-            raise EnvError(
-                f"unknown argument {name!r}", where="FreeDecay-v0", remedy=did_you_mean(name, known)
-            )
+            remedy = did_you_mean(name, known)
+            raise EnvError(f"unknown argument {name!r}", where="FreeDecay-v0", remedy=remedy)
     return FreeDecayConfig(**arguments)
-
-
-def _check_number(name: str, value: object) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-    if not number or value < 0.0 or (value == 0.0 and name not in _MAY_BE_ZERO):  # type: ignore[operator]
-        least = "0 or more" if name in _MAY_BE_ZERO else "above 0"
-        raise EnvError(f"{name} = {value!r} is out of range", remedy=f"give a finite number {least} (SI)")
 
 
 def _whole(name: str, count: float, of: str) -> None:
@@ -173,13 +153,7 @@ STIFFNESS_MARGIN = 1.3  # least ratio of a drawn spring's stiffness to the great
 
 @dataclass(frozen=True)
 class RunPlan:
-    """One run before it is simulated: its stated conditions and its truth.
-
-    Args:
-        condition: spring, wind, release and duration, as a campaign states them.
-        sensor: the potentiometer with its true zero.
-        effects: effects beyond the nominal model.
-    """
+    """One run before it is simulated: stated conditions, truth, sensor with its true zero, and effects."""
 
     condition: Condition
     truth: Truth
@@ -190,24 +164,6 @@ class RunPlan:
         """The run's physics without its effects."""
         return run_settings(self.truth, self.condition)
 
-    def run(self, record: Record) -> Run:
-        """The run as a campaign lists it.
-
-        Args:
-            record: the sensor's reading.
-        """
-        return stated_run(self.condition, record)
-
-    def statement(self) -> dict[str, float]:
-        """The conditions given to the operator at the start, in SI units."""
-        condition = self.condition
-        return {
-            "spring_stiffness": condition.spring_stiffness,
-            "wind_speed": condition.wind_speed,
-            "air_density": condition.air_density,
-            "release_angle": condition.release_angle,
-        }
-
 
 def plan_run(
     options: Mapping[str, Any] | None, config: FreeDecayConfig, rig: Rig, rng: np.random.Generator
@@ -215,19 +171,46 @@ def plan_run(
     """The run of one episode.
 
     Args:
-        options: of ``reset``; see docs/reference/envs/free-decay.md.
         rng: draws what the options do not give, in the order spring, wind speed, release angle, truth in the
             order of `TRUTH`, effects. Nothing is drawn for given options.
-
-    Raises:
-        EnvError: for the first option that is unknown or out of range.
     """
     given = _checked(options or {}, OPTIONS, "reset options")
-    stiffness = _stiffness(given, rig, rng)
+    if given.get("spring") is not None and given.get("spring_stiffness") is not None:
+        raise EnvError("spring and spring_stiffness are both given", remedy="give one of them")
+    if given.get("spring") is not None:
+        try:
+            stiffness = rig.spring(given["spring"])
+        except (TunnelError, TypeError) as error:
+            remedy = f"use one of {', '.join(map(str, rig.springs))}"
+            what = f"there is no spring {given['spring']!r}"
+            raise EnvError(what, where="option spring", remedy=remedy) from error
+    elif given.get("spring_stiffness") is not None:
+        stiffness = _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
+    else:
+        # Of those whose stiffness exceeds Ka at any drawn speed, or else of all.
+        needed = STIFFNESS_MARGIN * aerodynamic_stiffness(
+            CN_BETA[1], **rig.body.flow(rig.air.density, WIND_SPEED[1])
+        )
+        springs = [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
+        stiffness = springs[int(rng.integers(len(springs)))]
     wind = _number(given, "wind_speed", WIND_SPEED, rng, least=0.0, most=config.wind_limit)
     density = _number(given, "air_density", (rig.air.density, rig.air.density), None, least=0.0)
-    angle = _release_angle(given, rig, rng)
-    truth, zero = _truth(_checked(given.get("truth") or {}, TRUTH, "option truth"), rig, rng)
+    if given.get("release_angle") is not None:
+        limit = 0.99 * angle_limit(rig)
+        angle = _number(given, "release_angle", (0.0, 0.0), None, least=-limit, most=limit)
+    else:
+        angle = float(rng.choice((-1.0, 1.0)) * rng.uniform(*RELEASE_ANGLE))
+    own = _checked(given.get("truth") or {}, TRUTH, "option truth")
+    nominal = rig.dynamics
+    inertia = (INERTIA_SHARE[0] * nominal.yaw_inertia, INERTIA_SHARE[1] * nominal.yaw_inertia)
+    damping = (DAMPING_SHARE[0] * nominal.mechanical_damping, DAMPING_SHARE[1] * nominal.mechanical_damping)
+    truth = Truth(
+        cn_beta=_number(own, "cn_beta", CN_BETA, rng),
+        cn_r=_number(own, "cn_r", CN_R, rng),
+        yaw_inertia=_number(own, "yaw_inertia", inertia, rng, least=1e-6),
+        mechanical_damping=_number(own, "mechanical_damping", damping, rng),
+    )
+    zero = _number(own, "sensor_zero", SENSOR_ZERO, rng, least=-1.0, most=1.0)
     condition = Condition(
         id=f"k{stiffness:g}-v{wind:g}-a{np.rad2deg(angle):.3g}",
         spring_stiffness=stiffness,
@@ -236,20 +219,18 @@ def plan_run(
         release_angle=angle,
         duration=config.duration,
     )
-    plan = RunPlan(condition, truth, config.sensor(zero))
-    settings = _effects(given, config, plan, rng)
+    sensor = config.sensor(zero)
+    settings = _effects(given.get("effects"), config, condition, rng)
     try:
-        one_run = CampaignPlan("episode", 0, truth, (condition,), plan.sensor, tuple(settings))
+        one_run = CampaignPlan("episode", 0, truth, (condition,), sensor, tuple(settings))
         effects = plan_effects(one_run)
         for effect in effects:
             # An episode reads the motion as it goes: none of it can be passed over.
             if effect.skips and not effect.is_null:
-                raise TunnelError(
-                    "an episode cannot drop samples",
-                    where=f"effect {effect.name}",
-                    remedy="inject it with tunnel simulate, which makes whole records",
-                )
-        return RunPlan(condition, truth, plan.sensor, effects)
+                what = "an episode cannot drop samples"
+                remedy = "inject it with tunnel simulate, which makes whole records"
+                raise TunnelError(what, where=f"effect {effect.name}", remedy=remedy)
+        return RunPlan(condition, truth, sensor, effects)
     except TunnelError as error:
         raise as_env_error(error, "option effects") from error
 
@@ -278,69 +259,25 @@ def _number(
     value = given[name]
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not (number and isfinite(value) and least <= value <= most):
-        raise EnvError(
-            f"{value!r} is out of range",
-            where=f"option {name}",
-            remedy=f"give a number from {least:g} to {most:g} in SI units",
-        )
+        remedy = f"give a number from {least:g} to {most:g} in SI units"
+        raise EnvError(f"{value!r} is out of range", where=f"option {name}", remedy=remedy)
     return float(value)
 
 
-def _stiffness(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> float:
-    if given.get("spring") is not None and given.get("spring_stiffness") is not None:
-        raise EnvError("spring and spring_stiffness are both given", remedy="give one of them")
-    if given.get("spring") is not None:
-        try:
-            return rig.spring(given["spring"])
-        except (TunnelError, TypeError) as error:
-            remedy = f"use one of {', '.join(map(str, rig.springs))}"
-            raise EnvError(
-                f"there is no spring {given['spring']!r}", where="option spring", remedy=remedy
-            ) from error
-    if given.get("spring_stiffness") is not None:
-        return _number(given, "spring_stiffness", (0.0, 0.0), None, least=1e-6)
-    springs = drawn_springs(rig)
-    return springs[int(rng.integers(len(springs)))]
-
-
-def drawn_springs(rig: Rig) -> list[float]:
-    """The stiffnesses from which episodes draw: those that exceed the aerodynamic stiffness at any drawn speed.
-
-    Returns:
-        N m/rad; all springs where none is stiff enough.
-    """
-    flow = rig.body.flow(rig.air.density, WIND_SPEED[1])
-    needed = STIFFNESS_MARGIN * aerodynamic_stiffness(CN_BETA[1], **flow)
-    return [value for value in rig.springs.values() if value > needed] or list(rig.springs.values())
-
-
-def _release_angle(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> float:
-    limit = angle_limit(rig)
-    if given.get("release_angle") is not None:
-        return _number(given, "release_angle", (0.0, 0.0), None, least=-0.99 * limit, most=0.99 * limit)
-    return float(rng.choice((-1.0, 1.0)) * rng.uniform(*RELEASE_ANGLE))
-
-
-def _truth(given: Mapping[str, Any], rig: Rig, rng: np.random.Generator) -> tuple[Truth, float]:
-    nominal = rig.dynamics
-    inertia = tuple(share * nominal.yaw_inertia for share in INERTIA_SHARE)
-    damping = tuple(share * nominal.mechanical_damping for share in DAMPING_SHARE)
-    truth = Truth(
-        cn_beta=_number(given, "cn_beta", CN_BETA, rng),
-        cn_r=_number(given, "cn_r", CN_R, rng),
-        yaw_inertia=_number(given, "yaw_inertia", (inertia[0], inertia[1]), rng, least=1e-6),
-        mechanical_damping=_number(given, "mechanical_damping", (damping[0], damping[1]), rng),
-    )
-    return truth, _number(given, "sensor_zero", SENSOR_ZERO, rng, least=-1.0, most=1.0)
-
-
 def _effects(
-    given: Mapping[str, Any], config: FreeDecayConfig, plan: RunPlan, rng: np.random.Generator
+    stated: Any, config: FreeDecayConfig, condition: Condition, rng: np.random.Generator
 ) -> list[EffectSetting]:
-    stated = given.get("effects")
+    """The stated effects, or one of half to twice its typical severity, drawn with the stated probability."""
     if stated is None:
-        drawn = config.effect_probability > 0.0 and rng.random() < config.effect_probability
-        return [_drawn_effect(plan, rng)] if drawn else []
+        if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
+            return []
+        kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven)]
+        kind = kinds[int(rng.integers(len(kinds)))]
+        severity = kind.parameters()[0]
+        value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
+        spring = kind.chosen_spring()
+        chosen = {} if spring is None else {spring: condition.spring_stiffness}
+        return [EffectSetting(kind.name, {severity.name: value, **chosen})]
     if isinstance(stated, Mapping):
         pairs = [(name, _checked(values, values, f"effect {name}")) for name, values in stated.items()]
         return [EffectSetting(str(name), dict(values)) for name, values in pairs]
@@ -348,21 +285,5 @@ def _effects(
         listed = list(stated)
         if all(isinstance(effect, Effect) for effect in listed):
             return [EffectSetting(effect.name, effect.to_json_dict()["parameters"]) for effect in listed]
-    raise EnvError(
-        f"{stated!r} names no effects",
-        where="option effects",
-        remedy="give {name: {parameter: value}}, or a list of tunnel_sim.effects",
-    )
-
-
-def _drawn_effect(plan: RunPlan, rng: np.random.Generator) -> EffectSetting:
-    """An effect of half to twice its typical severity."""
-    kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven)]
-    kind = kinds[int(rng.integers(len(kinds)))]
-    severity = kind.parameters()[0]
-    value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))
-    values = {severity.name: value}
-    spring = kind.chosen_spring()
-    if spring is not None:
-        values[spring] = plan.condition.spring_stiffness
-    return EffectSetting(kind.name, values)
+    remedy = "give {name: {parameter: value}}, or a list of tunnel_sim.effects"
+    raise EnvError(f"{stated!r} names no effects", where="option effects", remedy=remedy)

@@ -1,4 +1,7 @@
-"""Integration of the runs: one with ``mj_step``, many with ``mujoco.batch``, with bit-identical results."""
+"""The operator's controls, and the integration of the runs: one with ``mj_step``, or many on ``mujoco.batch``.
+
+Both give bit-identical results.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.simulate import STATE, RunBatch
+from tunnel_sim.envs import EnvError
+from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.physics.run_settings import RunSettings, sampling
 from tunnel_sim.physics.steps import follow_fastest
 from tunnel_sim.vocabulary.record import Array
@@ -43,11 +49,7 @@ class Models:
         self._compiled: dict[tuple[object, ...], Model] = {}
 
     def of(self, settings: RunSettings) -> tuple[tuple[object, ...], int, Model]:
-        """The model of a run.
-
-        Returns:
-            Layout, number of steps between two samples, model.
-        """
+        """The layout of a run, its number of steps between two samples, and its model."""
         settings = follow_fastest(self._rig, settings)
         _, steps = sampling(settings, self._sample_rate)
         layout = settings.layout()
@@ -57,11 +59,7 @@ class Models:
 
 
 class OneRun:
-    """A single run with its own model; its ``row`` is always 0.
-
-    Args:
-        samples: in one control period.
-    """
+    """A single run with its own model, of some samples in each control period; its ``row`` is always 0."""
 
     def __init__(self, models: Models, samples: int) -> None:
         self._models = models
@@ -71,26 +69,14 @@ class OneRun:
         self._steps = 1
 
     def start(self, row: int, settings: RunSettings) -> float:
-        """Start a run at its release.
-
-        Returns:
-            Angle of the rod's upper end, rad.
-        """
+        """Start a run at its release; the angle of the rod's upper end, rad."""
         del row
         _, self._steps, self._model = self._models.of(settings)
         self._data = self._model.release_state()
         return float(self._data.qpos[self._model.yaw_address])
 
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Integrate one control period.
-
-        Args:
-            operation: the operator's actions; None: nothing acts.
-
-        Returns:
-            Angle (rad) and rate (rad/s) of the rod's upper end at the samples and at the period's end, each of
-            shape (1, samples + 1).
-        """
+        """Integrate a control period: angle (rad) and rate (rad/s) at samples and end, shape (1, samples + 1)."""
         assert self._model is not None
         model, data, at = self._model.mj, self._data, self._model.yaw_address
         angle, rate = np.empty((1, self._samples + 1)), np.empty((1, self._samples + 1))
@@ -105,11 +91,7 @@ class OneRun:
         return angle, rate
 
     def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run.
-
-        Returns:
-            The result of ``mj_getState`` for `STATE`, shape (n,).
-        """
+        """MuJoCo's state of a run, as ``mj_getState`` gives it for `STATE`, shape (n,)."""
         del row
         assert self._model is not None
         state = np.empty(mujoco.mj_stateSize(self._model.mj, STATE))
@@ -128,21 +110,12 @@ class OneRun:
 
     def pose(self, row: int) -> tuple[float, float]:
         """Angle of the rod's upper end, and of the body relative to it, rad."""
-        return _pose(self.get_qpos(row))
-
-    def get_qpos(self, row: int) -> Array:
-        """Positions of a run's joints, rad; arguments as in `pose`."""
         del row
-        return np.array(self._data.qpos)
+        return _pose(self._data.qpos)
 
 
 class ManyRuns:
-    """Many runs on ``mujoco.batch``, one batch per layout; ``row`` is the index of a run.
-
-    Args:
-        samples: number of samples in one control period.
-        nthread: number of threads; 0 uses all processors. The result does not depend on it.
-    """
+    """Many runs on ``mujoco.batch``, one batch per layout; ``row`` is the index of a run."""
 
     def __init__(self, models: Models, samples: int, count: int, nthread: int) -> None:
         self._models, self._samples, self._count, self._nthread = models, samples, count, nthread
@@ -165,20 +138,17 @@ class ManyRuns:
     def advance(self, operation: Operation | None) -> tuple[Array, Array]:
         """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
         if not self._members:
-            layouts = dict.fromkeys(self._layout)
-            self._members = {
-                layout: np.flatnonzero([other == layout for other in self._layout]) for layout in layouts
-            }
+            for layout in dict.fromkeys(self._layout):
+                self._members[layout] = np.flatnonzero([other == layout for other in self._layout])
+        control = None if operation is None else (operation.wind_departure, operation.moment)
         if len(self._members) == 1:
             (layout,) = self._members
-            control = None if operation is None else (operation.wind_departure, operation.moment)
             angle, rate = self._batches[layout].advance(self._samples, self._last, None, control)
         else:
             angle, rate = (np.empty((self._count, self._samples + 1)) for _ in range(2))
             for layout, rows in self._members.items():
-                control = (
-                    None if operation is None else (operation.wind_departure[rows], operation.moment[rows])
-                )
+                if operation is not None:
+                    control = operation.wind_departure[rows], operation.moment[rows]
                 first = self._last[:, rows]
                 angle[rows], rate[rows] = self._batches[layout].advance(self._samples, first, rows, control)
         self._last = np.stack((angle[:, -1], rate[:, -1]))
@@ -201,3 +171,90 @@ class ManyRuns:
 
 def _pose(qpos: Array) -> tuple[float, float]:
     return float(qpos[0]), float(qpos[1]) if len(qpos) > 1 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorLog:
+    """The operator's actions in a run, one entry per control period.
+
+    Args:
+        time_s: start of the period, shape (n,), s.
+        set_point, wind_speed: set-point and, at the period's end, the speed, shape (n,), m/s.
+        moment: applied to the rod's upper end, shape (n,), N m.
+    """
+
+    time_s: Array
+    set_point: Array
+    wind_speed: Array
+    moment: Array
+
+
+def action_space(config: FreeDecayConfig) -> spaces.Space[Any]:
+    """The space of one environment's actions: ``Discrete(1)`` in the plain preset, else a box from −1 to 1."""
+    if config.preset == "plain":
+        return spaces.Discrete(1)
+    return spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def operator_action(
+    config: FreeDecayConfig, *, wind_speed: float, moment: float = 0.0
+) -> np.ndarray[Any, Any]:
+    """The action of the operator preset, shape (2,), from values in SI units within their limits.
+
+    Args:
+        wind_speed: set-point, m/s, from 0 to the limit.
+        moment: applied yaw moment, N m, within the limit to either side.
+    """
+    action = np.array([2.0 * wind_speed / config.wind_limit - 1.0, moment / config.moment_limit], np.float32)
+    decode(config, action[None])
+    return action
+
+
+def decode(config: FreeDecayConfig, actions: np.ndarray[Any, Any]) -> tuple[Array, Array]:
+    """Actions, shape (runs, 2), as wind-speed set-points (m/s) and moments (N m), each of shape (runs,)."""
+    values = np.asarray(actions, dtype=np.float64)
+    if values.ndim != 2 or values.shape[1] != 2:
+        remedy = "give set-point and moment"
+        raise EnvError(f"an action has shape {values.shape[1:]}, not (2,)", where="action", remedy=remedy)
+    bad = ~(np.abs(values) <= 1.0)
+    if bad.any():
+        value = values[bad][0]
+        remedy = "give numbers from -1 to 1 (operator_action)"
+        raise EnvError(f"{value:g} is outside the space", where="action", remedy=remedy)
+    return 0.5 * config.wind_limit * (values[:, 0] + 1.0), config.moment_limit * values[:, 1]
+
+
+def check_plain(actions: np.ndarray[Any, Any], count: int) -> None:
+    """Refuse all actions except 0, the only action of the plain preset."""
+    values = np.asarray(actions)
+    if values.size != count or values.dtype.kind not in "iu" or np.any(values != 0):
+        remedy = "give 0, or make the environment with preset='operator'"
+        raise EnvError(f"{actions!r} is not an action of the plain preset", where="action", remedy=remedy)
+
+
+@dataclass(frozen=True)
+class WindAnswer:
+    """The tunnel's first-order response to its set-point over one control period.
+
+    Args:
+        period: s.
+        samples: number of sample intervals in the period.
+        time_constant: s.
+    """
+
+    period: float
+    samples: int
+    time_constant: float
+
+    def speeds(self, begin: Array, set_point: Array) -> tuple[Array, Array]:
+        """Exact solution of τ V̇ = Vs − V over the period, m/s.
+
+        Mean speeds in the sample intervals, shape (runs, samples), and speed at the end, shape (runs,).
+
+        Args:
+            begin, set_point: speed at the start, and set-point, shape (runs,), m/s.
+        """
+        left = np.exp(-np.arange(self.samples + 1) * (self.period / self.samples / self.time_constant))
+        mean = (left[:-1] - left[1:]) * (self.time_constant * self.samples / self.period)
+        departure = begin - set_point
+        return set_point[:, None] + departure[:, None] * mean, set_point + departure * left[-1]

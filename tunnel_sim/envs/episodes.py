@@ -1,29 +1,32 @@
-"""Parallel episodes: readings, information, end, and the campaign they give.
+"""Parallel episodes: readings, information, end, and the campaign they give; a vector environment has many.
 
-An environment has one episode, a vector environment many.
+Readings are bit-identical to those of `tunnel_sim.effects.base.read_motion`: zero, noise and quantisation are
+vectorised, effects act run by run.
 """
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
+from tunnel_sim.effects.base import quantise
+from tunnel_sim.engine.virtual_campaign import stated_run
+from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run
-from tunnel_sim.envs.controls import OperatorLog, WindAnswer, check_plain, decode
-from tunnel_sim.envs.engines import Operation
-from tunnel_sim.envs.errors import EnvError, as_env_error
-from tunnel_sim.envs.information import Information, NominalRun, Prior
-from tunnel_sim.envs.readings import Readings, RunningSensor
+from tunnel_sim.envs.engines import ManyRuns, OneRun, Operation, OperatorLog, WindAnswer, check_plain, decode
+from tunnel_sim.envs.information import Information, Prior
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -32,21 +35,7 @@ Flags = NDArray[np.bool_]
 READING_BOUND = 2.0 * np.pi
 """Bound of a reading in the observation, rad; the record is not clipped."""
 
-
-class Engine(Protocol):
-    """The integrator of the runs; see `tunnel_sim.envs.engines`."""
-
-    def start(self, row: int, settings: RunSettings) -> float:
-        """Start a run at its release; result and arguments as in `OneRun.start`."""
-
-    def advance(self, operation: Operation | None) -> tuple[Array, Array]:
-        """Integrate one control period of all runs; result and arguments as in `OneRun.advance`."""
-
-    def get_state(self, row: int) -> Array:
-        """MuJoCo's state of a run; result and arguments as in `OneRun.get_state`."""
-
-    def set_state(self, row: int, state: Array) -> None:
-        """Put a run into a state; arguments as in `OneRun.set_state`."""
+Engine: TypeAlias = OneRun | ManyRuns
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +43,7 @@ class EpisodeState:
     """The complete state of an episode in progress; continuing from it gives bit-identical results.
 
     Args:
-        physics: the plan's run with its effects, as integrated.
         mujoco: ``mj_getState`` of ``mjSTATE_INTEGRATION``, including the plugin's state, shape (n,).
-        arrays: readings so far, sensitivities and information, by name.
-        sensor: the run's effects on the reading.
     """
 
     plan: RunPlan
@@ -69,11 +55,7 @@ class EpisodeState:
 
 
 def observation_space(config: FreeDecayConfig) -> spaces.Box:
-    """The space of one environment's observations.
-
-    Returns:
-        Readings (rad), then time (s) and wind speed (m/s).
-    """
+    """The space of one environment's observations: readings (rad), then time (s) and wind speed (m/s)."""
     low = np.array([-READING_BOUND] * config.samples_per_step + [0.0, 0.0])
     high = np.array([READING_BOUND] * config.samples_per_step + [config.duration, config.wind_limit])
     return spaces.Box(low, high, dtype=np.float64)
@@ -85,10 +67,8 @@ class Episodes:
     def __init__(self, config: FreeDecayConfig, rig: Rig, engine: Engine, count: int) -> None:
         self._config, self._rig, self._engine, self._count = config, rig, engine, count
         samples = config.samples_per_step
-        self._prior = Prior.changed(config.prior)
-        self._information = Information(
-            count, samples, 1.0 / config.sample_rate, config.reading_variance, self._prior
-        )
+        interval, variance = 1.0 / config.sample_rate, config.reading_variance
+        self.information = Information(count, samples, interval, variance, Prior.changed(config.prior))
         self._wind = WindAnswer(config.control_period, samples, config.wind_time_constant)
         self._limit = angle_limit(rig)
         self._plans: list[RunPlan | None] = [None] * count
@@ -103,11 +83,7 @@ class Episodes:
     def start(
         self, row: int, options: Mapping[str, Any] | None, rng: np.random.Generator
     ) -> tuple[Array, dict[str, Any]]:
-        """Start an episode.
-
-        Raises:
-            EnvError: when an option is refused.
-        """
+        """Start an episode."""
         plan = plan_run(options, self._config, self._rig, rng)
         stated = plan.stated()
         try:
@@ -118,53 +94,39 @@ class Episodes:
             raise as_env_error(error, "reset options") from error
         self._plans[row], self._physics[row] = plan, physics
         self._readings.start(row, RunningSensor(chain, plan.sensor), rng)
-        self._information.start(row, self._nominal(plan))
+        self.information.start(row, stated, self._rig.body)
         self._stated_speed[row] = self._speed[row] = plan.condition.wind_speed
         self.step_count[row], self.ended[row] = 0, False
         time = self.step_count[row] * self._config.control_period
         shown = np.clip(self._readings.held(row, end_angle), -READING_BOUND, READING_BOUND)
         observation = np.concatenate((shown, (min(time, self._config.duration), self._speed[row])))
-        info: dict[str, Any] = dict(plan.statement())
+        given = ("spring_stiffness", "wind_speed", "air_density", "release_angle")  # to the operator
+        info: dict[str, Any] = {name: getattr(plan.condition, name) for name in given}
         if self._config.expose_truth:
             info["truth"] = plan
         return observation, info
 
-    def _nominal(self, plan: RunPlan) -> NominalRun:
-        truth, condition, body = plan.truth, plan.condition, self._rig.body
-        return NominalRun(
-            spring_stiffness=condition.spring_stiffness,
-            yaw_inertia=truth.yaw_inertia,
-            mechanical_damping=truth.mechanical_damping,
-            cn_beta=truth.cn_beta,
-            cn_r=truth.cn_r,
-            air_density=condition.air_density,
-            frontal_area=body.frontal_area,
-            reference_length=body.length,
-        )
-
     def advance(self, actions: Any) -> tuple[Array, Array, Flags, Flags]:
-        """Advance every episode by one control period, including those that have ended.
-
-        Args:
-            actions: shape (runs,) in the plain preset, (runs, 2) in the operator preset.
-
-        Returns:
-            Observations of shape (runs, samples + 2), rewards (nats), terminations and truncations of shape
-            (runs,).
-
-        Raises:
-            EnvError: when an action is refused.
-        """
-        speeds, moment = self._operate(actions)
+        """Advance all episodes: observations, shape (runs, samples + 2), rewards (nats) and ends, shape (runs,)."""
         operation = None
-        if self._config.preset == "operator":
+        if self._config.preset == "plain":
+            check_plain(actions, self._count)
+            speeds = np.broadcast_to(self._speed[:, None], (self._count, self._config.samples_per_step))
+            moment = np.zeros(self._count)
+        else:
+            set_point, moment = decode(self._config, actions)
+            if len(moment) != self._count:
+                raise EnvError(f"{len(moment)} actions for {self._count} runs", remedy="give one per run")
+            speeds, self._speed = self._wind.speeds(self._speed, set_point)
+            at = np.minimum(self.step_count, self._config.steps - 1)
+            self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
             operation = Operation(speeds - self._stated_speed[:, None], moment)
         angle, rate = self._engine.advance(operation)
         wild = ~(np.max(np.abs(angle), axis=1) <= self._limit)
         if wild.any():
             angle, rate = (np.nan_to_num(np.clip(values, -1e3, 1e3)) for values in (angle, rate))
         readings = self._readings.take(angle[:, :-1], self.step_count, ~self.ended)
-        rewards = self._information.advance(angle, rate, speeds.mean(axis=1), moment)
+        rewards = self.information.advance(angle, rate, speeds.mean(axis=1), moment)
         self.step_count += 1
         observations = np.empty((self._count, self._config.samples_per_step + 2))
         np.clip(readings, -READING_BOUND, READING_BOUND, out=observations[:, :-2])
@@ -174,30 +136,12 @@ class Episodes:
         self.ended |= wild | truncated
         return observations, rewards, wild, truncated
 
-    def _operate(self, actions: Any) -> tuple[Array, Array]:
-        """Wind speeds in the sample intervals, and moments; also writes the log."""
-        if self._config.preset == "plain":
-            check_plain(actions, self._count)
-            still = np.broadcast_to(self._speed[:, None], (self._count, self._config.samples_per_step))
-            return still, np.zeros(self._count)
-        set_point, moment = decode(self._config, actions)
-        if len(moment) != self._count:
-            raise EnvError(f"{len(moment)} actions for {self._count} runs", remedy="give one per run")
-        speeds, self._speed = self._wind.speeds(self._speed, set_point)
-        at = np.minimum(self.step_count, self._config.steps - 1)
-        self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)
-        return speeds, moment
-
     def outcome(self, row: int) -> dict[str, Any]:
-        """The content of ``info`` at the end of an episode.
-
-        Returns:
-            ``record``; ``run`` in the plain preset, ``operator_log`` in the other; ``truth`` where exposed.
-        """
+        """The content of ``info`` at the end of an episode, as the environment's page lists it."""
         plan, record = self._plan(row), self.record(row)
         info: dict[str, Any] = {"record": record}
         if self._config.preset == "plain":
-            info["run"] = plan.run(record)
+            info["run"] = stated_run(plan.condition, record)
         else:
             steps = int(self.step_count[row])
             time = np.arange(steps, dtype=np.float64) * self._config.control_period
@@ -207,14 +151,7 @@ class Episodes:
         return info
 
     def record(self, row: int) -> Record:
-        """The record of a run so far.
-
-        Returns:
-            The record, complete where the run has ended.
-
-        Raises:
-            EnvError: before the first step.
-        """
+        """The record of a run so far."""
         return self._readings.record(row, int(self.step_count[row]))
 
     def _plan(self, row: int) -> RunPlan:
@@ -222,10 +159,6 @@ class Episodes:
         if plan is None:
             raise EnvError("no episode has begun", remedy="call reset() first")
         return plan
-
-    def matrix(self, row: int) -> Array:
-        """The Fisher information so far; result and arguments as in `Information.matrix`."""
-        return self._information.matrix(row)
 
     def get_state(self, row: int) -> EpisodeState:
         """The complete state of an episode in progress."""
@@ -239,23 +172,16 @@ class Episodes:
             "step_count": self.step_count[row],
             "ended": self.ended[row],
         }
-        arrays = {name: np.array(value) for name, value in own.items()} | self._information.snapshot(row)
+        arrays = {name: np.array(value) for name, value in own.items()} | self.information.snapshot(row)
         return EpisodeState(plan, physics, self._engine.get_state(row), arrays, chain, rng)
 
     def set_state(self, row: int, state: EpisodeState) -> np.random.Generator:
-        """Continue an episode from a state of an environment with the same configuration.
-
-        Returns:
-            The generator that the episode uses from now on.
-
-        Raises:
-            EnvError: when the state belongs to a different configuration.
-        """
+        """Continue an episode from a state of the same configuration; the generator that it uses from now on."""
         rng = self._readings.restore(row, state.arrays["readings"], state.sensor, state.rng)
         self._engine.start(row, state.physics)
         self._engine.set_state(row, state.mujoco)
         self._plans[row], self._physics[row] = state.plan, state.physics
-        self._information.restore(row, self._nominal(state.plan), state.arrays)
+        self.information.restore(row, state.plan.stated(), self._rig.body, state.arrays)
         self._log[row] = state.arrays["log"]
         self._speed[row], self._stated_speed[row] = state.arrays["speed"], state.plan.condition.wind_speed
         self.step_count[row], self.ended[row] = state.arrays["step_count"], state.arrays["ended"]
@@ -270,18 +196,7 @@ class _HasRig(Protocol):
 
 
 def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") -> Campaign:
-    """The runs of finished episodes as one campaign.
-
-    Args:
-        runs: ``info["run"]`` of each, in the plain preset.
-
-    Returns:
-        The campaign. It states the rig's nominal inertia and the configured sensor, and contains no trace of the
-        truth. Runs with equal conditions are numbered.
-
-    Raises:
-        EnvError: when no run is given.
-    """
+    """The runs of finished episodes (plain preset) as one campaign, without the truth; equal ids are numbered."""
     listed = list(runs)
     if not listed:
         raise EnvError("no run is given", where="campaign_of", remedy="give info['run'] of finished episodes")
@@ -293,3 +208,129 @@ def campaign_of(runs: Iterable[Run], env: _HasRig, *, name: str = "episodes") ->
         numbered.append(replace(run, id=f"{run.id}-{seen[run.id]}") if run.id in repeated else run)
     sensor = SensorProperties.of(env.config.sensor(0.0))
     return Campaign(name, RigProperties.of(env.rig), sensor, tuple(numbered))
+
+
+class RunningSensor:
+    """The effects of one run on its reading."""
+
+    def __init__(self, chain: EffectChain, sensor: SensorModel) -> None:
+        self.chain = chain
+        self.sensor = chain.sensor(sensor)
+        self._remembers = any(effect.remembers for effect in chain.effects)
+        self._angles: list[Array] = []
+        self._times: list[Array] = []
+
+    def copied(self) -> RunningSensor:
+        """An independent copy at the same point of the run."""
+        other = copy.copy(self)
+        vars(other).update(_angles=list(self._angles), _times=list(self._times))
+        return other
+
+    def angle(self, angle: Array, time_s: Array) -> Array:
+        """The angle that the sensor measures in the next samples, before zero and noise are added.
+
+        Args:
+            angle: of the rod's upper end, shape (n,), rad.
+            time_s: shape (n,), s; continues from the previous call.
+        """
+        if not self._remembers:
+            return self.chain.angle(angle, time_s)
+        self._angles.append(angle.copy())
+        self._times.append(time_s)
+        seen = self.chain.angle(np.concatenate(self._angles), np.concatenate(self._times))
+        return seen[-len(angle) :]
+
+
+class Readings:
+    """The potentiometer readings of many runs; ``row`` is the index of a run."""
+
+    def __init__(self, config: FreeDecayConfig, count: int) -> None:
+        self._samples = config.samples_per_step
+        self._steps = config.steps
+        self._times = np.arange(config.steps * config.samples_per_step) / config.sample_rate
+        self._interval = 1.0 / config.sample_rate
+        self._running: list[RunningSensor | None] = [None] * count
+        self._rngs: list[np.random.Generator] = [np.random.default_rng(0)] * count
+        self._altered: set[int] = set()  # runs with effects on the reading
+        self._sensor = np.zeros((3, count, 1))  # zero, noise, resolution
+        self._values = np.zeros((count, config.steps * config.samples_per_step))
+
+    def start(self, row: int, running: RunningSensor, rng: np.random.Generator) -> None:
+        """Start a run with its effects on the reading."""
+        self._running[row], self._rngs[row] = running, rng
+        sensor = running.sensor
+        self._sensor[:, row, 0] = sensor.zero, sensor.noise_std, sensor.resolution
+        (self._altered.discard if running.chain.reads_plainly else self._altered.add)(row)
+
+    def held(self, row: int, angle: float) -> Array:
+        """Readings (rad) of the control period before the release, shape (samples,), with noise of their own.
+
+        Args:
+            angle: at which the rod's upper end is held, rad.
+        """
+        chain, sensor = self._of(row).chain, self._of(row).sensor
+        time = np.arange(-self._samples, 0, dtype=np.float64) * self._interval
+        noise = self._rngs[row].spawn(1)[0].standard_normal(self._samples)
+        held = chain.angle(np.full(self._samples, angle), time)  # later samples do not depend on it
+        return quantise(chain.reading(held + sensor.zero + sensor.noise_std * noise), sensor.resolution)
+
+    def take(self, angle: Array, step: NDArray[np.int64], running: NDArray[np.bool_]) -> Array:
+        """The next readings of all runs, shape (runs, samples), rad.
+
+        Args:
+            angle: of the rod's upper end at the samples, shape (runs, samples), rad.
+            step: number of the control period, shape (runs,).
+            running: which runs are in progress, shape (runs,); the generators of the others are not used.
+        """
+        noise = np.zeros_like(angle)
+        for row in np.flatnonzero(running).tolist():
+            self._rngs[row].standard_normal(out=noise[row])
+        first = np.minimum(step, self._steps - 1) * self._samples
+        if self._altered:
+            angle = angle.copy()
+        for row in self._altered:
+            times = self._times[first[row] : first[row] + self._samples]
+            angle[row] = self._of(row).angle(angle[row], times)
+        zero, noise_std, resolution = self._sensor
+        readings = angle + zero + noise_std * noise
+        for row in self._altered:
+            readings[row] = self._of(row).chain.reading(readings[row])
+        size = np.where(resolution > 0.0, resolution, 1.0)
+        readings = np.where(resolution > 0.0, np.round(readings / size) * size, readings)
+        if (first == first[0]).all():
+            self._values[:, first[0] : first[0] + self._samples] = readings
+        else:
+            columns = first[:, None] + np.arange(self._samples)
+            self._values[np.arange(len(first))[:, None], columns] = readings
+        return readings
+
+    def record(self, row: int, steps: int) -> Record:
+        """The record of a run over its first control periods."""
+        count = steps * self._samples
+        if count < 2:
+            raise EnvError("there is no reading yet", where="record", remedy="call step() first")
+        return Record(self._times[:count], self._values[row, :count])
+
+    def snapshot(self, row: int) -> tuple[Array, RunningSensor, np.random.Generator]:
+        """Copies of the state of a run."""
+        return self._values[row].copy(), self._of(row).copied(), copy.deepcopy(self._rngs[row])
+
+    def restore(
+        self, row: int, values: Array, running: RunningSensor, rng: np.random.Generator
+    ) -> np.random.Generator:
+        """Restore a run from a snapshot, with copies; the generator that it uses from now on.
+
+        Args:
+            values: readings from `snapshot`, shape (n,), rad.
+        """
+        if np.shape(values) != self._values[row].shape:
+            raise EnvError("the state belongs to a different configuration", remedy="use the same arguments")
+        self.start(row, running.copied(), copy.deepcopy(rng))
+        self._values[row] = values
+        return self._rngs[row]
+
+    def _of(self, row: int) -> RunningSensor:
+        running = self._running[row]
+        if running is None:
+            raise EnvError("no episode has begun", remedy="call reset() first")
+        return running

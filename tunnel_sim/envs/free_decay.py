@@ -11,11 +11,10 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.conditions import free_decay_config
-from tunnel_sim.envs.controls import action_space, operator_action
-from tunnel_sim.envs.engines import ManyRuns, Models, OneRun
+from tunnel_sim.envs.engines import ManyRuns, Models, OneRun, action_space, operator_action
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
-from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView, render_modes
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -25,13 +24,9 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
     Args:
         render_mode: ``human``: MuJoCo's viewer; ``rgb_array``: pictures; None: nothing is drawn.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
+        width, height: of a picture, pixels.
         camera: name of a camera of ``mjcf/rig.xml``.
         **arguments: fields of `FreeDecayConfig`.
-
-    Raises:
-        EnvError: when an argument is unknown or out of range.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 100}  # type: ignore[misc]
@@ -63,19 +58,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Start a run.
-
-        Args:
-            seed: of all random draws, as in Gymnasium.
-            options: properties of the run; the others are drawn. See the environment's page.
-
-        Returns:
-            The observation (readings before the release, time 0 and wind speed), and the stated conditions of the
-            run.
-
-        Raises:
-            EnvError: when an option is unknown or out of range.
-        """
+        """Start a run; the options that the environment's page lists fix its properties, the others are drawn."""
         super().reset(seed=seed)
         observation, info = self._episodes.start(0, options, self.np_random)
         if self.render_mode == "human":
@@ -83,18 +66,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Advance the run by one control period.
-
-        Args:
-            action: 0 in the plain preset; set-point and moment, each from −1 to 1, in the operator preset.
-
-        Returns:
-            Observation, information gained (nats), whether the angle left the sensor's range, whether the run
-            has ended, and info.
-
-        Raises:
-            EnvError: when the action is outside the space, or no run is in progress.
-        """
+        """Advance the run by one control period; the reward is the information gained, in nats."""
         if self._episodes.ended[0]:
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
         many = self._episodes.advance(np.asarray(action)[None])
@@ -105,63 +77,32 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         return observation, float(reward), bool(terminated), bool(truncated), info
 
     def operator_action(self, *, wind_speed: float, moment: float = 0.0) -> np.ndarray[Any, Any]:
-        """The action of the operator preset from values in SI units.
+        """The action of the operator preset, shape (2,), from values in SI units within their limits.
 
         Args:
             wind_speed: set-point, m/s.
             moment: applied yaw moment, N m.
-
-        Returns:
-            The action, shape (2,).
-
-        Raises:
-            EnvError: when one is beyond its limit.
         """
         return operator_action(self.config, wind_speed=wind_speed, moment=moment)
 
     def information(self) -> Array:
-        """The Fisher information so far, including the prior.
-
-        It is computed at the true coefficients, so an agent must not observe it.
-
-        Returns:
-            Shape (7, 7), in the order of ``tunnel_sim.envs.information.UNKNOWNS``.
-        """
-        return self._episodes.matrix(0)
+        """The Fisher information so far with the prior, shape (7, 7), at the truth: not for the agent."""
+        return self._episodes.information.matrix(0)
 
     def record(self) -> Record:
-        """The record so far, for example of a run ended by ``TimeLimit``.
-
-        Raises:
-            EnvError: before the first step.
-        """
+        """The record so far, for example of a run ended by ``TimeLimit``."""
         return self._episodes.record(0)
 
     def get_state(self) -> EpisodeState:
-        """The complete state of the episode in progress, including the states of MuJoCo and the plugin.
-
-        Raises:
-            EnvError: when no episode has begun.
-        """
+        """The complete state of the episode in progress, including the states of MuJoCo and the plugin."""
         return self._episodes.get_state(0)
 
     def set_state(self, state: EpisodeState) -> None:
-        """Continue from a saved state of this environment, or of one with the same configuration.
-
-        Raises:
-            EnvError: when the state belongs to a different configuration.
-        """
+        """Continue from a saved state of this environment, or of one with the same configuration."""
         self.np_random = self._episodes.set_state(0, state)
 
     def render(self) -> Any:
-        """Draw the rig in its present position.
-
-        Returns:
-            A picture of shape (height, width, 3), uint8, in mode ``rgb_array``; None otherwise.
-
-        Raises:
-            EnvError: when rendering does not work on this machine, with the remedy.
-        """
+        """Draw the rig in its present position: a picture, shape (height, width, 3), in mode ``rgb_array``."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() is called without a render_mode; give one to gymnasium.make")
             return None
@@ -173,14 +114,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
 
 
 def render_fps(control_period: float) -> float | int:
-    """Pictures per second of real time, 1/dt.
-
-    Args:
-        control_period: s.
-
-    Returns:
-        Hz, as an integer where possible.
-    """
+    """Pictures per second of real time for a control period in s, 1/dt, Hz; an integer where possible."""
     rate = 1.0 / control_period
     return round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate
 
@@ -191,15 +125,10 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
     A run that has ended is restarted in the next step (``AutoresetMode.NEXT_STEP``), with all properties drawn.
 
     Args:
-        num_envs: number of runs.
-        render_mode: ``rgb_array`` or None.
         max_episode_steps: number of steps after which runs are truncated; None: at their end only.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
         width, height, camera: as in `FreeDecayEnv`.
         **arguments: fields of `FreeDecayConfig`.
-
-    Raises:
-        EnvError: when an argument is unknown or out of range.
     """
 
     metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
@@ -237,10 +166,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         self._view = RigView(self.rig, render_mode, width, height, camera, self.config.control_period)
 
     def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Start all runs, or those selected by a mask.
 
@@ -248,17 +174,24 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
             seed: one per run, or the first of consecutive seeds, or None, as in ``SyncVectorEnv``.
             options: as in `FreeDecayEnv.reset`, for all runs. ``reset_mask``, a boolean array, selects the runs to
                 start; ``runs``, a sequence of mappings, overrides the common options run by run.
-
-        Returns:
-            Observations of all runs (zeros where the mask excludes a run), and infos.
-
-        Raises:
-            EnvError: when an option, mask or seed is refused.
         """
         common = dict(options or {})
-        mask = self._mask(common.pop("reset_mask", None))
-        each = self._each(common.pop("runs", None))
-        seeds = self._seeds(seed)
+        mask, each = common.pop("reset_mask", None), common.pop("runs", None)
+        mask = np.ones(self.num_envs, dtype=np.bool_) if mask is None else np.asarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            what = f"reset_mask is not a boolean array of length {self.num_envs} with at least one True"
+            raise EnvError(what, where="option reset_mask", remedy="give one boolean per run")
+        each = [{}] * self.num_envs if each is None else each
+        if not isinstance(each, Sequence) or len(each) != self.num_envs:
+            what = f"runs is not a sequence of length {self.num_envs}"
+            raise EnvError(what, where="option runs", remedy="give one mapping per run")
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + row for row in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            what = f"{len(seeds)} seeds for {self.num_envs} runs"
+            raise EnvError(what, where="seed", remedy="give one per run")
         observations = np.zeros(self.observation_space.shape or ())
         infos: dict[str, Any] = {}
         for row in np.flatnonzero(mask).tolist():
@@ -275,52 +208,8 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         observation, info = self._episodes.start(row, options, rng)
         return observation, self._add_info(infos, info, row)
 
-    def _mask(self, mask: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        if mask is None:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        values = np.asarray(mask)
-        if values.shape != (self.num_envs,) or values.dtype != np.bool_ or not values.any():
-            raise EnvError(
-                f"reset_mask is not a boolean array of length {self.num_envs} with at least one True",
-                where="option reset_mask",
-                remedy="give one boolean per run",
-            )
-        return values
-
-    def _each(self, runs: Any) -> Sequence[Mapping[str, Any]]:
-        if runs is None:
-            return [{}] * self.num_envs
-        if not isinstance(runs, Sequence) or len(runs) != self.num_envs:
-            raise EnvError(
-                f"runs is not a sequence of length {self.num_envs}",
-                where="option runs",
-                remedy="give one mapping per run",
-            )
-        return runs
-
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, int | np.integer):
-            return [int(seed) + row for row in range(self.num_envs)]
-        if len(seed) != self.num_envs:
-            raise EnvError(
-                f"{len(seed)} seeds for {self.num_envs} runs", where="seed", remedy="give one per run"
-            )
-        return seed
-
     def step(self, actions: Any) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Advance all runs by one control period; runs that ended in the previous step are restarted instead.
-
-        Args:
-            actions: from ``action_space``; the action of a run that is restarted is ignored.
-
-        Returns:
-            Observations, information gained (nats), terminations, truncations and infos.
-
-        Raises:
-            EnvError: when an action is outside the space, or before the first reset.
-        """
+        """Advance all runs as `FreeDecayEnv.step` does, or restart those that ended in the previous step."""
         if any(rng is None for rng in self._rngs):
             raise EnvError("no run is in progress", where="step", remedy="call reset() first")
         renewed = np.flatnonzero(self._episodes.ended)
@@ -341,23 +230,12 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return self._episodes.get_state(index)
 
     def set_state(self, index: int, state: EpisodeState) -> None:
-        """Put one run into a state.
-
-        Args:
-            state: from an environment of the same configuration.
-
-        Raises:
-            EnvError: when the state belongs to a different configuration.
-        """
+        """Put one run into a state of an environment of the same configuration."""
         self._rngs[index] = self._episodes.set_state(index, state)
 
     def information(self, index: int) -> Array:
-        """The Fisher information of one run so far.
-
-        Returns:
-            Shape (7, 7), as `FreeDecayEnv.information`.
-        """
-        return self._episodes.matrix(index)
+        """The Fisher information of one run so far, shape (7, 7), as `FreeDecayEnv.information`."""
+        return self._episodes.information.matrix(index)
 
     def render(self) -> tuple[Any, ...] | None:
         """A picture of every run; result and arguments as in `FreeDecayEnv.render`."""
@@ -366,11 +244,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         return tuple(self._view.draw(*self._engine.pose(row)) for row in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the rendering context.
-
-        Args:
-            **kwargs: not used.
-        """
+        """Close the rendering context."""
         del kwargs
         if hasattr(self, "_view"):  # Gymnasium before 1.3 closes also what could not be made
             self._view.close()

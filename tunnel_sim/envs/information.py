@@ -1,30 +1,9 @@
 """The information that a run gives about Cnβ and Cnr, sample by sample, from the sensitivities along its motion.
 
-In the nominal model Izz β̈ + (Cr − Ca) β̇ + (Kr
-− Ka) β = M(t) the sensitivity x = ∂β/∂p to an unknown p obeys
-
-    ẍ + 2a ẋ + k x = u(t),   2a = (Cr − Ca)/Izz,   k = (Kr − Ka)/Izz.
-
-The motion itself drives it: u = ½ρV²Al β/Izz for Cnβ, ½ρVAl² β̇/Izz for Cnr, −β̇/Izz for Cr and −β̈/Izz for Izz.
-For angle and rate at the release u = 0, and the initial values are (1, 0) and (0, 1). In each sample interval the
-homogeneous part is propagated exactly; u is integrated by Simpson's rule, with its middle value from the cubic
-through both ends. The wind speed is replaced by its mean over a control period. Where effects act that the nominal
-model does not include, the motion is the real one, and the sensitivities are those of the nominal model.
-
-The reading of a run is y = β(t; p) + zero +
-noise of variance σ². With the sensitivities s = ∂y/∂p of the nominal model, the Fisher information of all unknowns
-is
-
-    J = P⁻¹ + Σ s sᵀ/σ²,
-
-where P is the prior covariance and the sum runs over the samples so far. The unknowns are Izz, Cr, the angle and
-rate at the release, the sensor's zero, Cnβ and Cnr. Eliminating the first five gives the Schur complement S;
-½ log det S, in nats, measures the information about (Cnβ, Cnr). Its increase over a step is the reward of the step
-and cannot be negative. Source: S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory (1993),
-ch. 3; ½ log det as a measure of an experiment: D. V. Lindley, Ann. Math. Stat. 27 (1956) 986, doi
-10.1214/aoms/1177728069.
-
-Many runs are processed at once; the numbers of a run do not depend on how many there are.
+docs/reference/envs/free-decay.md has the equations. In each sample interval the homogeneous part of a
+sensitivity is propagated exactly; its drive is integrated by Simpson's rule, with the middle value from the
+cubic through both ends. Source: S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory
+(1993), ch. 3.
 """
 
 from __future__ import annotations
@@ -35,147 +14,22 @@ from math import isfinite
 
 import numpy as np
 
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Body
 
 DYNAMIC = 6  # Izz, Cr, angle, rate, Cnβ, Cnr; the zero's sensitivity is one
 
 
-@dataclass(frozen=True)
-class NominalRun:
-    """The nominal model of one run.
-
-    Args:
-        spring_stiffness: Kr as stated, N m/rad.
-        yaw_inertia: Izz, kg m².
-        mechanical_damping: Cr, N m s/rad.
-        cn_beta: Cnβ, 1/rad.
-        cn_r: Cnr, 1/rad.
-        air_density: ρ, kg/m³.
-        frontal_area: A, m².
-        reference_length: l, m.
-    """
-
-    spring_stiffness: float
-    yaw_inertia: float
-    mechanical_damping: float
-    cn_beta: float
-    cn_r: float
-    air_density: float
-    frontal_area: float
-    reference_length: float
-
-    def coefficients(self) -> tuple[float, ...]:
-        """Kr/Izz, Cr/Izz, then ½ρAl/Izz and ½ρAl²/Izz without and with their coefficients, and 1/Izz."""
-        inertia = self.yaw_inertia
-        stiffness = 0.5 * self.air_density * self.frontal_area * self.reference_length / inertia
-        damping = stiffness * self.reference_length
-        return (
-            self.spring_stiffness / inertia,
-            self.mechanical_damping / inertia,
-            stiffness,
-            damping,
-            stiffness * self.cn_beta,
-            damping * self.cn_r,
-            1.0 / inertia,
-        )
-
-
-class Sensitivities:
-    """Sensitivities of many runs in progress.
-
-    Args:
-        samples: number of samples in one step.
-        interval: between samples, s.
-    """
-
-    def __init__(self, count: int, samples: int, interval: float) -> None:
-        self._samples = samples
-        self._interval = interval
-        self._runs = np.ones((7, count))
-        self._x = np.zeros((2, count, DYNAMIC))  # value and rate
-        self._speed = np.full(count, np.nan)  # for which the propagators hold
-        self._propagator = np.zeros((6, count))
-        self._decay = np.zeros((2, count))
-
-    def start(self, row: int, run: NominalRun) -> None:
-        """Start a run."""
-        self._runs[:, row] = run.coefficients()
-        self._x[:, row] = 0.0
-        self._x[0, row, 2] = self._x[1, row, 3] = 1.0
-        self._speed[row] = np.nan
-
-    def snapshot(self, row: int) -> dict[str, Array]:
-        """Copies of the state of a run; result and arguments as in `Information.snapshot`."""
-        return {"sensitivities": self._x[:, row].copy()}
-
-    def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
-        """Restore a run from a snapshot; arguments as in `Information.restore`."""
-        self.start(row, run)
-        self._x[:, row] = state["sensitivities"]
-
-    def advance(self, angle: Array, rate: Array, wind_speed: Array, moment: Array) -> Array:
-        """Propagate the sensitivities through one step; arguments as in `Information.advance`.
-
-        Returns:
-            Sensitivities of the readings at the samples, shape (runs, 7, samples), in the order of `UNKNOWNS`.
-        """
-        if not np.array_equal(wind_speed, self._speed):
-            stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
-            a = 0.5 * (damping - air_damping * wind_speed)
-            k = stiffness - air_stiffness * wind_speed**2
-            self._speed, self._decay = wind_speed.copy(), np.stack((a, k))
-            whole = propagator(a, k, self._interval)
-            half = propagator(a, k, 0.5 * self._interval)
-            self._propagator = np.stack((*whole, half[1], half[3]))
-        kicks = self._kicks(angle, rate, wind_speed, moment)
-        f00, f01, f10, f11 = (row[:, None] for row in self._propagator[:4])
-        x, v = self._x
-        out = np.ones((self._samples, len(self._speed), DYNAMIC + 1))  # the sensitivity to the zero remains 1
-        for j in range(self._samples):
-            out[j, :, :4], out[j, :, 5:] = x[:, :4], x[:, 4:]
-            x, v = f00 * x + f01 * v + kicks[0, j], f10 * x + f11 * v + kicks[1, j]
-        self._x = np.stack((x, v))
-        return out.transpose(1, 2, 0)
-
-    def _kicks(self, angle: Array, rate: Array, speed: Array, moment: Array) -> Array:
-        """What u adds to value and rate in each interval, shape (2, samples, runs, DYNAMIC)."""
-        h = self._interval
-        a, k = self._decay
-        _, f01, _, f11, m01, m11 = self._propagator
-        _, _, stiffness, damping, _, _, inverse = self._runs
-        begin, end = angle[:, :-1], angle[:, 1:]
-        rate0, rate1 = rate[:, :-1], rate[:, 1:]
-        sums = np.empty((2, 2, self._samples, len(speed)))  # of value, rate; driven by the angle, its rate
-        for drive, (u0, middle, u1) in enumerate(
-            (
-                (begin.T, (0.5 * (begin + end) + 0.125 * h * (rate0 - rate1)).T, end.T),
-                (rate0.T, (1.5 * (end - begin) / h - 0.25 * (rate0 + rate1)).T, rate1.T),
-            )
-        ):
-            sums[0, drive] = (h / 6.0) * (f01 * u0 + 4.0 * m01 * middle)
-            sums[1, drive] = (h / 6.0) * (f11 * u0 + 4.0 * m11 * middle + u1)
-        push = (h / 6.0) * np.stack((f01 + 4.0 * m01, f11 + 4.0 * m11 + 1.0)) * (moment * inverse)
-        kicks = np.zeros((2, self._samples, len(speed), DYNAMIC))
-        by_angle, by_rate = sums[:, 0], sums[:, 1]
-        kicks[..., 0] = inverse * (k * by_angle + 2.0 * a * by_rate - push[:, None])  # −β̈/Izz
-        kicks[..., 1] = -inverse * by_rate
-        kicks[..., 4] = stiffness * speed**2 * by_angle
-        kicks[..., 5] = damping * speed * by_rate
-        return kicks
-
-
 def propagator(a: Array, k: Array, duration: float) -> tuple[Array, Array, Array, Array]:
-    """Exact solution of ẍ + 2a ẋ + k x = 0 after a time, from (x, ẋ) = (1, 0) and (0, 1).
+    """Exact solution of ẍ + 2a ẋ + k x = 0 after a time: x from (1, 0) and (0, 1), then ẋ; each of shape (n,).
 
     Args:
         a: shape (n,), 1/s.
         k: shape (n,), 1/s²; may be below a², or negative.
         duration: s.
-
-    Returns:
-        x from (1, 0), x from (0, 1), ẋ from (1, 0), ẋ from (0, 1), each of shape (n,).
     """
     omega = np.sqrt((k - a**2).astype(np.complex128))
     decay = np.exp(-a * duration)
@@ -195,13 +49,10 @@ class Prior:
     """What is known before the run, as standard deviations; 0: known exactly.
 
     Args:
-        yaw_inertia: as a share of Izz, dimensionless; known from wind-off runs with the spring.
-        mechanical_damping: as a share of Cr, dimensionless; known from the same runs.
-        release_angle: rad.
+        yaw_inertia, mechanical_damping: as a share of Izz and Cr; known from wind-off runs with the spring.
+        release_angle, sensor_zero: rad.
         release_rate: rad/s.
-        sensor_zero: rad.
-        cn_beta: 1/rad, above 0.
-        cn_r: 1/rad, above 0.
+        cn_beta, cn_r: 1/rad, above 0.
     """
 
     yaw_inertia: float = 1e-4
@@ -214,115 +65,141 @@ class Prior:
 
     @staticmethod
     def changed(changes: Mapping[str, float]) -> Prior:
-        """The prior with some of its numbers changed.
-
-        Args:
-            changes: standard deviations by name, in the units above.
-
-        Raises:
-            EnvError: when a name is unknown or a number out of range.
-        """
+        """The prior with some of its standard deviations changed."""
         known = [item.name for item in fields(Prior)]
         for name, value in changes.items():
             if name not in known:
                 raise EnvError(f"unknown prior {name!r}", where="prior", remedy=did_you_mean(name, known))
             least = 0.0 if name not in ("cn_beta", "cn_r") else 1e-300
             if not isinstance(value, int | float) or not isfinite(value) or value < least:
-                raise EnvError(
-                    f"{name} = {value!r} is not a standard deviation",
-                    where="prior",
-                    remedy="give it, SI units",
-                )
+                what = f"{name} = {value!r} is not a standard deviation"
+                raise EnvError(what, where="prior", remedy="give it, SI units")
         return replace(Prior(), **changes)
 
-    def scales(self, run: NominalRun) -> Array:
-        """The standard deviations in the units of the unknowns.
-
-        Returns:
-            Shape (7,), in the order of `UNKNOWNS`.
-        """
+    def scales(self, run: RunSettings) -> Array:
+        """The standard deviations in the units of the unknowns, shape (7,), in the order of `UNKNOWNS`."""
         own = {"yaw_inertia": run.yaw_inertia, "mechanical_damping": abs(run.mechanical_damping)}
         return np.array([getattr(self, name) * own.get(name, 1.0) for name in UNKNOWNS])
 
 
 class Information:
-    """The Fisher information of many runs in progress; ``row`` is the index of a run.
+    """The Fisher information of many runs in progress, and the sensitivities behind it; ``row`` is a run's index.
 
     Args:
         samples: number of samples in one step.
         interval: between samples, s.
         variance: of a reading, rad².
-        prior: what is known before a run.
     """
 
     def __init__(self, count: int, samples: int, interval: float, variance: float, prior: Prior) -> None:
-        self._prior = prior
-        self._variance = variance
+        self._samples, self._interval, self._variance, self._prior = samples, interval, variance, prior
+        self._runs = np.ones((7, count))
+        self._x = np.zeros((2, count, DYNAMIC))  # sensitivity of the angle, and its rate
+        self._speed = np.full(count, np.nan)  # for which the propagators hold
+        self._propagator = np.zeros((6, count))
+        self._decay = np.zeros((2, count))
         size = len(UNKNOWNS)
-        self._sensitivities = Sensitivities(count, samples, interval)
         self._scale = np.ones((count, size))  # the matrices use the prior standard deviations as units
         self.scaled = np.tile(np.eye(size), (count, 1, 1))
         self.known = np.zeros(count)
 
-    def start(self, row: int, run: NominalRun) -> None:
-        """Start a run."""
-        self._sensitivities.start(row, run)
+    def start(self, row: int, run: RunSettings, body: Body) -> None:
+        """Start a run, its physics without effects, of a body."""
+        inertia = run.yaw_inertia
+        stiffness = 0.5 * run.air_density * body.frontal_area * body.length / inertia
+        damping = stiffness * body.length
+        # Kr/Izz, Cr/Izz, then ½ρAl/Izz and ½ρAl²/Izz without and with their coefficients, and 1/Izz
+        self._runs[:, row] = (
+            run.spring_stiffness / inertia,
+            run.mechanical_damping / inertia,
+            stiffness,
+            damping,
+            stiffness * run.derivatives.cn_beta,
+            damping * run.derivatives.cn_r,
+            1.0 / inertia,
+        )
+        self._x[:, row] = 0.0
+        self._x[0, row, 2] = self._x[1, row, 3] = 1.0
+        self._speed[row] = np.nan
         self._scale[row] = self._prior.scales(run)
         self.scaled[row] = np.eye(len(UNKNOWNS))
         self.known[row] = 0.0
 
     def advance(self, angle: Array, rate: Array, wind_speed: Array, moment: Array) -> Array:
-        """Add the samples of one step.
+        """Add the samples of one step; the information gained about (Cnβ, Cnr), shape (runs,), nats.
 
         Args:
-            angle: at the samples and at the end of the step, shape (runs, samples + 1), rad.
-            rate: at the same times, shape (runs, samples + 1), rad/s.
+            angle, rate: at the samples and at the end of the step, shape (runs, samples + 1), rad and rad/s.
             wind_speed: mean over the step, shape (runs,), m/s.
             moment: applied by the operator, shape (runs,), N m.
-
-        Returns:
-            The information gained about (Cnβ, Cnr), shape (runs,), nats.
         """
-        of_reading = self._sensitivities.advance(angle, rate, wind_speed, moment)  # (runs, 7, samples)
+        if not np.array_equal(wind_speed, self._speed):
+            stiffness, damping, _, _, air_stiffness, air_damping, _ = self._runs
+            a = 0.5 * (damping - air_damping * wind_speed)
+            k = stiffness - air_stiffness * wind_speed**2
+            self._speed, self._decay = wind_speed.copy(), np.stack((a, k))
+            whole = propagator(a, k, self._interval)
+            half = propagator(a, k, 0.5 * self._interval)
+            self._propagator = np.stack((*whole, half[1], half[3]))
+        # What u adds to value and rate in each interval: kicks, shape (2, samples, runs, DYNAMIC).
+        h = self._interval
+        a, k = self._decay
+        _, f01, _, f11, m01, m11 = self._propagator
+        _, _, stiffness, damping, _, _, inverse = self._runs
+        begin, end = angle[:, :-1], angle[:, 1:]
+        rate0, rate1 = rate[:, :-1], rate[:, 1:]
+        sums = np.empty(
+            (2, 2, self._samples, len(wind_speed))
+        )  # of value, rate; driven by the angle, its rate
+        for drive, (u0, middle, u1) in enumerate(
+            (
+                (begin.T, (0.5 * (begin + end) + 0.125 * h * (rate0 - rate1)).T, end.T),
+                (rate0.T, (1.5 * (end - begin) / h - 0.25 * (rate0 + rate1)).T, rate1.T),
+            )
+        ):
+            sums[0, drive] = (h / 6.0) * (f01 * u0 + 4.0 * m01 * middle)
+            sums[1, drive] = (h / 6.0) * (f11 * u0 + 4.0 * m11 * middle + u1)
+        push = (h / 6.0) * np.stack((f01 + 4.0 * m01, f11 + 4.0 * m11 + 1.0)) * (moment * inverse)
+        kicks = np.zeros((2, self._samples, len(wind_speed), DYNAMIC))
+        by_angle, by_rate = sums[:, 0], sums[:, 1]
+        kicks[..., 0] = inverse * (k * by_angle + 2.0 * a * by_rate - push[:, None])  # −β̈/Izz
+        kicks[..., 1] = -inverse * by_rate
+        kicks[..., 4] = stiffness * wind_speed**2 * by_angle
+        kicks[..., 5] = damping * wind_speed * by_rate
+        f00, f01, f10, f11 = (row[:, None] for row in self._propagator[:4])
+        x, v = self._x
+        out = np.ones((self._samples, len(self._speed), DYNAMIC + 1))  # the sensitivity to the zero remains 1
+        for j in range(self._samples):
+            out[j, :, :4], out[j, :, 5:] = x[:, :4], x[:, 4:]
+            x, v = f00 * x + f01 * v + kicks[0, j], f10 * x + f11 * v + kicks[1, j]
+        self._x = np.stack((x, v))
+        of_reading = out.transpose(1, 2, 0)  # (runs, 7, samples)
         of_reading *= self._scale[:, :, None]
         self.scaled += np.matmul(of_reading, of_reading.transpose(0, 2, 1)) / self._variance
         before, self.known = self.known, half_log_det(self.scaled)
         return np.maximum(self.known - before, 0.0)
 
     def matrix(self, row: int) -> Array:
-        """The Fisher information of one run, including its prior.
-
-        Returns:
-            Shape (7, 7), in the order of `UNKNOWNS` and in the inverse products of their units; infinite where
-            the prior is exact.
-        """
+        """The Fisher information of one run, shape (7, 7), as `UNKNOWNS`; infinite where the prior is exact."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.scaled[row] / np.outer(self._scale[row], self._scale[row]))
 
     def snapshot(self, row: int) -> dict[str, Array]:
         """Copies of the state of a run in progress."""
         own = {"scale": self._scale[row], "scaled": self.scaled[row], "known": self.known[row]}
-        return {name: np.array(value) for name, value in own.items()} | self._sensitivities.snapshot(row)
+        own["sensitivities"] = self._x[:, row]
+        return {name: np.array(value) for name, value in own.items()}
 
-    def restore(self, row: int, run: NominalRun, state: Mapping[str, Array]) -> None:
+    def restore(self, row: int, run: RunSettings, body: Body, state: Mapping[str, Array]) -> None:
         """Restore a run from a snapshot."""
-        self._sensitivities.restore(row, run, state)
-        self._scale[row], self.scaled[row], self.known[row] = (
-            state["scale"],
-            state["scaled"],
-            state["known"],
-        )
+        self.start(row, run, body)
+        self._x[:, row] = state["sensitivities"]
+        self._scale[row], self.scaled[row] = state["scale"], state["scaled"]
+        self.known[row] = state["known"]
 
 
 def half_log_det(information: Array) -> Array:
-    """½ log det of the information about the last two unknowns, with all others eliminated.
-
-    Args:
-        information: positive definite, shape (n, m, m).
-
-    Returns:
-        Shape (n,), nats.
-    """
+    """½ log det of information, shape (n, m, m), about the last two unknowns: shape (n,), nats."""
     rest = information
     for _ in range(information.shape[-1] - 2):
         column = rest[:, 1:, 0]

@@ -1,7 +1,7 @@
 """Pictures of the rig during an episode, off-screen or in MuJoCo's viewer.
 
-A separate model is posed like the run and drawn, so that one window lasts for all episodes and many runs share one
-rendering context.
+A separate model is posed like the run and drawn, so that one window lasts for all episodes and many runs
+share one rendering context.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.engine.model import build_model
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -33,23 +33,16 @@ class RigView:
     """Draws the rig.
 
     Args:
-        mode: ``human``, ``rgb_array`` or None.
-        width: of a picture, pixels.
-        height: of a picture, pixels.
-        camera: name of a camera of ``mjcf/rig.xml``.
+        width, height: of a picture, pixels.
         period: time between two frames in a window, s.
-
-    Raises:
-        EnvError: for an unknown mode, camera or size.
     """
 
     def __init__(
         self, rig: Rig, mode: str | None, width: int, height: int, camera: str, period: float
     ) -> None:
         if mode is not None and mode not in RENDER_MODES:
-            raise EnvError(
-                f"unknown mode {mode!r}", where="render_mode", remedy=did_you_mean(str(mode), RENDER_MODES)
-            )
+            remedy = did_you_mean(str(mode), RENDER_MODES)
+            raise EnvError(f"unknown mode {mode!r}", where="render_mode", remedy=remedy)
         self._rig, self._mode, self._period = rig, mode, period
         self._width, self._height, self._camera = width, height, camera
         self._model: Any = None
@@ -59,24 +52,42 @@ class RigView:
         self._shown = 0.0
 
     def draw(self, end: float, twist: float) -> Any:
-        """Draw one pose.
+        """Draw one pose: a picture of shape (height, width, 3), uint8; None in a window.
 
         Args:
             end: angle of the rod's upper end, rad.
             twist: angle of the body relative to it, rad.
-
-        Returns:
-            A picture of shape (height, width, 3), uint8; None in a window.
-
-        Raises:
-            EnvError: when rendering does not work on this machine.
         """
         if self._model is None:
-            self._build()
+            dynamics = self._rig.dynamics
+            settings = RunSettings(
+                self._rig.spring(dynamics.default_spring),
+                AeroDerivatives(0.0, 0.0),
+                dynamics.yaw_inertia,
+                dynamics.mechanical_damping,
+                rod_twist=RodTwist(1e-3, 0.5),  # two joints, so that any run can be shown
+            )
+            model = build_model(self._rig, settings).mj
+            cameras = [model.camera(i).name for i in range(model.ncam)]
+            if self._camera not in cameras:
+                remedy = did_you_mean(self._camera, cameras)
+                raise EnvError(f"unknown camera {self._camera!r}", where="camera", remedy=remedy)
+            model.vis.quality.shadowsize, model.vis.quality.offsamples = _FILM_QUALITY
+            model.vis.global_.offwidth = max(self._width, model.vis.global_.offwidth)
+            model.vis.global_.offheight = max(self._height, model.vis.global_.offheight)
+            self._model, self._data = model, mujoco.MjData(model)
         self._data.qpos[:] = end, twist
         mujoco.mj_forward(self._model, self._data)
         if self._mode == "human":
-            return self._show()
+            if self._window is None:
+                self._window = _open_window(self._model, self._data)
+                self._shown = time.monotonic()
+            self._window.sync()
+            wait = self._period - (time.monotonic() - self._shown)  # real time
+            if wait > 0.0:
+                time.sleep(wait)
+            self._shown = time.monotonic()
+            return None
         if self._canvas is None:
             self._canvas = _Canvas(self._model, self._width, self._height)
         return self._canvas.picture(self._data, self._model.camera(self._camera).id)
@@ -88,37 +99,6 @@ class RigView:
         if self._canvas is not None:
             self._canvas.close()
         self._window = self._canvas = None
-
-    def _build(self) -> None:
-        dynamics = self._rig.dynamics
-        settings = RunSettings(
-            self._rig.spring(dynamics.default_spring),
-            AeroDerivatives(0.0, 0.0),
-            dynamics.yaw_inertia,
-            dynamics.mechanical_damping,
-            rod_twist=RodTwist(1e-3, 0.5),  # two joints, so that any run can be shown
-        )
-        model = build_model(self._rig, settings).mj
-        cameras = [model.camera(i).name for i in range(model.ncam)]
-        if self._camera not in cameras:
-            raise EnvError(
-                f"unknown camera {self._camera!r}", where="camera", remedy=did_you_mean(self._camera, cameras)
-            )
-        model.vis.quality.shadowsize, model.vis.quality.offsamples = _FILM_QUALITY
-        model.vis.global_.offwidth = max(self._width, model.vis.global_.offwidth)
-        model.vis.global_.offheight = max(self._height, model.vis.global_.offheight)
-        self._model, self._data = model, mujoco.MjData(model)
-
-    def _show(self) -> None:
-        """Update the window, in real time."""
-        if self._window is None:
-            self._window = _open_window(self._model, self._data)
-            self._shown = time.monotonic()
-        self._window.sync()
-        wait = self._period - (time.monotonic() - self._shown)
-        if wait > 0.0:
-            time.sleep(wait)
-        self._shown = time.monotonic()
 
 
 def render_modes() -> list[str]:

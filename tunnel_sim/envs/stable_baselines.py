@@ -1,7 +1,7 @@
 """A bridge from Gymnasium's vector environments to Stable-Baselines3; needs the extra ``train``.
 
-Gymnasium restarts a run in the step after its end. Stable-Baselines3 expects the first observation of the next run
-together with the last reward, and the last observation in ``info``. Ended runs are therefore restarted at once.
+Gymnasium restarts a run in the step after its end. Stable-Baselines3 expects the first observation of the
+next run together with the last reward, so ended runs are restarted at once.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation
 
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.vocabulary.record import Array
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise EnvError(
-        "stable-baselines3 is missing", remedy="install it with pip install 'virtual-wind-tunnel[train]'"
-    ) from error
+    remedy = "install it with pip install 'virtual-wind-tunnel[train]'"
+    raise EnvError("stable-baselines3 is missing", remedy=remedy) from error
 
 
 class BaselinesVecEnv(VecEnv):
@@ -54,38 +53,27 @@ class BaselinesVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> tuple[Array, Array, np.ndarray[Any, np.dtype[np.bool_]], list[dict[str, Any]]]:
-        """Make a step in all runs, and restart those that ended.
-
-        Returns:
-            Observations, rewards, whether runs ended, and infos by run.
-        """
+        """Make a step in all runs, and restart those that ended."""
         observations, rewards, terminated, truncated, many = self._envs.step(self._actions)
         done = terminated | truncated
         infos = [_of_run(many, row) for row in range(self.num_envs)]
         if done.any():
             last, observations = observations, observations.copy()
-            fresh, started = self._restart(done)
+            # Gymnasium's NormalizeObservation refuses to restart only some of the runs. So they are restarted
+            # inside it, and their observations enter its statistics here.
+            first, started = self._inner.reset(options={**self._common, "reset_mask": done})
+            fresh = first[done]
+            if self._normal is not None:
+                statistics: Any = self._normal.obs_rms  # Gymnasium's class is typed in parts only
+                if self._normal.update_running_mean:
+                    statistics.update(fresh)
+                fresh = (fresh - statistics.mean) / np.sqrt(statistics.var + self._normal.epsilon)
             observations[done] = fresh
             for row in np.flatnonzero(done).tolist():
                 infos[row]["terminal_observation"] = last[row]
                 infos[row]["TimeLimit.truncated"] = bool(truncated[row] and not terminated[row])
                 self.reset_infos[row] = _of_run(started, row)
         return observations, rewards, done, infos
-
-    def _restart(self, done: np.ndarray[Any, np.dtype[np.bool_]]) -> tuple[Array, dict[str, Any]]:
-        """The first observations of the runs that start again, and infos.
-
-        Gymnasium's NormalizeObservation refuses to restart only some of the runs. So they are restarted inside
-        it, and their observations enter its statistics here.
-        """
-        observations, infos = self._inner.reset(options={**self._common, "reset_mask": done})
-        fresh = observations[done]
-        if self._normal is not None:
-            statistics: Any = self._normal.obs_rms  # Gymnasium's class is typed in parts only
-            if self._normal.update_running_mean:
-                statistics.update(fresh)
-            fresh = (fresh - statistics.mean) / np.sqrt(statistics.var + self._normal.epsilon)
-        return fresh, infos
 
     def close(self) -> None:
         """Close the vector environment."""

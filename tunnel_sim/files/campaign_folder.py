@@ -1,32 +1,28 @@
-"""A campaign as a folder: ``campaign.toml`` and one CSV or Parquet file per run.
-
-The reader never opens ``truth.json``. The
-writer writes the whole campaign or nothing.
-"""
+"""A campaign as a folder: ``campaign.toml`` and one CSV or Parquet file per run; ``truth.json`` is never read."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import tomli_w
 from pydantic import Field
 
-from tunnel_sim.files.plausible import (
-    checked_record,
-    plausible_values,
-)
+from tunnel_sim.files.plausible import checked_record, plausible_values
+from tunnel_sim.files.readers import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
-from tunnel_sim.files.run_files import RUN_FORMATS, RunTableValues, read_table, table_bytes
 from tunnel_sim.files.toml_input import (
+    NotNegative,
     OneLine,
+    Positive,
     SampleRate,
     StrictModel,
     check_version,
     load_toml,
+    optional,
     shown,
     validate,
 )
@@ -41,14 +37,11 @@ from tunnel_sim.vocabulary.campaign import (
     Zero,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import Drive, Hold, checked_drive, without_spring_needs_drive
+from tunnel_sim.vocabulary.drive import Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 
 CAMPAIGN_FILE = "campaign.toml"
 NO_CAMPAIGN = f"name a folder that holds a {CAMPAIGN_FILE}"
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class CampaignTable(StrictModel):
@@ -61,23 +54,21 @@ class CampaignTable(StrictModel):
 class RigTable(StrictModel):
     """``[rig]``."""
 
-    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
-    frontal_area: Positive | None = Field(default=None, description="a positive number in m2")
-    reference_length: Positive | None = Field(default=None, description="a positive number in m")
-    width: Positive | None = Field(default=None, description="a positive number in m")
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    frontal_area: Positive | None = optional("a positive number in m2")
+    reference_length: Positive | None = optional("a positive number in m")
+    width: Positive | None = optional("a positive number in m")
 
 
 class SensorTable(StrictModel):
     """``[sensor]``."""
 
-    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
-    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
-    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
-    plausible: bool | None = Field(
-        default=None, description="false to accept values that look like a wrong unit, or leave it out"
-    )
-    quantity: Quantity | None = Field(default=None, description="'angle', 'rate' or 'acceleration'")
-    zero: Zero | None = Field(default=None, description="'common', 'per_run' or 'auto'")
+    sample_rate: SampleRate | None = optional("a positive number in Hz")
+    resolution: NotNegative | None = optional("a number in rad, zero or more")
+    noise_std: NotNegative | None = optional("a number in rad, zero or more")
+    plausible: bool | None = optional("false to accept values that look like a wrong unit, or leave it out")
+    quantity: Quantity | None = optional("'angle', 'rate' or 'acceleration'")
+    zero: Zero | None = optional("'common', 'per_run' or 'auto'")
 
 
 class RunTable(StrictModel):
@@ -85,20 +76,15 @@ class RunTable(StrictModel):
 
     id: OneLine = Field(description="a short unique name in quotes")
     file: OneLine = Field(description="a path inside the campaign's folder, such as 'runs/r01.csv'")
-    spring_stiffness: NotNegative | None = Field(
-        default=None,
-        description="a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
-        "normalised form",
+    spring_stiffness: NotNegative | None = optional(
+        "a positive number in N m/rad, 0 for a driven body without a spring, or leave it out for the "
+        "normalised form"
     )
     wind_speed: NotNegative = Field(description="a number in m/s, 0 for wind-off")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
-    release_angle: float | None = Field(default=None, description="a number in rad")
-    drive_hold: Hold | None = Field(
-        default=None, description="'zero' or 'linear', between the samples of a driven run's input"
-    )
-    drive_gain: float | None = Field(
-        default=None, description="a number other than 0 in N m per unit of the column drive"
-    )
+    air_density: Positive | None = optional("a positive number in kg/m3")
+    release_angle: float | None = optional("a number in rad")
+    drive_hold: Hold | None = optional("'zero' or 'linear', between the samples of a driven run's input")
+    drive_gain: float | None = optional("a number other than 0 in N m per unit of the column drive")
 
 
 class CampaignDocument(StrictModel):
@@ -112,23 +98,12 @@ class CampaignDocument(StrictModel):
 
 
 def read_document(path: Path) -> CampaignDocument:
-    """Read and validate ``campaign.toml``; the run files are not opened.
-
-    Raises:
-        TunnelError: for the first fault, naming file, run and remedy.
-    """
+    """Read and validate ``campaign.toml``; the run files are not opened."""
     return parse_document(load_toml(path, missing=NO_CAMPAIGN), path)
 
 
 def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
-    """Validate the content of ``campaign.toml``.
-
-    Args:
-        path: the file that is read or written, for the message.
-
-    Raises:
-        TunnelError: for the first fault, naming file, run and remedy.
-    """
+    """Validate the content of the ``campaign.toml`` at a path."""
     check_version(document, path)
     parsed = validate(CampaignDocument, document, path)
     remedy = "put the runs into several campaigns"
@@ -137,63 +112,32 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     for run in parsed.runs:
         where = run_place(path, run.id)
         if run.id in seen:
-            raise TunnelError(
-                f"the id '{run.id}' is used twice", where=where, remedy="give every run its own id"
-            )
+            remedy = "give every run its own id"
+            raise TunnelError(f"the id '{run.id}' is used twice", where=where, remedy=remedy)
         seen.add(run.id)
         scales = run.spring_stiffness, parsed.rig.frontal_area, parsed.rig.reference_length
         if run.air_density is None and needs_density(run.wind_speed, *scales):
-            raise TunnelError(
-                f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density",
-                where=where,
-                remedy="give air_density in kg/m3 (about 1.2 for air)",
-            )
+            what = f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density"
+            raise TunnelError(what, where=where, remedy="give air_density in kg/m3 (about 1.2 for air)")
         windows, posix = PureWindowsPath(run.file), PurePosixPath(run.file)
         if windows.drive or windows.root or posix.is_absolute() or ".." in windows.parts + posix.parts:
-            raise TunnelError(
-                f"the path '{run.file}' may lead outside the campaign's folder",
-                where=where,
-                remedy="put the file inside the folder and name it without '..' or a leading '/'",
-            )
+            what = f"the path '{run.file}' may lead outside the campaign's folder"
+            remedy = "put the file inside the folder and name it without '..' or a leading '/'"
+            raise TunnelError(what, where=where, remedy=remedy)
     if parsed.sensor.plausible is not False:
-        _check_sizes(parsed, path)
+        plausible_values(parsed.rig.model_dump(), f"{shown(path)}, [rig]")
+        for run in parsed.runs:
+            plausible_values(run.model_dump(), run_place(path, run.id))
     return parsed
 
 
 def run_place(path: Path, run_id: str) -> str:
-    """File and run for an error message.
-
-    Args:
-        path: of the run's file, or of the campaign's folder.
-    """
+    """File and run for an error message."""
     return f"{shown(path)}, run '{run_id}'"
 
 
-def _check_sizes(document: CampaignDocument, path: Path) -> None:
-    plausible_values(document.rig.model_dump(), f"{shown(path)}, [rig]")
-    for run in document.runs:
-        plausible_values(run.model_dump(), run_place(path, run.id))
-
-
-def rig_properties(table: RigTable) -> RigProperties:
-    """The vocabulary's form of ``[rig]``."""
-    return RigProperties(**table.model_dump())
-
-
-def sensor_properties(table: SensorTable) -> SensorProperties:
-    """``[sensor]`` as `SensorProperties`."""
-    return SensorProperties(**table.model_dump())
-
-
 def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, Any]:
-    """The tables of ``campaign.toml`` for a campaign.
-
-    Args:
-        files: the file of every run, by id, relative to the campaign's folder.
-
-    Returns:
-        The tables, in the order in which they are written, without values that are None.
-    """
+    """The tables of ``campaign.toml`` in their order, without values that are None; ``files`` by id of the run."""
     head = {"name": campaign.name, "description": campaign.description or None}
     document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
     for key, values in (("rig", vars(campaign.rig)), ("sensor", vars(campaign.sensor))):
@@ -224,17 +168,7 @@ IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """Read and check a campaign.
-
-    Args:
-        folder: the campaign's folder, or the ``campaign.toml`` in it.
-
-    Returns:
-        The campaign, angles in radians.
-
-    Raises:
-        TunnelError: for the first fault, in one line that names file, run and remedy.
-    """
+    """Read and check the campaign in a folder, or with a ``campaign.toml``; angles in radians."""
     folder = Path(folder)
     if folder.name == CAMPAIGN_FILE and folder.is_file():
         folder = folder.parent
@@ -244,25 +178,57 @@ def read_campaign(folder: Path | str) -> Campaign:
         remedy = nearest_campaign(folder) or nearest(folder / CAMPAIGN_FILE) or NO_CAMPAIGN
         raise TunnelError("no such file", where=shown(folder / CAMPAIGN_FILE), remedy=remedy)
     document = read_document(folder / CAMPAIGN_FILE)
-    sensor = sensor_properties(document.sensor)
+    sensor = SensorProperties(**document.sensor.model_dump())
+    runs, samples = [], 0
+    for run in document.runs:
+        path = folder / run.file
+        where = run_place(path, run.id)
+        # Refuse a run file outside the folder, also through a symbolic link.
+        try:
+            inside = path.resolve().is_relative_to(folder.resolve())
+        except (OSError, RuntimeError, ValueError):
+            raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
+        if not inside:
+            what = "a symbolic link leads outside the campaign's folder"
+            raise TunnelError(what, where=where, remedy="copy the file into the folder")
+        held = read_table(path, where, timed=sensor.sample_rate is None, quantity=sensor.quantity or "angle")
+        time_s = held.time_s
+        if time_s is None:
+            if sensor.sample_rate is None:
+                remedy = (
+                    "add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml"
+                )
+                raise TunnelError("no column time_s and no sample_rate", where=where, remedy=remedy)
+            time_s = np.arange(held.reading.size) / sensor.sample_rate
+        drive = None
+        if held.input is not None and held.input_column is not None:
+            if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
+                what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
+                remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
+                raise TunnelError(what, where=where, remedy=remedy)
+            drive = Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
+        elif run.drive_hold is not None or run.drive_gain is not None:
+            what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
+            remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"
+            raise TunnelError(what, where=where, remedy=remedy)
+        record = checked_record(time_s, held.reading, held.column, sensor, run.release_angle, where, drive)
+        without_spring_needs_drive(run.spring_stiffness, drive, where)
+        conditions = run.spring_stiffness, run.air_density, run.release_angle
+        runs.append(Run(run.id, record, run.wind_speed, *conditions, drive=drive))
+        samples += record.time_s.size
+        remedy = "put the runs into several campaigns"
+        check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
-        rig=rig_properties(document.rig),
+        rig=RigProperties(**document.rig.model_dump()),
         sensor=sensor,
-        runs=tuple(_read_runs(folder, document, sensor)),
+        runs=tuple(runs),
     )
 
 
 def as_campaign(given: Campaign | Path | str) -> Campaign:
-    """A campaign, read where its place is given.
-
-    Args:
-        given: the campaign; its folder, or the ``campaign.toml`` in it; or one file of a data logger.
-
-    Raises:
-        TunnelError: as for `read_campaign`, and where a file cannot be imported without options.
-    """
+    """A campaign, read where its folder, its ``campaign.toml`` or one file of a data logger is given."""
     if isinstance(given, Campaign):
         return given
     path = Path(given)
@@ -286,152 +252,46 @@ def write_campaign(
 ) -> Path:
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
-    Args:
-        campaign: what to write; it must pass every check of the reader.
-        folder: the folder to create, with its parents where they are missing.
-        run_format: ``parquet`` or ``csv``.
-        truth: the simulated truth, written as ``truth.json``; None: no such file.
-        overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
-        text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
-        beside: further files of the folder, by name.
-        checked: whether every record has passed `checked_record`, so that this need not be done again.
-
-    Raises:
-        TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
-            reports an error.
-        ValueError: ``truth`` contains NaN or an infinity.
-        TypeError: ``truth`` contains a value that JSON cannot represent.
+    An existing folder may be replaced where it is empty or contains only a campaign. ``checked`` says that
+    every record has passed `checked_record`.
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:
-        raise TunnelError(
-            f"unknown run format '{run_format}'",
-            where=shown(folder),
-            remedy=did_you_mean(run_format, RUN_FORMATS),
-        )
+        remedy = did_you_mean(run_format, RUN_FORMATS)
+        raise TunnelError(f"unknown run format '{run_format}'", where=shown(folder), remedy=remedy)
     clear_leftovers(folder.resolve().parent)  # restores what a killed command had set aside
     _check_target(folder, overwrite=overwrite)
-    files = _run_files(campaign, run_format)
+    # Run files are named by id where all ids are safe file names, else by number.
+    ids = [run.id for run in campaign.runs]
+    safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
+    named = safe and len({name.lower() for name in ids}) == len(ids)
+    files = {
+        name: f"{RUN_FOLDER}/{name if named else f'run-{number:04d}'}.{run_format}"
+        for number, name in enumerate(ids, start=1)
+    }
     document = campaign_document(campaign, files)
     parse_document(document, folder / CAMPAIGN_FILE)
-    if not checked:
-        _check_records(campaign, folder)
+    for run in () if checked else campaign.runs:
+        where = run_place(folder, run.id)
+        time_s, yaw = run.record.time_s, run.record.yaw_rad
+        if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
+            remedy = "shorten the run or leave it out"
+            raise TunnelError("the record holds NaN or an infinity", where=where, remedy=remedy)
+        checked_record(time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, run.drive)
+        without_spring_needs_drive(run.spring_stiffness, run.drive, where)
     truth_text = None if truth is None else json_text(truth)
     with whole_folder(folder, replace=overwrite) as partial:
         (partial / RUN_FOLDER).mkdir()
         for run in campaign.runs:
-            (partial / files[run.id]).write_bytes(
-                table_bytes(
-                    run.record, folder / files[run.id], campaign.sensor.quantity or "angle", run.drive
-                )
-            )
+            quantity = campaign.sensor.quantity or "angle"
+            content = table_bytes(run.record, folder / files[run.id], quantity, run.drive)
+            (partial / files[run.id]).write_bytes(content)
         if truth_text is not None:
             (partial / TRUTH_FILE).write_bytes(truth_text.encode())
         for name, content in (beside or {}).items():
             (partial / name).write_bytes(content)
         (partial / CAMPAIGN_FILE).write_bytes(text(document).encode())
     return folder
-
-
-def _read_runs(folder: Path, document: CampaignDocument, sensor: SensorProperties) -> Iterator[Run]:
-    """The runs one by one, up to the limit on samples."""
-    samples = 0
-    for table in document.runs:
-        run = _read_run(folder, table, sensor)
-        yield run
-        samples += run.record.time_s.size
-        remedy = "put the runs into several campaigns"
-        check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
-
-
-def _read_run(folder: Path, run: RunTable, sensor: SensorProperties) -> Run:
-    sample_rate = sensor.sample_rate
-    path = folder / run.file
-    where = run_place(path, run.id)
-    # Refuse a run file outside the folder, also through a symbolic link.
-    try:
-        inside = path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):
-        raise TunnelError("the path cannot be resolved", where=where, remedy="correct 'file'") from None
-    if not inside:
-        raise TunnelError(
-            "a symbolic link leads outside the campaign's folder",
-            where=where,
-            remedy="copy the file into the folder",
-        )
-    held = read_table(path, where, timed=sample_rate is None, quantity=sensor.quantity or "angle")
-    time_s = held.time_s
-    if time_s is None:
-        if sample_rate is None:
-            raise TunnelError(
-                "no column time_s and no sample_rate",
-                where=where,
-                remedy="add a column time_s in seconds, or sample_rate in Hz under [sensor] in campaign.toml",
-            )
-        time_s = np.arange(held.reading.size) / sample_rate
-    drive = _drive(run, held, where)
-    record = checked_record(
-        time_s, held.reading, held.column, sensor, run.release_angle, where, driven=drive is not None
-    )
-    if drive is not None:
-        checked_drive(drive, record, where, judged=sensor.plausible is not False)
-    without_spring_needs_drive(run.spring_stiffness, drive, where)
-    return Run(
-        id=run.id,
-        record=record,
-        wind_speed=run.wind_speed,
-        spring_stiffness=run.spring_stiffness,
-        air_density=run.air_density,
-        release_angle=run.release_angle,
-        drive=drive,
-    )
-
-
-def _drive(run: RunTable, held: RunTableValues, where: str) -> Drive | None:
-    if held.input is None or held.input_column is None:
-        stated = next((key for key in ("drive_hold", "drive_gain") if getattr(run, key) is not None), None)
-        if stated is None:
-            return None
-        raise TunnelError(
-            f"{stated} without an input column",
-            where=where,
-            remedy="add a column moment_nm, drive or base_rad to the run file, or leave the key out",
-        )
-    if run.drive_gain is not None and (held.input_column != "drive" or run.drive_gain == 0.0):
-        raise TunnelError(
-            f"drive_gain = {run.drive_gain:g} of the column {held.input_column}",
-            where=where,
-            remedy="give drive_gain of a column drive only, in N m per unit, not zero",
-        )
-    return Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
-
-
-def _check_records(campaign: Campaign, folder: Path) -> None:
-    """Refuse the records that the reader would refuse, before anything is written."""
-    for run in campaign.runs:
-        where = run_place(folder, run.id)
-        time_s, yaw = run.record.time_s, run.record.yaw_rad
-        if not (np.isfinite(time_s).all() and np.isfinite(yaw).all()):
-            raise TunnelError(
-                "the record holds NaN or an infinity", where=where, remedy="shorten the run or leave it out"
-            )
-        record = checked_record(
-            time_s, yaw, "yaw_rad", campaign.sensor, run.release_angle, where, driven=run.drive is not None
-        )
-        if run.drive is not None:
-            checked_drive(run.drive, record, where, judged=campaign.sensor.plausible is not False)
-        without_spring_needs_drive(run.spring_stiffness, run.drive, where)
-
-
-def _run_files(campaign: Campaign, run_format: str) -> dict[str, str]:
-    """The file of every run: named by id where all ids are safe file names, else by number."""
-    ids = [run.id for run in campaign.runs]
-    safe = all(re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,79}", name) for name in ids)
-    named = safe and len({name.lower() for name in ids}) == len(ids)
-    return {
-        name: f"{RUN_FOLDER}/{name if named else f'run-{number:04d}'}.{run_format}"
-        for number, name in enumerate(ids, start=1)
-    }
 
 
 def _check_target(folder: Path, *, overwrite: bool) -> None:
@@ -441,14 +301,12 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
             raise TunnelError("this is not a folder", where=where, remedy="choose another name")
         return
     if not overwrite:
-        raise TunnelError(
-            "the folder exists", where=where, remedy="choose another one, or ask to overwrite it"
-        )
+        remedy = "choose another one, or ask to overwrite it"
+        raise TunnelError("the folder exists", where=where, remedy=remedy)
     entries = list(folder.iterdir())
     if entries and not (folder / CAMPAIGN_FILE).is_file():
-        raise TunnelError(
-            "the folder holds no campaign", where=where, remedy="choose another one, or empty it"
-        )
+        remedy = "choose another one, or empty it"
+        raise TunnelError("the folder holds no campaign", where=where, remedy=remedy)
     # Files that the writer did not create belong to somebody: replacing the folder would delete them.
     own = (CAMPAIGN_FILE, TRUTH_FILE, RUN_FOLDER, IMPORT_RECIPE, IMPORT_PICTURE)
     strange = [p for p in entries if p.name not in own]
@@ -456,8 +314,5 @@ def _check_target(folder: Path, *, overwrite: bool) -> None:
     if runs.is_dir() and not runs.is_symlink():
         strange += [p for p in runs.iterdir() if p.is_dir() or p.suffix.lower()[1:] not in RUN_FORMATS]
     if strange:
-        raise TunnelError(
-            f"the folder holds more than a campaign ({strange[0].name})",
-            where=where,
-            remedy="move that away, or choose another folder",
-        )
+        what = f"the folder holds more than a campaign ({strange[0].name})"
+        raise TunnelError(what, where=where, remedy="move that away, or choose another folder")

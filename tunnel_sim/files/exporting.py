@@ -23,20 +23,7 @@ _SHEET_ROWS = 1_048_576
 
 
 def export_campaign(campaign: Campaign, path: Path, kind: str) -> Path:
-    """Write a campaign as one file, completely or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-        kind: ``mat``, ``csv``, ``xlsx`` or ``hdf5``.
-
-    Returns:
-        The same path. Units are those of the campaign format; conditions that are not stated are left out, or
-        empty.
-
-    Raises:
-        TunnelError: an unknown format, a library that is missing, a run too long for a sheet, or a file that
-            cannot be written.
-    """
+    """Write a campaign as one ``mat``, ``csv``, ``xlsx`` or ``hdf5`` file, completely or not at all."""
     if kind not in WRITERS:
         raise TunnelError(f"unknown format '{kind}'", where=shown(path), remedy=did_you_mean(kind, WRITERS))
     return write_encoded(path, lambda stream: WRITERS[kind](campaign, stream, shown(path)))
@@ -74,8 +61,7 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     keys = ("id", *_condition_keys(campaign), "time_s", _column(campaign), *_input_columns(campaign))
     runs = np.zeros(len(campaign.runs), dtype=[(key, object) for key in keys])
     for place, run in enumerate(campaign.runs):
-        stated = {key: value for key, value in _conditions(run).items() if value is not None}
-        known = {"id": run.id, **stated, **_record(campaign, run)}
+        known = {"id": run.id, **_conditions(run), **_record(campaign, run)}
         runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
     rig: Mapping[str, Any] = {"name": campaign.name, **_stated(campaign.rig, _RIG)}
     savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
@@ -96,12 +82,12 @@ def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
     return {"time_s": run.record.time_s, _column(campaign): run.record.yaw_rad, **given}
 
 
-def _conditions(run: Run) -> dict[str, float | str | None]:
-    """The conditions of a run by key, None where they are not stated; of a driven run those of its input too."""
-    found: dict[str, float | str | None] = {key: getattr(run, key) for key in _CONDITIONS}
+def _conditions(run: Run) -> dict[str, float | str]:
+    """The stated conditions of a run by key; of a driven run those of its input too."""
+    stated: dict[str, float | str | None] = {key: getattr(run, key) for key in _CONDITIONS}
     if run.drive is not None:
-        found |= {"drive_hold": run.drive.hold, "drive_gain": run.drive.gain}
-    return found
+        stated |= {"drive_hold": run.drive.hold, "drive_gain": run.drive.gain}
+    return {key: value for key, value in stated.items() if value is not None}
 
 
 def _input_columns(campaign: Campaign) -> tuple[str, ...]:
@@ -118,8 +104,7 @@ def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
         width = len(str(len(campaign.runs)))  # programs sort groups by name
         for number, run in enumerate(campaign.runs, 1):
             group = file.create_group(f"run-{number:0{width}d}")
-            stated = {key: value for key, value in _conditions(run).items() if value is not None}
-            group.attrs.update({"id": run.id, **stated})
+            group.attrs.update({"id": run.id, **_conditions(run)})
             for name, values in _record(campaign, run).items():
                 group.create_dataset(name, data=values, compression="gzip", shuffle=True)
 

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from tunnel_sim.files.run_files import read_input
+from tunnel_sim.files.readers import read_input
 from tunnel_sim.files.toml_input import OneLine, StrictModel
-from tunnel_sim.vocabulary import excitation
-from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
+from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 from tunnel_sim.vocabulary.record import Array
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -67,10 +67,6 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
     Args:
         samples: of a run (a count).
         sample_rate: Hz.
-        where: file and table, for messages.
-
-    Raises:
-        TunnelError: for the first fault.
     """
     given = [name for name in _OPTIONAL if getattr(table, name) not in (None, [])]
     needed = _NEEDS[table.kind]
@@ -85,42 +81,23 @@ def check_drive(table: DriveTable, samples: int, sample_rate: float, where: str)
     )
     for name in given:
         if name not in taken:
-            raise TunnelError(
-                f"kind = '{table.kind}' does not take {name}", where=where, remedy="leave it out"
-            )
+            remedy = "leave it out"
+            raise TunnelError(f"kind = '{table.kind}' does not take {name}", where=where, remedy=remedy)
     if table.kind != "file" and bool(table.amplitudes_nm) == bool(table.amplitudes_rad):
-        raise TunnelError(
-            "both amplitudes_nm and amplitudes_rad" if table.amplitudes_nm else "no amplitudes",
-            where=where,
-            remedy="give amplitudes_nm (moments on the body) or amplitudes_rad (angles of the spring's root)",
-        )
+        what = "both amplitudes_nm and amplitudes_rad" if table.amplitudes_nm else "no amplitudes"
+        remedy = "give amplitudes_nm (moments on the body) or amplitudes_rad (angles of the spring's root)"
+        raise TunnelError(what, where=where, remedy=remedy)
     if len(set(table.amplitudes)) < len(table.amplitudes):
-        raise TunnelError(
-            "the amplitudes hold a value twice",
-            where=where,
-            remedy="leave one out, and use repeats for more runs",
-        )
+        remedy = "leave one out, and use repeats for more runs"
+        raise TunnelError("the amplitudes hold a value twice", where=where, remedy=remedy)
     for name in ("frequency_hz", "from_hz", "to_hz"):
         _check_sampled(name, getattr(table, name), sample_rate, where)
     for frequency in table.frequencies_hz:
         _check_sampled("frequencies_hz", frequency, sample_rate, where)
-    _check_band(table, samples, sample_rate, where)
-
-
-def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
-    if frequency is not None and not frequency < 0.5 * sample_rate:
-        raise TunnelError(
-            f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz",
-            where=where,
-            remedy="lower it, or raise sample_rate under [sensor]",
-        )
-
-
-def _check_band(table: DriveTable, samples: int, sample_rate: float, where: str) -> None:
     low, high = table.from_hz, table.to_hz
     if table.kind not in _BANDS or low is None or high is None:
         return
-    if low > high or not excitation.lines_in_band(samples, 1.0 / sample_rate, low, high).size:
+    if low > high or not lines_in_band(samples, 1.0 / sample_rate, low, high).size:
         raise TunnelError(
             f"no multiple of {sample_rate / samples:.4g} Hz, one over the duration, lies between from_hz = {low:g} "
             f"and to_hz = {high:g}",
@@ -129,68 +106,56 @@ def _check_band(table: DriveTable, samples: int, sample_rate: float, where: str)
         )
 
 
+def _check_sampled(name: str, frequency: float | None, sample_rate: float, where: str) -> None:
+    if frequency is not None and not frequency < 0.5 * sample_rate:
+        what = f"{name} = {frequency:g} is not below half the sample rate of {sample_rate:g} Hz"
+        raise TunnelError(what, where=where, remedy="lower it, or raise sample_rate under [sensor]")
+
+
 def drive_of_run(table: DriveTable, amplitude: float, number: int, time_s: Array) -> Drive:
     """The input of one driven run that is not that of a file.
 
     Args:
-        table: checked by `check_drive`.
         amplitude: peak, N m or rad.
         number: of the driven run in the plan from 0 on: drawn phases differ from run to run.
         time_s: of the samples from 0 on, shape (n,), s.
     """
-    column: InputColumn = "moment_nm" if table.amplitudes_nm else "base_rad"
-    return Drive(column, amplitude * _waveform(table, time_s, number), table.hold)
-
-
-def _waveform(table: DriveTable, time: Array, number: int) -> Array:
     low, high = table.from_hz or 0.0, table.to_hz or 0.0
     rng = np.random.default_rng([table.seed or 0, number])
     match table.kind:
         case "square":
-            return excitation.square(time, table.frequency_hz or 0.0)
+            wave = square(time_s, table.frequency_hz or 0.0)
         case "chirp":
-            return excitation.chirp(time, low, high)
+            wave = chirp(time_s, low, high)
         case "multisine":
-            return excitation.multisine(time, low, high, None if table.seed is None else rng)
+            wave = multisine(time_s, low, high, None if table.seed is None else rng)
         case "random":
-            return excitation.band_noise(time, low, high, rng)
+            wave = band_noise(time_s, low, high, rng)
         case _:
-            return excitation.stepped_sine(time, table.frequencies_hz or [table.frequency_hz or 0.0])
+            wave = stepped_sine(time_s, table.frequencies_hz or [table.frequency_hz or 0.0])
+    return Drive("moment_nm" if table.amplitudes_nm else "base_rad", amplitude * wave, table.hold)
 
 
 def drive_of_file(path: Path, time_s: Array, hold: Hold, where: str) -> Drive:
     """The input of a file at the times of the samples, its first value at time 0.
 
     Args:
-        path: a table with time_s and one of moment_nm (N m) and base_rad (rad).
         time_s: of the samples from 0 on, shape (n,), s.
-        hold: between the file's values.
-        where: plan and file, for messages.
-
-    Raises:
-        TunnelError: a file that is not an input of known unit, is constant, or is shorter than the run.
     """
     given, column, values = read_input(path, where)
     if column == "drive":
-        raise TunnelError(
-            "the column drive has no known unit",
-            where=where,
-            remedy="name it moment_nm (N m on the body) or base_rad (rad of the spring's root)",
-        )
+        remedy = "name it moment_nm (N m on the body) or base_rad (rad of the spring's root)"
+        raise TunnelError("the column drive has no known unit", where=where, remedy=remedy)
     given = given - given[0]
     slack = 1e-6 * (time_s[1] - time_s[0])
     if given[-1] < time_s[-1] - slack:
-        raise TunnelError(
-            f"ends after {given[-1]:.6g} s, before the last sample of a run at {time_s[-1]:.6g} s",
-            where=where,
-            remedy="give a longer file or a shorter duration",
-        )
+        what = f"ends after {given[-1]:.6g} s, before the last sample of a run at {time_s[-1]:.6g} s"
+        raise TunnelError(what, where=where, remedy="give a longer file or a shorter duration")
     if hold == "zero":
         sampled = values[np.searchsorted(given, time_s + slack, side="right") - 1]
     else:
         sampled = np.interp(time_s, given, values)
     if np.ptp(sampled) == 0.0:
-        raise TunnelError(
-            f"the column {column} is constant", where=where, remedy="give an input that changes"
-        )
+        remedy = "give an input that changes"
+        raise TunnelError(f"the column {column} is constant", where=where, remedy=remedy)
     return Drive(column, sampled, hold)

@@ -1,16 +1,16 @@
-"""The plan of a campaign: the tables of its TOML file, and reading them.
+"""The plan of a campaign: the tables of its TOML file, and reading them; and the tables of an effects file.
 
 The packaged ``data/paper-campaign.toml`` is an example with a comment on every key.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator
 from importlib import resources
 from itertools import count
 from math import radians
 from pathlib import Path
-from typing import Annotated, Protocol, TypeVar
+from typing import Annotated, Literal, Protocol, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -18,7 +18,17 @@ from pydantic import AfterValidator, Field
 from tunnel_sim.files.plan_drive import DriveTable, check_drive, drive_of_file, drive_of_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, load_toml, shown, validate
+from tunnel_sim.files.toml_input import (
+    NotNegative,
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    load_toml,
+    optional,
+    shown,
+    validate,
+)
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -34,9 +44,6 @@ from tunnel_sim.vocabulary.rig import Rig
 
 STEPS_PER_SECOND = 1000.0
 """Integration steps per second of a run."""
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 def _release_angle(angle: float) -> float:
@@ -71,19 +78,17 @@ class TruthTable(StrictModel):
 
     cn_beta: float = Field(description="a number, 1/rad")
     cn_r: float = Field(description="a number, 1/rad")
-    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
-    mechanical_damping: NotNegative | None = Field(
-        default=None, description="a number in N m s/rad, zero or more"
-    )
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    mechanical_damping: NotNegative | None = optional("a number in N m s/rad, zero or more")
 
 
 class SensorModelTable(StrictModel):
     """``[sensor]``; omitted keys take the defaults of ``SensorModel``."""
 
-    sample_rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
-    noise_std: NotNegative | None = Field(default=None, description="a number in rad, zero or more")
-    resolution: NotNegative | None = Field(default=None, description="a number in rad, zero for none")
-    zero: float | None = Field(default=None, description="a number in rad")
+    sample_rate: SampleRate | None = optional("a positive number in Hz")
+    noise_std: NotNegative | None = optional("a number in rad, zero or more")
+    resolution: NotNegative | None = optional("a number in rad, zero for none")
+    zero: float | None = optional("a number in rad")
 
 
 class EffectTable(StrictModel):
@@ -105,10 +110,10 @@ class PlanDocument(StrictModel):
     release_angles_deg: FreeDecays = Field(default=[])
     repeats: Repeats = 1
     duration: Positive = Field(description="a positive number in s")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
+    air_density: Positive | None = optional("a positive number in kg/m3")
     truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")
     sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
-    drive: DriveTable | None = Field(default=None, description="a [drive] table with kind and amplitudes")
+    drive: DriveTable | None = optional("a [drive] table with kind and amplitudes")
     effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
 
     @property
@@ -123,62 +128,32 @@ class PlanDocument(StrictModel):
 
 
 def read_plan(path: Path) -> PlanDocument:
-    """Read and validate a campaign description.
-
-    Raises:
-        TunnelError: for the first fault, in one line that names file, key and remedy.
-    """
+    """Read and validate a campaign description."""
     document = load_toml(path, missing="name a campaign description such as the packaged paper-campaign.toml")
     plan = validate(PlanDocument, document, path)
     check_conditions(plan, shown(path))
     driven = 0 if plan.drive is None else len(plan.drive.amplitudes)
     if not plan.release_angles_deg and plan.drive is None:
-        raise TunnelError(
-            "'release_angles_deg' is empty or missing",
-            where=shown(path),
-            remedy="give release_angles_deg as a list of angles in degrees, such as [20], or a [drive]",
-        )
+        remedy = "give release_angles_deg as a list of angles in degrees, such as [20], or a [drive]"
+        raise TunnelError("'release_angles_deg' is empty or missing", where=shown(path), remedy=remedy)
     check_size(run_count(plan, driven), plan.duration, plan.sample_rate, shown(path))
     if plan.drive is not None:
-        check_drive(plan.drive, plan.samples, plan.sample_rate, _drive_of(path))
+        check_drive(plan.drive, plan.samples, plan.sample_rate, f"{shown(path)}, [drive]")
     return plan
 
 
-def _drive_of(path: Path) -> str:
-    return f"{shown(path)}, [drive]"
-
-
 class ConditionKeys(Protocol):
-    """The keys whose values are combined into a campaign's runs."""
+    """The keys whose values are combined into a campaign's runs, in N m/rad, m/s and degrees."""
 
-    @property
-    def springs(self) -> list[int]:
-        """Numbers of springs."""
-
-    @property
-    def spring_stiffness(self) -> list[float]:
-        """Kr, N m/rad."""
-
-    @property
-    def wind_speeds(self) -> list[float]:
-        """V, m/s."""
-
-    @property
-    def release_angles_deg(self) -> list[float]:
-        """Degrees."""
-
-    @property
-    def repeats(self) -> int:
-        """Number of runs of each combination."""
+    springs: list[int]
+    spring_stiffness: list[float]
+    wind_speeds: list[float]
+    release_angles_deg: list[float]
+    repeats: int
 
 
 def run_count(keys: ConditionKeys, driven: int = 0) -> int:
-    """The number of runs, calculated from the lengths of the lists.
-
-    Args:
-        keys: a campaign description, or a table with the same keys.
-        driven: number of driven runs of each spring and speed, before repeats.
-    """
+    """The number of runs of a table of lists, with some driven runs of each spring and speed before repeats."""
     springs = len(keys.springs) + len(keys.spring_stiffness)
     return springs * len(keys.wind_speeds) * (len(keys.release_angles_deg) + driven) * keys.repeats
 
@@ -187,12 +162,8 @@ def check_size(runs: int, duration: float, sample_rate: float, where: str) -> No
     """Refuse a campaign that is too large to simulate or to read again, before it is expanded.
 
     Args:
-        runs: number of runs.
         duration: of each run, s.
         sample_rate: Hz.
-
-    Raises:
-        TunnelError: too many runs, samples or integration steps, with their number and the limit.
     """
     check_count(runs, limits.CAMPAIGN_RUNS, "runs", where, "shorten a list, or make several campaigns")
     # Even the shortest run has two samples.
@@ -216,66 +187,57 @@ def first_twice(values: Iterable[HashableT]) -> HashableT | None:
 
 
 def check_conditions(plan: ConditionKeys, where: str) -> None:
-    """Refuse conditions that give no runs, or the same run twice.
-
-    Args:
-        plan: a campaign description, or a table with the same keys.
-
-    Raises:
-        TunnelError: when no spring is given, or a value occurs twice.
-    """
+    """Refuse conditions that give no runs, or the same run twice."""
     if not plan.springs and not plan.spring_stiffness:
-        raise TunnelError(
-            "no spring", where=where, remedy="give springs (numbers) or spring_stiffness (N m/rad)"
-        )
+        remedy = "give springs (numbers) or spring_stiffness (N m/rad)"
+        raise TunnelError("no spring", where=where, remedy=remedy)
     for key in ("springs", "spring_stiffness", "wind_speeds", "release_angles_deg"):
         twice = first_twice(getattr(plan, key))
         if twice is not None:
-            raise TunnelError(
-                f"{key} holds {twice:g} twice",
-                where=where,
-                remedy="leave one out, and use repeats for more runs",
-            )
+            remedy = "leave one out, and use repeats for more runs"
+            raise TunnelError(f"{key} holds {twice:g} twice", where=where, remedy=remedy)
 
 
 def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
-    """Read a campaign description.
-
-    Args:
-        path: a TOML file like the packaged ``paper-campaign.toml``.
-        rig: defines the numbered springs, and the inertia, damping and air density that the description does not
-            state; None uses the packaged rig.
-
-    Returns:
-        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
-        and repeats.
-
-    Raises:
-        TunnelError: for the first fault, in one line that names file, key and remedy.
-    """
+    """Read a campaign description; a rig (the packaged one) states what the description does not."""
     path = Path(path)
     return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path), path.parent)
 
 
 def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path()) -> CampaignPlan:
-    """The plan defined by a validated campaign description.
+    """The plan defined by a validated campaign description; the file of a drive is sought in the folder."""
+    table, time, numbers = document.drive, np.arange(document.samples) / document.sample_rate, count()
+    given = None
+    if table is not None and table.file is not None:
+        given = drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
+    for number in document.springs:
+        if number not in rig.springs:
+            remedy = f"use one of {', '.join(map(str, rig.springs))}, or give spring_stiffness in N m/rad"
+            raise TunnelError(f"there is no spring {number}", where=where, remedy=remedy)
+    springs = [(f"s{number}", rig.springs[number]) for number in document.springs]
+    springs += [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
 
-    Args:
-        rig: as in `load_plan`.
-        folder: in which the file of a drive is sought.
+    def starts() -> Iterator[tuple[str, float, Drive | None]]:
+        """End of the id, release angle (rad) and input of the runs of a spring and a speed, free decays first."""
+        repeats = [f"-{number + 1}" if document.repeats > 1 else "" for number in range(document.repeats)]
+        for angle in document.release_angles_deg:
+            yield from ((f"a{_short(angle)}{repeat}", radians(angle), None) for repeat in repeats)
+        for amplitude in () if table is None else table.amplitudes:
+            for repeat in repeats:
+                if amplitude is None or table is None:
+                    yield f"file{repeat}", 0.0, given
+                else:
+                    drive = drive_of_run(table, amplitude, next(numbers), time)
+                    yield f"d{_short(amplitude)}{repeat}", 0.0, drive
 
-    Raises:
-        TunnelError: when the rig has no such spring, or the file of a drive is refused.
-    """
     stated = document.truth.model_dump(exclude_none=True)
-    inertia, damping = rig.dynamics.yaw_inertia, rig.dynamics.mechanical_damping
-    given, numbers = _file_drive(document, folder, where), count()
+    own = {"yaw_inertia": rig.dynamics.yaw_inertia, "mechanical_damping": rig.dynamics.mechanical_damping}
     density = rig.air.density if document.air_density is None else document.air_density
     return CampaignPlan(
         name=document.name,
         description=document.description,
         seed=document.seed,
-        truth=Truth(**({"yaw_inertia": inertia, "mechanical_damping": damping} | stated)),
+        truth=Truth(**(own | stated)),
         conditions=tuple(
             Condition(
                 id=f"{label}-v{_short(speed)}-{start}",
@@ -286,9 +248,9 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
                 duration=document.duration,
                 drive=drive,
             )
-            for label, stiffness in _stiffnesses(document, rig.springs, where)
+            for label, stiffness in springs
             for speed in document.wind_speeds
-            for start, angle, drive in _starts(document, given, numbers)
+            for start, angle, drive in starts()
         ),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
@@ -301,45 +263,46 @@ def paper_plan() -> CampaignPlan:
         return load_plan(path)
 
 
-def _stiffnesses(document: PlanDocument, springs: Mapping[int, float], where: str) -> list[tuple[str, float]]:
-    """A label and the stiffness of every numbered spring and of every spring stated by its stiffness."""
-    for number in document.springs:
-        if number not in springs:
-            raise TunnelError(
-                f"there is no spring {number}",
-                where=where,
-                remedy=f"use one of {', '.join(map(str, springs))}, or give spring_stiffness in N m/rad",
-            )
-    numbered = [(f"s{number}", springs[number]) for number in document.springs]
-    return numbered + [(f"k{_short(stiffness)}", stiffness) for stiffness in document.spring_stiffness]
-
-
-def _file_drive(document: PlanDocument, folder: Path, where: str) -> Drive | None:
-    table = document.drive
-    if table is None or table.file is None:
-        return None
-    time = np.arange(document.samples) / document.sample_rate
-    return drive_of_file(folder / table.file, time, table.hold, f"{where}, [drive] file '{table.file}'")
-
-
-def _starts(
-    document: PlanDocument, given: Drive | None, numbers: Iterator[int]
-) -> Iterator[tuple[str, float, Drive | None]]:
-    """End of the id, release angle (rad) and input of every run of a spring and a speed, free decays first."""
-    repeats = [f"-{number + 1}" if document.repeats > 1 else "" for number in range(document.repeats)]
-    for angle in document.release_angles_deg:
-        yield from ((f"a{_short(angle)}{repeat}", radians(angle), None) for repeat in repeats)
-    table = document.drive
-    time = np.arange(document.samples) / document.sample_rate
-    for amplitude in () if table is None else table.amplitudes:
-        for repeat in repeats:
-            if amplitude is None or table is None:
-                yield f"file{repeat}", 0.0, given
-            else:
-                drive = drive_of_run(table, amplitude, next(numbers), time)
-                yield f"d{_short(amplitude)}{repeat}", 0.0, drive
-
-
 def _short(value: float) -> str:
     """The shortest text that represents a number uniquely: ``15``, ``16.12``."""
     return repr(value + 0.0).removesuffix(".0")  # + 0.0: minus zero is zero
+
+
+Formula = Annotated[OneLine, Field(max_length=limits.EXPRESSION_CHARACTERS)]
+
+
+class ParameterTable(StrictModel):
+    """``[effects.parameters.NAME]``."""
+
+    unit: OneLine = Field(description='a unit in quotes, such as "N m/rad", or "1" for a number')
+    scale: float = Field(description="a typical value, a number in its unit")
+    lower: float = Field(description="the least value, a number in its unit")
+    upper: float = Field(description="the greatest value, a number in its unit")
+    default: float | None = optional("a number in its unit")
+    meaning: OneLine | None = optional("a clause in quotes")
+
+
+class OwnEffectTable(StrictModel):
+    """``[[effects]]``."""
+
+    name: Annotated[OneLine, Field(pattern="^[a-z][a-z0-9_]{0,63}$")] = Field(
+        description="a name of lower-case letters, digits and _"
+    )
+    channel: Literal["stiffness", "damping", "forcing", "sensor", "calibration"] = Field(
+        description="stiffness, damping, forcing, sensor or calibration"
+    )
+    condition: Literal["always", "wind_on"] = Field(default="always", description="always or wind_on")
+    moment: Formula | None = optional("an expression in quotes, N m")
+    reading: Formula | None = optional("an expression in quotes, rad")
+    summary: OneLine = Field(default="An effect by expression.", description="a sentence in quotes")
+    parameters: Annotated[
+        dict[str, ParameterTable], Field(min_length=1, max_length=limits.OWN_PARAMETERS)
+    ] = Field(description="tables [effects.parameters.NAME], the severity first")
+
+
+class EffectsDocument(StrictModel):
+    """The whole of an effects file."""
+
+    effects: Annotated[list[OwnEffectTable], Field(min_length=1, max_length=limits.OWN_EFFECTS)] = Field(
+        description="tables [[effects]]"
+    )

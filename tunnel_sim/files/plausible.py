@@ -1,10 +1,8 @@
 """Whether a run can be what it is said to be: plausible ranges, increasing times, angles in radians, three cycles.
 
 Outside the plausible ranges of a rig, its air and its clock a wrong unit is more likely than such a rig. The
-ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres, so only a wrong
-unit that leaves them is detected. Speeds in km/h, wrong by a factor of 3.6, mostly remain inside: a free decay
-cannot distinguish an error of V from a factor on Cnβ and Cnr. Stiffness and inertia have no range, because both
-scale with the fifth power of a rig's size.
+ranges are wide enough for towing carriages, pressurised tunnels and models of a few centimetres. Stiffness
+and inertia have none, because both scale with the fifth power of a rig's size.
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ import numpy as np
 
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import SensorProperties
+from tunnel_sim.vocabulary.drive import Drive, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record, count_cycles
 
@@ -26,6 +25,15 @@ KEEP = "state plausible = false under [sensor] to keep it"
 LEAST_SAMPLES_PER_CYCLE = 10.0
 _LOOKS = "it looks like"
 _TWO_TURNS = 4.0 * np.pi
+# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Any
+# other difference is allowed: a run with times may have a rate of its own.
+_TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
+_SLIP_TOLERANCE = 0.1
+MINIMUM_CYCLES = 3.0
+# The count is uncertain, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
+CYCLE_TOLERANCE = 0.25
+# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
+_SLIP_RATIO = (50.0, 75.0)
 
 
 @dataclass(frozen=True)
@@ -33,12 +41,8 @@ class Range:
     """The plausible values of one quantity.
 
     Args:
-        low: least plausible value, in the unit.
-        high: greatest plausible value, in the unit.
-        unit: unit in the file format.
-        above: likely unit of a value above the range.
-        below: likely unit of a value below the range.
-        reason: why the range ends where it does.
+        low, high: least and greatest plausible value, in the unit.
+        above, below: likely unit of a value above and below the range.
     """
 
     low: float
@@ -88,15 +92,7 @@ step and its period of oscillation."""
 
 
 def plausible_values(values: Mapping[str, Any], where: str) -> None:
-    """Refuse stated values that appear to be in a wrong unit.
-
-    Args:
-        values: by key of ``campaign.toml``, in its units; keys without a range and None are skipped.
-        where: file and table or run, for messages.
-
-    Raises:
-        TunnelError: for the first value outside its range.
-    """
+    """Refuse stated values, by key of ``campaign.toml`` and in its units, that appear to be in a wrong unit."""
     for key, value in values.items():
         allowed = RANGES.get(key)
         if allowed is not None and value is not None:
@@ -110,49 +106,53 @@ def checked_record(
     sensor: SensorProperties,
     release_angle: float | None,
     where: str,
-    *,
-    driven: bool = False,
+    drive: Drive | None = None,
 ) -> Record:
-    """The record of a run, unless it is refused.
+    """The record of a run, unless it or its input is refused.
 
     Args:
         time_s: sample times, shape (n,), s.
         reading: shape (n,), rad, rad/s or rad/s².
-        column: that the readings are from, for messages.
-        sensor: what is stated of the sensor.
         release_angle: as stated, rad.
-        driven: whether the run has an input: it need not oscillate at a frequency of its own.
-
-    Raises:
-        TunnelError: times that do not increase, too few cycles of a free decay, or what looks like a wrong unit.
     """
     increasing_times(time_s, sensor.sample_rate, where)
     angle, judged = sensor.derivative == 0, sensor.plausible is not False
-    if judged and angle:
-        same_unit(reading, column, release_angle, where)
+    swing = 0.5 * (float(reading.max()) - float(reading.min()))  # the sensor's zero is unknown
+    if judged and angle and release_angle and swing != 0.0:
+        ratio, (low, high) = abs(release_angle) / swing, _SLIP_RATIO
+        if column == "yaw_rad" and low <= 1.0 / ratio <= high:
+            raise TunnelError(
+                f"yaw_rad swings by ±{swing:.4g}, about 57 times the release_angle of "
+                f"{release_angle:.4g} rad: it looks like degrees",
+                where=where,
+                remedy=f"name the column yaw_deg, or convert it to radians; {KEEP}",
+            )
+        if low <= ratio <= high:
+            raise TunnelError(
+                f"{column} swings by ±{swing:.4g} rad, about 1/57 of the release_angle of "
+                f"{release_angle:.4g} rad: one of them is in the wrong unit",
+                where=where,
+                remedy="give release_angle in rad, name the column for its unit, or leave release_angle out; "
+                f"{KEEP}",
+            )
     record = Record(time_s, reading)
-    if driven:
-        if judged:
-            plausible_sampling(record, where, angle=angle)
-        return record
-    cycles = enough_cycles(record, where)
+    cycles = count_cycles(record) if drive is None else 0.0
+    if drive is None and not cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
+        what = f"about {cycles:.1f} cycles of oscillation, fewer than three"
+        if not cycles > 0.0:
+            what = "no oscillation is visible in the record, so it has fewer than three cycles"
+        remedy = "record for longer after the release, or leave the run out"
+        raise TunnelError(what, where=where, remedy=remedy)
+    step = record.sample_interval
+    if judged and angle:  # rates and accelerations may have any size
+        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
     if judged:
-        plausible_run(record, cycles, where, angle=angle)
-    return record
-
-
-def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = True) -> None:
-    """Refuse a record that appears to be in a wrong unit, or that is sampled too slowly.
-
-    Args:
-        cycles: number of cycles in the record.
-        angle: whether the reading is an angle; rates and accelerations may have any size.
-
-    Raises:
-        TunnelError: a swing, time step or period outside its range, or fewer than ten samples per cycle.
-    """
-    step, per_cycle = record.sample_interval, record.yaw_rad.size / cycles
-    plausible_sampling(record, where, angle=angle)
+        _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
+    if drive is not None:
+        checked_drive(drive, record, where, judged=judged)
+    if drive is not None or not judged:
+        return record
+    per_cycle = reading.size / cycles
     _check(f"a swing takes {step * per_cycle:.3g} s", step * per_cycle, RANGES["period"], where)
     if per_cycle < LEAST_SAMPLES_PER_CYCLE:
         raise TunnelError(
@@ -161,21 +161,7 @@ def plausible_run(record: Record, cycles: float, where: str, *, angle: bool = Tr
             where=where,
             remedy=f"sample at {LEAST_SAMPLES_PER_CYCLE / (step * per_cycle):.3g} Hz or more; {KEEP}",
         )
-
-
-def plausible_sampling(record: Record, where: str, *, angle: bool = True) -> None:
-    """Refuse a record whose swing or time step appears to be in a wrong unit.
-
-    Args:
-        angle: whether the reading is an angle; rates and accelerations may have any size.
-
-    Raises:
-        TunnelError: a swing or time step outside its range.
-    """
-    step, swing = record.sample_interval, 0.5 * float(np.ptp(record.yaw_rad))
-    if angle:
-        _check(f"the angle swings by ±{swing:.4g} rad", swing, RANGES["swing"], where)
-    _check(f"time_s steps by {step:.3g} s", step, RANGES["step"], where)
+    return record
 
 
 def _check(said: str, value: float, allowed: Range, where: str) -> None:
@@ -185,26 +171,12 @@ def _check(said: str, value: float, allowed: Range, where: str) -> None:
     raise TunnelError(f"{said}: {_LOOKS} {slip}", where=where, remedy=f"give it in {allowed.unit}; {KEEP}")
 
 
-# If milliseconds are given as seconds, or kHz as Hz, time_s and sample_rate differ by a power of a thousand. Any
-# other difference is allowed: a run with times may have a rate of its own.
-_TIME_SLIPS = (1e-6, 1e-3, 1e3, 1e6)
-_SLIP_TOLERANCE = 0.1
-MINIMUM_CYCLES = 3.0
-# The count is uncertain, most where damping is heavy or the sensor drifts; a run of three cycles must pass.
-CYCLE_TOLERANCE = 0.25
-# If degrees are given as radians or vice versa, swing and stated release angle differ by a factor of 57.3.
-_SLIP_RATIO = (50.0, 75.0)
-
-
 def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> None:
-    """Check the times of a run file. Steps may differ, and samples may be missing.
+    """Refuse times that do not increase, or are not in s. Steps may differ, and samples may be missing.
 
     Args:
         time_s: sample times, shape (n,), s.
         sample_rate: as stated in the campaign, Hz; None where it is not stated.
-
-    Raises:
-        TunnelError: a step back, a repeated time, or times in a unit other than s.
     """
     if time_s.size < 2:
         raise TunnelError("only one sample", where=where, remedy="record three cycles or more")
@@ -227,57 +199,3 @@ def increasing_times(time_s: Array, sample_rate: float | None, where: str) -> No
             where=where,
             remedy="give time_s in seconds and sample_rate in Hz, or leave one of them out",
         )
-
-
-def same_unit(angle: Array, column: str, release_angle: float | None, where: str) -> None:
-    """Refuse a swing and a stated release angle of which one appears to be in degrees.
-
-    The sensor's zero is unknown, so half the span of the reading is compared.
-
-    Args:
-        angle: the reading, shape (n,), rad.
-        column: ``yaw_rad`` or ``yaw_deg``, for messages.
-        release_angle: nominal, rad; None where the campaign does not state it.
-
-    Raises:
-        TunnelError: a factor of about 57.3 between reading and release angle.
-    """
-    half_span = 0.5 * (float(angle.max()) - float(angle.min()))
-    if not release_angle or half_span == 0.0:
-        return
-    ratio = abs(release_angle) / half_span
-    low, high = _SLIP_RATIO
-    if column == "yaw_rad" and low <= 1.0 / ratio <= high:
-        raise TunnelError(
-            f"yaw_rad swings by ±{half_span:.4g}, about 57 times the release_angle of "
-            f"{release_angle:.4g} rad: it looks like degrees",
-            where=where,
-            remedy=f"name the column yaw_deg, or convert it to radians; {KEEP}",
-        )
-    if low <= ratio <= high:
-        raise TunnelError(
-            f"{column} swings by ±{half_span:.4g} rad, about 1/57 of the release_angle of "
-            f"{release_angle:.4g} rad: one of them is in the wrong unit",
-            where=where,
-            remedy=f"give release_angle in rad, name the column for its unit, or leave release_angle out; {KEEP}",
-        )
-
-
-def enough_cycles(record: Record, where: str) -> float:
-    """Refuse a record with fewer than three cycles of oscillation.
-
-    Returns:
-        Number of cycles in the record.
-
-    Raises:
-        TunnelError: fewer than three cycles, or no oscillation.
-    """
-    cycles = count_cycles(record)
-    if cycles >= MINIMUM_CYCLES - CYCLE_TOLERANCE:
-        return cycles
-    what = (
-        f"about {cycles:.1f} cycles of oscillation, fewer than three"
-        if cycles > 0.0
-        else "no oscillation is visible in the record, so it has fewer than three cycles"
-    )
-    raise TunnelError(what, where=where, remedy="record for longer after the release, or leave the run out")

@@ -1,8 +1,7 @@
 """Reading of regular files of limited size; every fault is a `TunnelError`.
 
-All packages read files through this module. A
-FIFO or a device is refused without waiting for it, and a file that is too large is refused before it is loaded
-into memory.
+A FIFO or a device is refused without waiting for it, a file that is too large before it is loaded into
+memory.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import json
 import os
 import stat
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from itertools import islice
 from pathlib import Path
@@ -29,52 +28,33 @@ _MARKER = "campaign.toml"
 
 
 def nearest(path: Path) -> str:
-    """The file or folder whose name is most similar, as a question.
-
-    Args:
-        path: does not exist.
-
-    Returns:
-        Such as ``did you mean the folder 'my-rig'?``; empty where nothing is similar.
-    """
-    names = {entry.name: _is_folder(entry) for entry in _entries(path.parent) if entry.name != path.name}
+    """The file or folder whose name is most similar to a missing one, as a question; empty where none is."""
+    names = [entry.name for entry in _entries(path.parent) if entry.name != path.name]
     found = get_close_matches(path.name, names, n=1)
-    return _question(path.parent / found[0], names[found[0]]) if found else ""
+    return _question(path.parent / found[0]) if found else ""
 
 
 def nearest_campaign(folder: Path) -> str:
-    """The campaign around or inside a folder that is not one, as a question.
-
-    Returns:
-        As `nearest`; empty where there is no campaign, or several.
-    """
+    """The campaign around or inside a folder that is not one, as a question; empty where there is not one."""
     around = [folder.parent] if (folder.parent / _MARKER).is_file() else []
     inside = [folder / entry.name for entry in _entries(folder) if (folder / entry.name / _MARKER).is_file()]
     found = around or inside
-    return _question(found[0], True) if len(found) == 1 else ""
+    return _question(found[0]) if len(found) == 1 else ""
 
 
 def inside(folder: Path) -> str:
-    """The remedy where a file is wanted and a folder is given.
-
-    Returns:
-        What the folder is, or a file in it; empty where it has none.
-    """
+    """The remedy where a file is wanted and a folder is given: what it is, or a file in it; empty if none."""
     if (folder / _MARKER).is_file():
         return "it is a campaign, which tunnel identify and tunnel diagnose take"
     files = sorted(entry.name for entry in _entries(folder) if (folder / entry.name).is_file())
     return f"name a file in it, such as '{shown(folder / files[0])}'" if files else ""
 
 
-def _question(path: Path, folder: bool) -> str:
-    return f"did you mean the {'folder' if folder else 'file'} '{shown(path)}'?"
-
-
-def _is_folder(entry: os.DirEntry[str]) -> bool:
-    try:
-        return entry.is_dir()
-    except OSError:  # a link to itself
-        return False
+def _question(path: Path) -> str:
+    kind = "file"
+    with suppress(OSError):  # a link to itself
+        kind = "folder" if path.is_dir() else kind
+    return f"did you mean the {kind} '{shown(path)}'?"
 
 
 def _entries(folder: Path) -> Iterator[os.DirEntry[str]]:
@@ -91,17 +71,7 @@ _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeErr
 
 
 def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", readable: str = "") -> bytes:
-    """Read a regular file.
-
-    Args:
-        limit: greatest size, bytes.
-        where: its name in messages; its path when empty.
-        missing: the remedy where there is no such file.
-        readable: the remedy where it is not a regular file or cannot be read.
-
-    Raises:
-        TunnelError: no such file, not a regular file, not readable, or too large.
-    """
+    """Read a regular file of limited size, in bytes; ``missing`` and ``readable`` are the remedies."""
     where = where or shown(path)
     readable = readable or "name a file that can be read"
     try:
@@ -115,12 +85,10 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
     try:
         state = os.fstat(descriptor)
         if not stat.S_ISREG(state.st_mode):
-            kind = "it is a folder" if stat.S_ISDIR(state.st_mode) else "it is not a regular file"
-            raise TunnelError(
-                f"cannot be read ({kind})",
-                where=where,
-                remedy=(stat.S_ISDIR(state.st_mode) and inside(path)) or readable,
-            )
+            folder = stat.S_ISDIR(state.st_mode)
+            kind = "it is a folder" if folder else "it is not a regular file"
+            remedy = (folder and inside(path)) or readable
+            raise TunnelError(f"cannot be read ({kind})", where=where, remedy=remedy)
         check_count(state.st_size, limit, "bytes", where, "split the file, or name the right one")
         # The file's content, which may be longer than its stated size.
         found = bytearray()
@@ -134,67 +102,41 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
         os.close(descriptor)
 
 
-def read_text(path: Path, limit: int, *, where: str = "", missing: str = "") -> str:
-    """Read a regular file of UTF-8 text, without its byte order mark.
-
-    Args:
-        limit: greatest size, bytes.
-        where: its name in messages; its path when empty.
-        missing: the remedy where there is no such file.
-
-    Raises:
-        TunnelError: as `read_regular`, or not UTF-8.
-    """
-    where = where or shown(path)
-    return decoded(read_regular(path, limit, where=where, missing=missing), where)
+def read_text(path: Path, limit: int, *, missing: str = "") -> str:
+    """Read a regular file of UTF-8 text, without its byte order mark; arguments as in `read_regular`."""
+    return decoded(read_regular(path, limit, missing=missing), shown(path))
 
 
 def decoded(content: bytes, where: str) -> str:
-    """UTF-8 text, without its byte order mark.
-
-    Raises:
-        TunnelError: not UTF-8.
-    """
+    """UTF-8 text, without its byte order mark."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise TunnelError(
-            f"not UTF-8 text (line {line})", where=where, remedy="save the file as UTF-8"
-        ) from None
+        what = f"not UTF-8 text (line {line})"
+        raise TunnelError(what, where=where, remedy="save the file as UTF-8") from None
 
 
-def read_json(path: Path, *, remedy: str, limit: int = limits.JSON_BYTES) -> dict[str, Any]:
-    """Read a JSON object.
-
-    Args:
-        remedy: what to do where it is missing or malformed.
-        limit: greatest size, bytes.
-
-    Raises:
-        TunnelError: as `read_regular` and `parse_json`.
-    """
-    return parse_json(read_regular(path, limit, missing=remedy, readable=remedy), shown(path), remedy)
+def read_json(path: Path, *, remedy: str) -> dict[str, Any]:
+    """Read a JSON object; the remedy is for a file that is missing or malformed."""
+    content = read_regular(path, limits.JSON_BYTES, missing=remedy, readable=remedy)
+    return parse_json(content, shown(path), remedy)
 
 
 def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
-    """A JSON object from its text.
-
-    Args:
-        content: UTF-8.
-        remedy: what to do where it is malformed.
-
-    Returns:
-        The object, nested no deeper than `limits.NESTING` and with integers no longer than `limits.INTEGER_BITS`.
-
-    Raises:
-        TunnelError: not UTF-8, not JSON, not an object, NaN or an infinity, nested too deeply, or an integer that
-            is too long.
-    """
+    """A JSON object from its text, or from UTF-8, with finite numbers only and within `check_shape`."""
     text = content if isinstance(content, str) else decoded(content, where)
+
+    def refused(number: str) -> float:
+        raise ValueError(f"{number} is not a JSON number")
+
+    def finite(number: str) -> float:  # the parser reads a number such as 1e999 as an infinity
+        if not abs(float(number)) < float("inf"):
+            raise ValueError(f"{one_line(number, 20)} is too large for a floating-point number")
+        return float(number)
+
     try:
-        # The parser reads a number such as 1e999 as an infinity; parse_float refuses it.
-        found = json.loads(text, parse_constant=_no_constant, parse_float=_finite)
+        found = json.loads(text, parse_constant=refused, parse_float=finite)
     except (ValueError, RecursionError) as error:
         raise TunnelError(f"is not JSON ({one_line(error, 80)})", where=where, remedy=remedy) from None
     if not isinstance(found, dict):
@@ -204,15 +146,7 @@ def parse_json(content: bytes | str, where: str, remedy: str) -> dict[str, Any]:
 
 
 def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
-    """Refuse a document that is nested too deeply or contains an integer that is too long.
-
-    Args:
-        document: plain values.
-        remedy: what to do about it.
-
-    Raises:
-        TunnelError: for the first such fault.
-    """
+    """Refuse a document that is nested too deeply or contains an integer that is too long."""
     level: list[Any] = [document]
     for _ in range(limits.NESTING + 1):
         following: list[Any] = []
@@ -222,11 +156,8 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
             elif isinstance(value, list):
                 following += value
             elif isinstance(value, int) and value.bit_length() > limits.INTEGER_BITS:
-                raise TunnelError(
-                    f"an integer of {value.bit_length()} bits, more than {limits.INTEGER_BITS}",
-                    where=where,
-                    remedy=remedy,
-                )
+                what = f"an integer of {value.bit_length()} bits, more than {limits.INTEGER_BITS}"
+                raise TunnelError(what, where=where, remedy=remedy)
         level = following
         if not level:
             return
@@ -236,19 +167,7 @@ def check_shape(document: Mapping[str, Any], where: str, remedy: str) -> None:
 def frame_schema(
     content: bytes, where: str, remedy: str, *, rows: int, counted: str = "rows"
 ) -> dict[str, pl.DataType]:
-    """The columns of a Parquet file whose metadata says that it is not too large.
-
-    Args:
-        remedy: what to do where it is malformed.
-        rows: greatest number of rows.
-        counted: what a row is, in the plural, for messages.
-
-    Returns:
-        Types by name. No row is read.
-
-    Raises:
-        TunnelError: not a readable Parquet file, or too many rows or columns.
-    """
+    """The types by name of a Parquet file whose metadata says that it is not too large; no row is read."""
     import polars as pl
 
     with _parquet_faults(where, remedy):
@@ -260,15 +179,7 @@ def frame_schema(
 
 
 def read_frame(content: bytes, where: str, remedy: str, columns: Sequence[str]) -> pl.DataFrame:
-    """Columns of a Parquet file that `frame_schema` has accepted.
-
-    Args:
-        remedy: what to do where it is malformed.
-        columns: names of the columns to read; all must exist.
-
-    Raises:
-        TunnelError: not a readable Parquet file.
-    """
+    """Columns of a Parquet file that `frame_schema` has accepted."""
     import polars as pl
 
     with _parquet_faults(where, remedy):
@@ -284,22 +195,15 @@ def _parquet_faults(where: str, remedy: str) -> Iterator[None]:
         yield
     # Some broken files make the decoder panic; PanicException is not a subclass of Exception.
     except (Exception, pl.exceptions.PanicException) as error:
-        raise TunnelError(
-            f"not a readable Parquet file ({one_line(error, 60)})", where=where, remedy=remedy
-        ) from None
+        what = f"not a readable Parquet file ({one_line(error, 60)})"
+        raise TunnelError(what, where=where, remedy=remedy) from None
 
 
 def check_count(count: float, limit: int, what: str, where: str, remedy: str) -> None:
-    """Refuse a number above its limit; the message states both.
+    """Refuse a number above its limit, before anything is expanded; the message states both.
 
     Args:
-        count: the number, known before anything is expanded (a count).
-        limit: see `tunnel_sim.vocabulary.limits`.
-        what: what is counted, in the plural.
-        remedy: what to do about it.
-
-    Raises:
-        TunnelError: more than the limit.
+        count: the number of what, a plural (a count).
     """
     if not count <= limit:
         number = f"{count:,}" if isinstance(count, int) and count < 10**15 else f"{float(count):.3g}"
@@ -308,15 +212,7 @@ def check_count(count: float, limit: int, what: str, where: str, remedy: str) ->
 
 @contextmanager
 def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
-    """Convert the exceptions that malformed content causes in a parser to a `TunnelError`.
-
-    Args:
-        what: what is wrong, such as ``is not an estimate``.
-        remedy: what to do about it.
-
-    Raises:
-        TunnelError: for any fault of the content; a `TunnelError` of the parser itself is passed on.
-    """
+    """Convert the exceptions that malformed content causes in a parser to a `TunnelError`."""
     try:
         yield
     except Exception as error:
@@ -330,14 +226,3 @@ def as_described(what: str, where: str, remedy: str) -> Iterator[None]:
 def _unreadable(error: Exception, where: str, remedy: str) -> TunnelError:
     reason = getattr(error, "strerror", None) or error
     return TunnelError(f"cannot be read ({one_line(reason)})", where=where, remedy=remedy)
-
-
-def _no_constant(text: str) -> float:
-    raise ValueError(f"{text} is not a JSON number")
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not abs(value) < float("inf"):
-        raise ValueError(f"{one_line(text, 20)} is too large for a floating-point number")
-    return value

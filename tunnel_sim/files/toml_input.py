@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -29,6 +29,11 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
+def optional(description: str) -> Any:
+    """A field that may be left out: None."""
+    return Field(default=None, description=description)
+
+
 ModelT = TypeVar("ModelT", bound=StrictModel)
 
 
@@ -40,6 +45,8 @@ def _printable(text: str) -> str:
 
 OneLine = Annotated[str, AfterValidator(_printable)]
 """A text without line breaks or control characters."""
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 SampleRate = Annotated[float, Field(ge=limits.SLOWEST_RATE, le=limits.FASTEST_RATE)]
 """A sample rate within its limits, Hz."""
 
@@ -48,42 +55,22 @@ _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{limits.
 
 
 def load_toml(path: Path, *, missing: str) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Args:
-        missing: the remedy when there is no such file.
-
-    Returns:
-        The document, not yet validated.
-
-    Raises:
-        TunnelError: no such file, not a regular file, not readable, too large, not UTF-8, not TOML, nested too
-            deeply, or a number outside `limits.SMALLEST_NUMBER` to `limits.LARGEST_NUMBER`.
-    """
+    """Read a TOML file, not yet validated, whose numbers do not overflow; ``missing`` is the remedy without it."""
     where = shown(path)
     text = read_text(path, limits.DOCUMENT_BYTES, missing=missing)
     if not text.strip():
         raise TunnelError("the file is empty", where=where, remedy=missing)
-    document = _parsed(text, where)
-    check_shape(document, where, "correct the file at that place")
-    _check_magnitudes(document, where)
-    return document
-
-
-def _parsed(text: str, where: str) -> dict[str, Any]:
+    remedy = "correct the file at that place"
     if _LONG_KEY.search(text):
-        raise TunnelError(
-            f"a key of more than {limits.KEY_PARTS} parts",
-            where=where,
-            remedy="correct the file at that place",
-        )
+        raise TunnelError(f"a key of more than {limits.KEY_PARTS} parts", where=where, remedy=remedy)
     try:
         # tomllib raises ValueError for numbers and dates that Python cannot represent.
-        return tomllib.loads(text)
+        document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise TunnelError(
-            f"not valid TOML: {one_line(error)}", where=where, remedy="correct the file at that place"
-        ) from None
+        raise TunnelError(f"not valid TOML: {one_line(error)}", where=where, remedy=remedy) from None
+    check_shape(document, where, remedy)
+    _check_magnitudes(document, where)
+    return document
 
 
 def _check_magnitudes(value: object, where: str, key: str = "") -> None:
@@ -94,29 +81,15 @@ def _check_magnitudes(value: object, where: str, key: str = "") -> None:
     elif isinstance(value, list):
         for one in value:
             _check_magnitudes(one, where, key)
-    elif isinstance(value, float) and value and isfinite(value) and not _is_computable(value):
-        raise TunnelError(
-            f"'{one_line(key)}' = {value:g} is beyond {limits.SMALLEST_NUMBER:g} to "
-            f"{limits.LARGEST_NUMBER:g} in magnitude",
-            where=where,
-            remedy="correct it (SI units)",
-        )
-
-
-def _is_computable(value: float) -> bool:
-    return limits.SMALLEST_NUMBER <= abs(value) <= limits.LARGEST_NUMBER
+    elif isinstance(value, float) and value and isfinite(value):
+        least, most = limits.SMALLEST_NUMBER, limits.LARGEST_NUMBER
+        if not least <= abs(value) <= most:
+            what = f"'{one_line(key)}' = {value:g} is beyond {least:g} to {most:g} in magnitude"
+            raise TunnelError(what, where=where, remedy="correct it (SI units)")
 
 
 def check_version(document: Mapping[str, Any], path: Path) -> None:
-    """Refuse a document whose ``schema_version`` this program does not read.
-
-    Args:
-        document: the document of :func:`load_toml`.
-        path: its file, for the message.
-
-    Raises:
-        TunnelError: the version is missing or different.
-    """
+    """Refuse a document whose ``schema_version`` this program does not read."""
     remedy = f"put schema_version = {SCHEMA_VERSION} at the top of the file"
     if "schema_version" not in document:
         raise TunnelError("no schema_version", where=shown(path), remedy=remedy)
@@ -127,98 +100,65 @@ def check_version(document: Mapping[str, Any], path: Path) -> None:
 
 
 def read_document(model: type[ModelT], path: Path, *, missing: str) -> ModelT:
-    """Read and validate a TOML file that states a ``schema_version``.
-
-    Args:
-        model: the model of the whole file.
-        missing: the remedy when there is no such file.
-
-    Raises:
-        TunnelError: for the first thing that is wrong.
-    """
+    """Read and validate a TOML file that states a ``schema_version``; ``missing`` is the remedy without it."""
     document = load_toml(path, missing=missing)
     check_version(document, path)
     return validate(model, document, path)
 
 
 def validate(model: type[ModelT], document: Mapping[str, Any], path: Path) -> ModelT:
-    """Validate a document against its model.
-
-    Args:
-        model: the model of the whole file.
-        document: the document of :func:`load_toml`.
-        path: its file, for the message.
-
-    Raises:
-        TunnelError: for the first fault.
-    """
+    """Validate a document against the model of its whole file."""
     try:
         return model.model_validate(document)
     except ValidationError as error:
         # An unknown key is reported first: it is often the cause of a missing key in the same table.
         problems = error.errors(include_url=False)
-        first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
-        raise _as_tunnel_error(model, document, first, path) from None
+        problem = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
+        loc, kind = problem["loc"], problem["type"]
+        # Where it is: run 'r01', [[effects]] number 2, [rig], or nothing for the top level.
+        first, number = loc[0], loc[1] if len(loc) >= 2 else None
+        where = shown(path)
+        if first == "runs" and isinstance(number, int):
+            entry = document["runs"][number]
+            name = entry.get("id") if isinstance(entry, Mapping) else None
+            named = isinstance(name, str) and bool(name.strip())
+            where += f", run '{one_line(name)}'" if named else f", run number {number + 1}"
+        elif isinstance(number, int) and isinstance(document.get(str(first)), list):
+            where += f", [[{first}]] number {number + 1}"
+        elif number is not None:
+            where += f", [{first}]"
+        key_at = max((i for i, part in enumerate(loc) if isinstance(part, str)), default=0)
+        key = str(loc[key_at])
+        table: type[StrictModel] | None = model  # that contains the key
+        for part in loc[:key_at]:
+            if isinstance(part, str) and table is not None:
+                field = table.model_fields.get(part)
+                table = _model_in(field.annotation) if field else None
+        fields = {} if table is None else table.model_fields
+        if kind == "extra_forbidden":
+            what, remedy = f"unknown key '{one_line(key)}'", did_you_mean(key, fields)
+            raise TunnelError(what, where=where, remedy=remedy) from None
+        if kind == "missing":
+            what = f"'{key}' is missing"
+        elif kind == "too_short":
+            what = f"'{key}' is empty"
+        else:
+            said = one_line(problem["msg"]).removeprefix("Value error, ")
+            reason = _REASONS.get(kind, said.replace("Input should be", "should be", 1))
+            what = f"'{key}' = {one_line(repr(problem['input']), limit=40)} {reason}"
+        description = (fields[key].description if key in fields else None) or "documented"
+        raise TunnelError(what, where=where, remedy=f"give {one_line(key)} as {description}") from None
 
 
-def _as_tunnel_error(
-    model: type[StrictModel], document: Mapping[str, Any], problem: Any, path: Path
-) -> TunnelError:
-    loc: Sequence[str | int] = problem["loc"]
-    place = _place(document, loc)
-    where = f"{shown(path)}, {place}" if place else shown(path)
-    key_at = max((i for i, part in enumerate(loc) if isinstance(part, str)), default=0)
-    key = str(loc[key_at])
-    table = _table_model(model, loc[:key_at])
-    if problem["type"] == "extra_forbidden":
-        known = table.model_fields if table else ()
-        return TunnelError(f"unknown key '{one_line(key)}'", where=where, remedy=did_you_mean(key, known))
-    what = f"'{key}' is missing" if problem["type"] == "missing" else _wrong_value(key, problem)
-    description = table.model_fields[key].description if table and key in table.model_fields else None
-    return TunnelError(what, where=where, remedy=f"give {one_line(key)} as {description or 'documented'}")
-
-
-def _wrong_value(key: str, problem: Any) -> str:
-    reason = {
-        "finite_number": "is not a finite number",
-        "float_type": "is not a number",
-        "int_type": "is not a whole number",
-        "string_type": "is not text",
-        "list_type": "is not a list",
-        "model_type": "is not a table",
-        "dict_type": "is not a table",
-        "too_short": "is empty",
-    }.get(problem["type"])
-    if problem["type"] == "too_short":
-        return f"'{key}' {reason}"
-    if reason is None:
-        said = one_line(problem["msg"]).removeprefix("Value error, ")
-        reason = said.replace("Input should be", "should be", 1)
-    return f"'{key}' = {one_line(repr(problem['input']), limit=40)} {reason}"
-
-
-def _place(document: Mapping[str, Any], loc: Sequence[str | int]) -> str:
-    """A location as text: ``run 'r01'``, ``[rig]``, or nothing for the top level."""
-    if len(loc) >= 2 and loc[0] == "runs" and isinstance(loc[1], int):
-        entry = document["runs"][loc[1]]
-        name = entry.get("id") if isinstance(entry, Mapping) else None
-        named = isinstance(name, str) and bool(name.strip())
-        return f"run '{one_line(name)}'" if named else f"run number {loc[1] + 1}"
-    several = isinstance(document.get(str(loc[0])), list)
-    if len(loc) >= 2 and isinstance(loc[0], str) and isinstance(loc[1], int) and several:
-        return f"[[{loc[0]}]] number {loc[1] + 1}"
-    return f"[{loc[0]}]" if len(loc) >= 2 else ""
-
-
-def _table_model(model: type[StrictModel], loc: Sequence[str | int]) -> type[StrictModel] | None:
-    """The model of the table that contains a location."""
-    current: type[StrictModel] | None = model
-    for part in loc:
-        if isinstance(part, int) or current is None:
-            continue
-        field = current.model_fields.get(part)
-        current = _model_in(field.annotation) if field else None
-    return current
+_REASONS = {
+    "finite_number": "is not a finite number",
+    "float_type": "is not a number",
+    "int_type": "is not a whole number",
+    "string_type": "is not text",
+    "list_type": "is not a list",
+    "model_type": "is not a table",
+    "dict_type": "is not a table",
+}
 
 
 def _model_in(annotation: Any) -> type[StrictModel] | None:

@@ -1,9 +1,8 @@
 """Output files: written whole or not at all, as text and as JSON.
 
-While a file or
-folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target. A folder that is
-about to be replaced is renamed ``.NAME.MARK.replaced``. The mark contains the machine, the process and its start
-time, so that another command can tell whether the writer is still running, and remove what a killed one left.
+While a file or folder is being written, it has the temporary name ``.NAME.MARK.partial`` next to its target;
+a folder about to be replaced is renamed ``.NAME.MARK.replaced``. The mark holds machine, process and its
+start time, so that another command can tell what a killed one left.
 """
 
 from __future__ import annotations
@@ -34,44 +33,17 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def json_text(document: Mapping[str, object]) -> str:
-    """A document as JSON for a file.
-
-    Args:
-        document: plain values and NumPy scalars and arrays, all finite.
-
-    Returns:
-        Indented JSON with a final line feed.
-
-    Raises:
-        ValueError: when a number is not finite; the message says where. This is a bug in the program.
-        TypeError: when a value has a type that JSON does not support.
-    """
+    """A document as indented JSON; a number that is not finite is a bug, and a ValueError says where."""
     return _encoded(document, indent=2) + "\n"
 
 
 def json_line(document: object, *, sort_keys: bool = False) -> str:
-    """A document as JSON on one line, for a field of another file.
-
-    Args:
-        document: as for `json_text`.
-        sort_keys: whether to sort keys, so that equal documents give equal text.
-
-    Returns:
-        JSON without line feeds.
-
-    Raises:
-        ValueError: as for `json_text`.
-        TypeError: as for `json_text`.
-    """
+    """A document as JSON on one line, for a field of another file; errors as in `json_text`."""
     return _encoded(document, sort_keys=sort_keys)
 
 
 def as_json(value: object) -> Any:
-    """A value in JSON's types: dataclasses by field unless they have a ``to_json_dict``, tuples as lists.
-
-    Args:
-        value: dataclasses, mappings, tuples and lists of them, and plain values.
-    """
+    """A value in JSON's types: dataclasses by field unless they have a ``to_json_dict``, tuples as lists."""
     if hasattr(value, "to_json_dict"):
         return value.to_json_dict()
     if dataclasses.is_dataclass(value):
@@ -82,20 +54,18 @@ def as_json(value: object) -> Any:
 
 
 def _encoded(document: object, **layout: Any) -> str:
+    def plain(value: object) -> object:
+        if isinstance(value, np.generic | np.ndarray):
+            return value.tolist()
+        raise TypeError(f"internal error: JSON cannot hold a {type(value).__name__}")
+
     try:
-        return json.dumps(document, default=_plain, ensure_ascii=False, allow_nan=False, **layout)
+        return json.dumps(document, default=plain, ensure_ascii=False, allow_nan=False, **layout)
     except ValueError as error:
         place = _not_finite(document)
         if place is None:
             raise
         raise ValueError(f"internal error: {place}, which JSON cannot hold") from error
-
-
-def _plain(value: object) -> object:
-    """A NumPy value as plain Python."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    raise TypeError(f"internal error: JSON cannot hold a {type(value).__name__}")
 
 
 def _not_finite(value: object, place: str = "the document") -> str | None:
@@ -120,14 +90,7 @@ _NAME_SHOWN = 40  # characters of the target's name in the temporary name: file 
 
 
 def temporary_names(target: Path) -> tuple[Path, Path]:
-    """Unique temporary names next to a target.
-
-    Args:
-        target: file or folder to write.
-
-    Returns:
-        The name for the new content, and the name for the old content while it is being replaced.
-    """
+    """Unique temporary names next to a target: for the new content, and for the old one while it is replaced."""
     pid = os.getpid()
     mark = f"{_machine()}-{pid}-{_start(pid) or 0}-{secrets.token_hex(3)}"
     return (
@@ -137,13 +100,7 @@ def temporary_names(target: Path) -> tuple[Path, Path]:
 
 
 def clear_leftovers(folder: Path) -> None:
-    """Remove what killed commands left in a folder, and restore folders that they had set aside.
-
-    Files of running processes and of other machines are kept. Files that cannot be removed are skipped.
-
-    Args:
-        folder: any folder; it need not exist.
-    """
+    """Remove what killed commands of this machine left in a folder, and restore what they had set aside."""
     try:
         names = [entry.name for entry in os.scandir(folder) if entry.name.startswith(".")]
     except OSError:
@@ -152,10 +109,14 @@ def clear_leftovers(folder: Path) -> None:
         found = _LEFTOVER.fullmatch(name)
         if found is None or found["machine"] != _machine() or _runs(int(found["pid"]), int(found["start"])):
             continue
-        if found["kind"] == REPLACED and not os.path.lexists(folder / found["name"]):
-            _restore(folder / name, folder / found["name"])
-        else:
-            _remove(folder / name)
+        path, target = folder / name, folder / found["name"]
+        with suppress(OSError):  # another command was faster, or it is not permitted: nothing is lost
+            if found["kind"] == REPLACED and not os.path.lexists(target):
+                path.rename(target)
+            elif path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
 
 
 @lru_cache(maxsize=64)
@@ -165,50 +126,21 @@ def clear_leftovers_once(folder: Path) -> None:
 
 
 def discard(folder: Path, partial: Path) -> None:
-    """Remove a folder that was set aside and is no longer needed.
-
-    It is renamed to a ``.partial`` first, so that after an interrupted removal the rest is not restored.
-
-    Args:
-        folder: the folder; it need not exist.
-        partial: an unused name from `temporary_names`.
-    """
+    """Remove a folder that was set aside; renamed first, so that an interruption does not restore the rest."""
     if folder.exists():
         folder.rename(partial)
         shutil.rmtree(partial, ignore_errors=True)
-
-
-def _restore(path: Path, target: Path) -> None:
-    try:
-        path.rename(target)
-    except OSError:
-        return  # another command was faster, or renaming is not permitted: nothing is lost
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-        return
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return
 
 
 @cache
 def _machine() -> str:
     """A hash that identifies this machine and, in a container, its process namespace."""
     parts = [socket.gethostname()]
-    for path, read in (("/etc/machine-id", _text), ("/proc/self/ns/pid", os.readlink)):
-        try:
-            parts.append(read(path))
-        except OSError:
-            continue
+    with suppress(OSError):
+        parts.append(Path("/etc/machine-id").read_text(encoding="utf-8", errors="replace").strip())
+    with suppress(OSError):
+        parts.append(str(Path("/proc/self/ns/pid").readlink()))
     return hashlib.sha256("\0".join(parts).encode(errors="replace")).hexdigest()[:8]
-
-
-def _text(path: str) -> str:
-    return Path(path).read_text(encoding="utf-8", errors="replace").strip()
 
 
 def _runs(pid: int, start: int) -> bool:
@@ -239,14 +171,7 @@ _PASSED_ON = (TunnelError, BrokenPipeError, KeyboardInterrupt, SystemExit, Gener
 
 
 def output_folder(folder: Path) -> Path:
-    """Create a folder for output, with its parents.
-
-    Args:
-        folder: where the output goes; it may exist.
-
-    Raises:
-        TunnelError: when it is a file, or cannot be created or written to.
-    """
+    """Create a folder for output, with its parents; refused where it is a file or cannot be written to."""
     with refusals(folder):
         _make(folder)
         with tempfile.TemporaryFile(dir=folder):
@@ -263,14 +188,7 @@ def remove_empty_folders() -> None:
 
 
 def refuse_unwritable(path: Path) -> None:
-    """Refuse a file that cannot be written, before the work whose result it is for.
-
-    Args:
-        path: the file; symbolic links are followed.
-
-    Raises:
-        TunnelError: when it is a folder or a block device, or its folder does not exist or takes no files.
-    """
+    """Refuse a file that cannot be written, before the work whose result it is for."""
     target = _target(path)
     if not target.parent.is_dir():
         folder = shown(target.parent)
@@ -285,16 +203,16 @@ def write_whole(path: Path, content: bytes) -> Path:
 
     A symbolic link is kept and its target is replaced. Devices, pipes and this process's standard output are
     written to directly.
-
-    Args:
-        path: the file; replaced when it exists.
-
-    Raises:
-        TunnelError: when it is a folder or a block device, or cannot be written.
     """
     target = _target(path)
     with refusals(path):
-        stream = _standard_stream(path)
+        stream = None  # a standard stream of this process, to which a path such as /dev/stdout refers
+        for standard in (sys.__stdout__, sys.__stderr__):
+            with suppress(OSError, ValueError):
+                own = standard is not None and os.path.samestat(path.stat(), os.fstat(standard.fileno()))
+                if stream is None and standard is not None and own:
+                    standard.flush()
+                    stream = standard.fileno()
         if stream is not None:
             _write_to(os.dup(stream), content)
         elif path.exists() and not path.is_file():
@@ -312,28 +230,12 @@ def write_whole(path: Path, content: bytes) -> Path:
 
 
 def write_encoded(path: Path, encode: Callable[[BinaryIO], object]) -> Path:
-    """Write the output of a library's writer, completely or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-        encode: writes the content to a stream.
-
-    Raises:
-        TunnelError: when the writer fails, or as `write_whole`.
-    """
+    """Write the output of a library's writer, completely or not at all."""
     return write_whole(path, encoded(path, encode))
 
 
 def encoded(path: Path, encode: Callable[[BinaryIO], object]) -> bytes:
-    """The output of a library's writer, in memory.
-
-    Args:
-        path: the file it is meant for, named in messages.
-        encode: writes the content to a stream.
-
-    Raises:
-        TunnelError: when the writer fails.
-    """
+    """The output of a library's writer in memory; the path it is meant for is named in messages."""
     stream = io.BytesIO()
     with refusals(path):
         encode(stream)
@@ -341,33 +243,16 @@ def encoded(path: Path, encode: Callable[[BinaryIO], object]) -> bytes:
 
 
 def write_json(path: Path, document: Mapping[str, object]) -> Path:
-    """Write a JSON document completely or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-        document: as for `tunnel_sim.files.writing.json_text`.
-
-    Raises:
-        TunnelError: when the file cannot be written.
-        ValueError: when the document contains NaN or infinity.
-    """
+    """Write a JSON document completely or not at all."""
     return write_whole(path, json_text(document).encode())
 
 
 @contextmanager
 def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
-    """Write a folder completely or not at all.
+    """Write a folder completely or not at all: a new, empty one, which is renamed at the end.
 
-    Args:
-        folder: missing parents are created; symbolic links are followed.
-        replace: whether a folder that holds something is replaced; otherwise it is refused, also one that another
-            process has written meanwhile.
-
-    Yields:
-        A new, empty folder to write in, which is renamed at the end.
-
-    Raises:
-        TunnelError: when the disk reports an error, or the folder holds something.
+    Missing parents are created; symbolic links are followed. A folder that holds something is replaced or
+    else refused, also one that another process has written meanwhile.
     """
     target = Path(os.path.realpath(folder))
     with refusals(folder, (OSError,)):
@@ -377,10 +262,20 @@ def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
         try:
             partial.mkdir()
             yield partial
-            if replace:
-                _put_in_place(partial, target, replaced)
-            else:
-                _put_where_nothing_is(partial, target, shown(folder))
+            if replace and target.exists():
+                target.rename(replaced)
+            elif not replace:
+                with suppress(OSError):
+                    target.rmdir()  # an empty folder may be in the way
+            try:
+                partial.rename(target)  # the system refuses it where a folder holds something
+            except BaseException as error:  # also for an interruption: the old folder must be restored
+                if replace and replaced.exists():
+                    replaced.rename(target)
+                if replace or not isinstance(error, OSError) or not target.is_dir():
+                    raise
+                remedy = "another command has written it meanwhile; choose another one"
+                raise TunnelError("the folder exists", where=shown(folder), remedy=remedy) from None
         finally:
             shutil.rmtree(partial, ignore_errors=True)
         discard(replaced, partial)
@@ -388,17 +283,7 @@ def whole_folder(folder: Path, *, replace: bool) -> Iterator[Path]:
 
 @contextmanager
 def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException,)) -> Iterator[None]:
-    """Convert the exceptions of a writer to a `TunnelError`.
-
-    Interruptions and broken pipes are passed on.
-
-    Args:
-        path: the file or folder that is written.
-        kinds: exceptions to convert; libraries written in Rust raise some that are not subclasses of `Exception`.
-
-    Raises:
-        TunnelError: instead of those.
-    """
+    """Convert the exceptions of a writer to a `TunnelError`; interruptions and broken pipes are passed on."""
     try:
         yield
     except _PASSED_ON:
@@ -407,37 +292,21 @@ def refusals(path: Path, kinds: tuple[type[BaseException], ...] = (BaseException
         # The error for a file or folder that cannot be written.
         reason = error.strerror if isinstance(error, OSError) else None
         said = reason.lower() if reason else f"{type(error).__name__}: {error}".rstrip(": ")
-        raise TunnelError(
-            f"cannot be written ({one_line(said)})",
-            where=shown(path),
-            remedy="name a file or folder that can be written",
-        ) from error
+        remedy = "name a file or folder that can be written"
+        what = f"cannot be written ({one_line(said)})"
+        raise TunnelError(what, where=shown(path), remedy=remedy) from error
 
 
 def _target(path: Path) -> Path:
     """The file that a path refers to; refused where no file can be written."""
-    where = shown(path)
     with refusals(path):
-        if path.is_dir():
-            raise TunnelError("is a folder, not a file", where=where, remedy="name a file")
-        if path.is_block_device():
-            raise TunnelError("is a disk, not a file", where=where, remedy="name a file")
+        if path.is_dir() or path.is_block_device():
+            kind = "folder" if path.is_dir() else "disk"
+            raise TunnelError(f"is a {kind}, not a file", where=shown(path), remedy="name a file")
         target = Path(os.path.realpath(path))
         if target.is_symlink():
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
         return target
-
-
-def _standard_stream(path: Path) -> int | None:
-    """Descriptor of this process's standard stream that a path such as ``/dev/stdout`` refers to."""
-    for stream in (sys.__stdout__, sys.__stderr__):
-        try:
-            if stream is not None and os.path.samestat(path.stat(), os.fstat(stream.fileno())):
-                stream.flush()
-                return stream.fileno()
-        except (OSError, ValueError):
-            continue
-    return None
 
 
 def _write_to(descriptor: int, content: bytes) -> None:
@@ -445,30 +314,7 @@ def _write_to(descriptor: int, content: bytes) -> None:
         stream.write(content)
 
 
-def _put_where_nothing_is(partial: Path, target: Path, where: str) -> None:
-    with suppress(OSError):
-        target.rmdir()  # an empty folder may be in the way
-    try:
-        partial.rename(target)  # the system refuses it where a folder holds something: no check can be outrun
-    except OSError:
-        if not target.is_dir():
-            raise
-        remedy = "another command has written it meanwhile; choose another one"
-        raise TunnelError("the folder exists", where=where, remedy=remedy) from None
-
-
 def _make(folder: Path) -> None:
     """Create a folder with its parents, and remember which were missing."""
     _made.extend(path for path in (folder, *folder.parents) if not path.exists())
     folder.mkdir(parents=True, exist_ok=True)
-
-
-def _put_in_place(partial: Path, target: Path, replaced: Path) -> None:
-    if target.exists():
-        target.rename(replaced)
-    try:
-        partial.rename(target)
-    except BaseException:  # also for an interruption: the old folder must be restored
-        if replaced.exists():
-            replaced.rename(target)
-        raise

@@ -1,8 +1,6 @@
 """Expressions such as ``-k*b*exp(-(b/w)^2)``: parsed, checked for units, evaluated or compiled for the moment law.
 
-Nothing is evaluated as Python. An expression is a tree of the operations in ``mjcf/plugin/expression.h``. Terms of
-the moment law as expressions of angle ``b`` (rad) and rate ``r`` (rad/s). Each has the coefficient without which
-there is none, the effect in words, and the moment (N m).
+Nothing is evaluated as Python: an expression is a tree of the operations in ``mjcf/plugin/expression.h``.
 """
 
 from __future__ import annotations
@@ -13,7 +11,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -40,12 +38,7 @@ _NUMERICS: Mapping[str, Callable[..., Any]] = {
 
 @dataclass(frozen=True)
 class Expression:
-    """A formula.
-
-    Args:
-        text: as stated.
-        root: the tree of its operations.
-    """
+    """A formula: its text as stated, and the tree of its operations."""
 
     text: str
     root: Node
@@ -56,60 +49,24 @@ class Expression:
         return frozenset(_names(self.root))
 
     def value(self, values: Mapping[str, float | Array]) -> Array:
-        """The value for numbers or arrays.
-
-        Args:
-            values: by name, in SI units, numbers or arrays of shape (n,).
-
-        Returns:
-            Shape (n,), or (); not a number or infinite outside the domain of a function.
-        """
+        """The value for numbers or arrays, shape (n,), by name in SI units; not finite where it has none."""
         with np.errstate(all="ignore"):
             return np.asarray(_value(self.root, values), np.float64)
 
     def dimension(self, dimensions: Mapping[str, Dimension]) -> Dimension:
-        """The dimension, with a check of every operation.
-
-        Args:
-            dimensions: of the names.
-
-        Returns:
-            Of the value.
-
-        Raises:
-            TunnelError: when quantities of different dimensions are added or compared, or the argument of a
-                function or an exponent has a dimension.
-        """
+        """The dimension, with a check of every operation; quantities of different dimensions cannot be added."""
         return _dimension(self.root, dimensions) or NUMBER
 
     def program(self, constants: Mapping[str, float], inputs: Mapping[str, str]) -> tuple[float, ...]:
-        """The code that the moment law evaluates, with the constants in it.
-
-        Args:
-            constants: value by name, in SI units.
-            inputs: operation by name, for what changes during a run.
-
-        Returns:
-            Elements as ``mjcf/plugin/expression.h`` describes them.
-        """
+        """The moment law's code (``mjcf/plugin/expression.h``) with constants in SI units and inputs."""
         return _code(_folded(self.root, constants), inputs)
 
 
 def parse(text: str, names: frozenset[str]) -> Expression:
-    """Read an expression.
-
-    Args:
-        text: numbers, names, ``+ - * / ^``, parentheses and `FUNCTIONS`; ``pi`` is a number.
-        names: that it may contain.
-
-    Raises:
-        TunnelError: when it is too long or too deep, or holds anything else.
-    """
+    """Read an expression of numbers, known names, ``pi``, ``+ - * / ^``, parentheses and `FUNCTIONS`."""
     if len(text) > limits.EXPRESSION_CHARACTERS:
-        raise TunnelError(
-            f"an expression of {len(text)} characters",
-            remedy=f"give one of {limits.EXPRESSION_CHARACTERS} or fewer",
-        )
+        remedy = f"give one of {limits.EXPRESSION_CHARACTERS} or fewer"
+        raise TunnelError(f"an expression of {len(text)} characters", remedy=remedy)
     if "#" in text:  # Python would take the rest for a comment
         raise _refused(f"{one_line(text)!r} is not a formula")
     try:
@@ -135,10 +92,9 @@ def _refused(what: str) -> TunnelError:
 def _node(tree: ast.expr, names: frozenset[str]) -> Node:
     """The tree of an expression from Python's."""
     match tree:
-        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and math.isfinite(
-            value
-        ):
-            return float(value)
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+            if math.isfinite(value):
+                return float(value)
         case ast.Name(id=name):
             if name == "pi":
                 return math.pi
@@ -146,22 +102,18 @@ def _node(tree: ast.expr, names: frozenset[str]) -> Node:
                 raise TunnelError(f"unknown name {one_line(name)!r}", remedy=did_you_mean(name, names))
             return name
         case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
-            return _signed(tree, names)
+            negative, inner = False, cast(ast.expr, tree)
+            # In a loop: hundreds of signs are more levels than Python's stack allows.
+            while isinstance(inner, ast.UnaryOp) and isinstance(inner.op, ast.USub | ast.UAdd):
+                negative ^= isinstance(inner.op, ast.USub)
+                inner = inner.operand
+            return ("negative", _node(inner, names)) if negative else _node(inner, names)
         case ast.BinOp(op=operator, left=left, right=right) if type(operator) in _BINARY:
             return _BINARY[type(operator)], _node(left, names), _node(right, names)
         case ast.Call(func=ast.Name(id=name), args=list(given), keywords=[]) if name in FUNCTIONS:
             if len(given) == (2 if name in ("min", "max") else 1):
                 return name, *(_node(one, names) for one in given)
     raise _refused(f"{one_line(ast.unparse(tree))!r} is not part of a formula")
-
-
-def _signed(tree: ast.expr, names: frozenset[str]) -> Node:
-    """What follows signs: hundreds of them are more levels than Python's stack allows."""
-    negative = False
-    while isinstance(tree, ast.UnaryOp) and isinstance(tree.op, ast.USub | ast.UAdd):
-        negative ^= isinstance(tree.op, ast.USub)
-        tree = tree.operand
-    return ("negative", _node(tree, names)) if negative else _node(tree, names)
 
 
 def _names(node: Node) -> set[str]:
@@ -218,14 +170,25 @@ def _dimension(node: Node, known: Mapping[str, Dimension]) -> Dimension | None:
     operation, *parts = node
     of = [_dimension(part, known) for part in parts]
     if operation in ("add", "subtract", "min", "max"):
-        return _of_alike(operation, of[0], of[1])
+        if of[0] is not None and of[1] is not None and of[0] != of[1]:
+            what = f"{operation} of {in_si(of[0])} and {in_si(of[1])}"
+            raise TunnelError(what, remedy="both must have the same unit")
+        return of[0] or of[1]
     if operation in ("negative", "abs"):
         return of[0]
     one, other = of[0] or NUMBER, of[-1] or NUMBER
     if operation in ("multiply", "divide"):
         return product(one, other, -1.0 if operation == "divide" else 1.0)
     if operation == "power":
-        return _of_power(one, parts[1], other)
+        if other != NUMBER:
+            raise TunnelError(f"an exponent in {in_si(other)}", remedy="an exponent is a number")
+        if one == NUMBER:
+            return NUMBER
+        power = _folded(parts[1], {})
+        if not isinstance(power, float):
+            what = f"a quantity in {in_si(one)} to the power of a parameter"
+            raise TunnelError(what, remedy="divide it by one of the same unit")
+        return product(NUMBER, one, power)
     if operation == "sqrt":
         return product(NUMBER, one, 0.5)
     if one != NUMBER and operation != "sign":
@@ -233,52 +196,18 @@ def _dimension(node: Node, known: Mapping[str, Dimension]) -> Dimension | None:
     return NUMBER
 
 
-def _of_alike(operation: str, one: Dimension | None, other: Dimension | None) -> Dimension | None:
-    if one is None or other is None or one == other:
-        return one or other
-    what = f"{operation} of {in_si(one)} and {in_si(other)}"
-    raise TunnelError(what, remedy="both must have the same unit")
-
-
-def _of_power(base: Dimension, exponent: Node, of_exponent: Dimension) -> Dimension:
-    if of_exponent != NUMBER:
-        raise TunnelError(f"an exponent in {in_si(of_exponent)}", remedy="an exponent is a number")
-    if base == NUMBER:
-        return NUMBER
-    power = _folded(exponent, {})
-    if not isinstance(power, float):
-        raise TunnelError(
-            f"a quantity in {in_si(base)} to the power of a parameter",
-            remedy="divide it by one of the same unit",
-        )
-    return product(NUMBER, base, power)
-
-
+# Terms of the moment law as expressions of angle b (rad) and rate r (rad/s): the coefficient without which there is
+# none, the effect in words, and the moment (N m).
+_CUBIC = "-Kr*stiffness_cubic*0.2^3*abs(b/0.2)^stiffness_cubic_exponent*sign(b)"
+_SQUARE = "-Kr*stiffness_quadratic*0.2^2*abs(b/0.2)^stiffness_quadratic_exponent"
+_DAMPING = "-quadratic_damping*2^2*abs(r/2)^quadratic_damping_exponent*sign(r)"
 OF_ANGLE = (
-    (
-        "stiffness_cubic",
-        "cubic stiffness",
-        "-Kr*stiffness_cubic*0.2^3*abs(b/0.2)^stiffness_cubic_exponent*sign(b)",
-    ),
-    (
-        "stiffness_quadratic",
-        "asymmetric stiffness",
-        "-Kr*stiffness_quadratic*0.2^2*abs(b/0.2)^stiffness_quadratic_exponent",
-    ),
+    ("stiffness_cubic", "cubic stiffness", _CUBIC),
+    ("stiffness_quadratic", "asymmetric stiffness", _SQUARE),
     ("free_play", "free play", "Kr*max(-free_play, min(free_play, b))"),
-    (
-        "gravity_stiffness",
-        "gravity stiffness",
-        "-gravity_stiffness*sin(b-gravity_angle)",
-    ),
+    ("gravity_stiffness", "gravity stiffness", "-gravity_stiffness*sin(b-gravity_angle)"),
 )
-OF_RATE = (
-    (
-        "quadratic_damping",
-        "quadratic damping",
-        "-quadratic_damping*2^2*abs(r/2)^quadratic_damping_exponent*sign(r)",
-    ),
-)
+OF_RATE = (("quadratic_damping", "quadratic damping", _DAMPING),)
 TEXTBOOK_POWERS = {
     "stiffness_cubic_exponent": 3.0,
     "stiffness_quadratic_exponent": 2.0,

@@ -1,18 +1,22 @@
 """The compiled forward integrator: the plugin's moment law without MuJoCo, for fits of many runs.
 
-It uses RK4 steps, treats the aerodynamic lag as the plugin does, and locates reversals under Coulomb friction.
-Tests compare it with the MuJoCo model for every term. Calls release the global interpreter lock.
+It uses RK4 steps, treats the aerodynamic lag as the plugin does, and locates reversals under Coulomb
+friction. Tests compare it with the MuJoCo model for every term. Calls release the global interpreter lock.
 """
 
 from __future__ import annotations
 
+import cmath
+import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import forward_library, parameter_names, parameter_vector, run_dtype
 from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling, spring_end_angle
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -20,17 +24,15 @@ _NONE: Array = np.zeros(0)
 
 
 def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, Array, int]:
-    """Integrate runs of equal length.
+    """Integrate runs of equal length: angle (rad) and rate (rad/s) of the rod's upper end, shape (n, samples).
+
+    The status is 0, or one more than the index of the first run whose motion grew without bound (that run and
+    the later ones are unset).
 
     Args:
         law: the moment law's parameters, shape (n, number of parameters), in the law's order.
         runs: shape (n,), of `run_dtype`; the arrays that its pointers name must stay alive.
         samples: samples per run, the first at time 0.
-
-    Returns:
-        Angle (rad) and rate (rad/s) of the rod's upper end, each of shape (n, samples), and a status: 0, or
-        one more than the index of the first run whose motion grew without bound (that run and the later ones are
-        unset).
     """
     count = len(runs)
     law = np.ascontiguousarray(law, dtype=np.float64)
@@ -50,15 +52,10 @@ def integrate(law: Array, runs: NDArray[np.void], samples: int) -> tuple[Array, 
 
 
 def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motion:
-    """Integrate one run.
+    """Integrate one run with its timestep; a ValueError where the motion grows without bound.
 
     Args:
-        rig: gives frontal area, reference length and width.
-        settings: the run's physics, with the timestep to use.
         sample_rate: Hz.
-
-    Raises:
-        ValueError: when the motion grows without bound.
     """
     samples, steps = sampling(settings, sample_rate)
     run, keep_alive = forward_run(settings)
@@ -71,12 +68,7 @@ def forward_motion(rig: Rig, settings: RunSettings, sample_rate: float) -> Motio
 
 
 def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array]]:
-    """A run's conditions in the form that the compiled code takes.
-
-    Returns:
-        Array of shape (1,) and `run_dtype`, at the release (see ``Model.release_state``), and the arrays it
-        points to, which the caller must keep alive.
-    """
+    """A run at its release for the compiled code, shape (1,), of `run_dtype`, and the arrays to be kept alive."""
     wind = settings.series.get("wind_speed")
     forcing = settings.series.get("forcing")
     values = np.array(wind.values if wind is not None else [settings.wind_speed], dtype=np.float64)
@@ -125,17 +117,146 @@ def forward_run(settings: RunSettings) -> tuple[NDArray[np.void], Sequence[Array
 
 
 def backlash(angle: Array, half_width: float, start: float) -> Array:
-    """The reading behind a backlash: it moves only when pushed.
+    """The reading behind a backlash, rad, shape (n,): it moves only when pushed.
 
     Args:
         angle: of the driving side, rad, shape (n,).
         half_width: rad.
         start: the reading before the first sample, rad.
-
-    Returns:
-        The reading, rad, shape (n,).
     """
     source = np.ascontiguousarray(angle, dtype=np.float64)
     result = np.empty_like(source)
     forward_library().vwt_backlash(source.size, source.ctypes.data, half_width, start, result.ctypes.data)
     return result
+
+
+# A rod rings many times faster than the body swings and decays soon, but an integrator has to follow it to the
+# end. Here the two oscillations of the linear rig are separated instead. The slow one is integrated with a rigid
+# rod whose inertia, damping and lead of the body give its exact frequency, damping and shape. The ringing is added
+# in closed form. Nonlinear terms act on the slow motion alone.
+
+#: How many times faster than the body the rod must ring for the two to be separated.
+SEPARATION = 5.0
+_GONE = 1e-9  # rad: ringing below this is not computed
+_MOST_ITERATIONS = 60
+_CONVERGED = 1e-14  # relative
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """A decaying oscillation of the rod's upper end, Re(amplitude · exp(root · t)), rad; root: 1/s, Im > 0."""
+
+    amplitude: complex
+    root: complex
+
+    def added(self, angle: Array, rate: Array, interval: float) -> tuple[Array, Array]:
+        """Angle and rate with the ringing.
+
+        Args:
+            angle, rate: of the slow motion at equal intervals from the release, rad and rad/s, shape (n,).
+            interval: s.
+        """
+        size = abs(self.amplitude)
+        if size <= _GONE:
+            return angle, rate
+        lasting = np.log(size / _GONE) / max(-self.root.real * interval, 1e-9)
+        count = min(angle.size, int(lasting) + 1)
+        ringing = self.amplitude * np.exp(self.root * interval * np.arange(count))
+        angle, rate = angle.copy(), rate.copy()
+        angle[:count] += ringing.real
+        rate[:count] += (self.root * ringing).real
+        return angle, rate
+
+
+@dataclass(frozen=True)
+class SlowMotion:
+    """A run with a rigid rod that moves as the slow oscillation of the run with a flexible one.
+
+    Args:
+        lead: of the body before the upper end, as a share of the angle there.
+        rod_stiffness: of the rod that leads, seen from the upper end, N m/rad.
+        body_release: the body's release angle, rad.
+    """
+
+    run: RunSettings
+    lead: float
+    rod_stiffness: float
+    body_release: float
+    ringing: Ringing
+
+    def forward_run(self) -> tuple[NDArray[np.void], Sequence[Array]]:
+        """The run for the compiled integrator; result as of `forward_run`."""
+        row, keep_alive = forward_run(self.run)
+        row["lead"], row["rod_stiffness"], row["lagged"] = self.lead, self.rod_stiffness, self.body_release
+        return row, keep_alive
+
+
+def slow_motion(run: RunSettings, rig: Rig) -> SlowMotion | None:
+    """Separate the rod's ringing from the motion of the body on its spring; the run's release angle is the body's.
+
+    None for a rigid rod, and where the two oscillations are not `SEPARATION` apart or one of them does not
+    oscillate.
+    """
+    twist = run.rod_twist
+    if twist is None:
+        return None
+    upper, lower = (share * run.yaw_inertia for share in (twist.inertia_share, 1.0 - twist.inertia_share))
+    flow = rig.body.flow(run.air_density, run.wind_speed)
+    air = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
+    air_damping = aerodynamic_damping(run.derivatives.cn_r, **flow)
+    spring = run.spring_stiffness + run.parameters.get("gravity_stiffness", 0.0)
+    loss, rod, rod_loss = run.mechanical_damping, 1.0 / twist.compliance, twist.damping(run.yaw_inertia)
+
+    def lead_at(root: complex) -> complex:
+        """The twist per angle of the upper end in an oscillation exp(root · t), from the balance of the body."""
+        free = air + air_damping * root - lower * root**2
+        return free / (rod + rod_loss * root - free)
+
+    lead, root = 0j, 0j
+    for _ in range(_MOST_ITERATIONS):
+        previous = root
+        # the whole rig's balance, its body moving 1 + lead times as far as the upper end
+        body = 1.0 + lead
+        root = _upper_root(upper + lower * body, loss - air_damping * body, spring - air * body)
+        lead = lead_at(root)
+        if abs(root - previous) <= _CONVERGED * abs(root):
+            break
+    else:
+        return None
+    if not root.imag > 0.0:
+        return None
+    # The four roots' sum and product give the other two.
+    total = (loss + rod_loss) / upper + (rod_loss - air_damping) / lower
+    product = (rod * (spring - air) - air * spring) / (upper * lower)
+    fast = _upper_root(1.0, total + 2.0 * root.real, product / abs(root) ** 2)
+    if not (fast.imag > 0.0 and abs(fast) > SEPARATION * abs(root)):
+        return None
+    end = spring_end_angle(run)
+    # Amplitudes of two oscillations that add up to the release's angle, its rate, the twist and its rate.
+    roots, leads = (root, fast), (lead, lead_at(fast))
+    rows = [(1.0, 1.0), roots, leads, (roots[0] * leads[0], roots[1] * leads[1])]
+    matrix = [[part for value in row for part in (value.real, -value.imag)] for row in rows]
+    state = np.array((end, run.release_rate, run.release_angle - end, 0.0))
+    found = np.linalg.solve(np.array(matrix), state).tolist()
+    slow, ringing = complex(found[0], found[1]), complex(found[2], found[3])
+    shape = (1.0 + lead.real) ** 2  # a moment on the body does work on its own angle
+    strained = rod * lead.real**2
+    inertia = (spring + strained - air * shape) / abs(root) ** 2
+    if not inertia > 0.0:
+        return None
+    damping = -2.0 * root.real * inertia + air_damping * shape
+    rigid = dataclasses.replace(
+        run,
+        rod_twist=None,
+        yaw_inertia=inertia,
+        mechanical_damping=damping,
+        release_angle=slow.real,
+        release_rate=(root * slow).real,
+    )
+    return SlowMotion(rigid, lead.real, strained, run.release_angle, Ringing(ringing, fast))
+
+
+def _upper_root(inertia: complex, damping: complex, stiffness: complex) -> complex:
+    """The root of inertia s² + damping s + stiffness with the larger imaginary part, 1/s."""
+    half = damping / (2.0 * inertia)
+    return -half + 1j * cmath.sqrt(stiffness / inertia - half * half)

@@ -1,7 +1,6 @@
 """The compiled moment law: where its library lies, and the names of parameters, states and operations it lists.
 
-Python looks the names up, so that it cannot disagree with C
-about their order (``mjcf/plugin/tables.c``).
+Python looks the names up, so that it cannot disagree with C about their order (``mjcf/plugin/tables.c``).
 """
 
 from __future__ import annotations
@@ -19,17 +18,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 def native_library(stem: str) -> Path:
-    """The path of a compiled library of this package.
-
-    Args:
-        stem: its name without ``lib`` and suffix, such as ``vwt_plugin``.
-
-    Returns:
-        The file in the installed package, even when the Python sources run from a checkout.
-
-    Raises:
-        TunnelError: when the package was not built.
-    """
+    """The path of a compiled library in the installed package, even when the sources run from a checkout."""
     try:
         distribution = importlib.metadata.distribution("virtual-wind-tunnel")
     except importlib.metadata.PackageNotFoundError as error:
@@ -39,21 +28,13 @@ def native_library(stem: str) -> Path:
         path = folder / f"lib{stem}{ending}"
         if path.is_file():
             return path
-    raise TunnelError(
-        f"the compiled library {stem} is missing", where=str(folder), remedy="reinstall the package"
-    )
+    what = f"the compiled library {stem} is missing"
+    raise TunnelError(what, where=str(folder), remedy="reinstall the package")
 
 
 @functools.cache
 def forward_library() -> ctypes.CDLL:
-    """The compiled forward integrator, loaded once.
-
-    Returns:
-        The library with the argument types of its functions set.
-
-    Raises:
-        TunnelError: when the package was not built.
-    """
+    """The compiled forward integrator, loaded once, with the argument types of its functions set."""
     library = ctypes.CDLL(str(native_library("vwt_forward")))
     for kind in ("parameter_name", "parameter_unit", "state_name", "operation_name", "run_name"):
         getattr(library, f"vwt_{kind}").restype = ctypes.c_char_p
@@ -81,14 +62,7 @@ def parameter_units() -> Mapping[str, str]:
 
 
 def parameter_vector(values: Mapping[str, float]) -> Array:
-    """The law's parameters in the form that the compiled code takes.
-
-    Args:
-        values: by name, in the law's units; the others are zero.
-
-    Returns:
-        Array of shape (number of parameters,).
-    """
+    """The law's parameters, in its units, in the form that the compiled code takes; those not given are zero."""
     return np.array([float(values.get(name, 0.0)) for name in parameter_names()])
 
 
@@ -100,17 +74,7 @@ def state_names() -> tuple[str, ...]:
 
 
 def state_vector(values: Mapping[str, float]) -> Array:
-    """The plugin's state in the form of ``mjData.plugin_state``.
-
-    Args:
-        values: by name, in rad, rad/s and s; the others are zero.
-
-    Returns:
-        Array of shape (number of state variables,).
-
-    Raises:
-        ValueError: when a name is unknown.
-    """
+    """The plugin's state (rad, rad/s, s) in the form of ``mjData.plugin_state``; values not given are zero."""
     if unknown := set(values) - set(state_names()):
         raise ValueError(f"the plugin's state has no {', '.join(sorted(unknown))}")
     return np.array([float(values.get(name, 0.0)) for name in state_names()])

@@ -1,8 +1,7 @@
-"""The physics of one run as numbers, its release and its motion.
+"""The physics of one run as numbers, its release and its motion; MuJoCo and the forward integrator use them.
 
-The MuJoCo model and the forward integrator are both built from these numbers. At the release the body is held at
-its angle, at rest, and its rod is in balance with the spring. With a rod of compliance c and a spring Kr, the
-body's angle is 1 + Kr c times that of the spring's end.
+At the release the body is held at its angle, at rest, and its rod is in balance with the spring. With a rod
+of compliance c and a spring Kr, the body's angle is 1 + Kr c times that of the spring's end.
 """
 
 from __future__ import annotations
@@ -34,9 +33,8 @@ _OWNED = frozenset(
 def _check(name: str, value: float, *, above: float = -inf, least: float = -inf) -> None:
     if not (isfinite(value) and value > above and value >= least):
         bound = f" above {above:g}" if above > -inf else f" of {least:g} or more" if least > -inf else ""
-        raise TunnelError(
-            f"{name} = {value!r} must be a finite number{bound}", remedy="correct the run's settings"
-        )
+        remedy = "correct the run's settings"
+        raise TunnelError(f"{name} = {value!r} must be a finite number{bound}", remedy=remedy)
 
 
 @cache
@@ -58,16 +56,10 @@ class Series:
     interval: float
 
     def __post_init__(self) -> None:
-        """Check the samples.
-
-        Raises:
-            TunnelError: when there are none, one is not finite, or the interval is not positive.
-        """
+        """Check the samples."""
         if not self.values or not all(map(isfinite, self.values)):
-            raise TunnelError(
-                "a series needs at least one sample, and all samples must be finite",
-                remedy="correct the sampled input",
-            )
+            what = "a series needs at least one sample, and all samples must be finite"
+            raise TunnelError(what, remedy="correct the sampled input")
         _check("interval of a series", self.interval, above=0.0)
 
 
@@ -86,11 +78,7 @@ class RodTwist:
     damping_ratio: float = 0.01
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            TunnelError: when one is out of range.
-        """
+        """Check the numbers."""
         _check("compliance of the rod", self.compliance, above=0.0)
         _check("inertia_share of the rod", self.inertia_share, above=0.0)
         _check("inertia share of the body", 1.0 - self.inertia_share, above=0.0)
@@ -102,26 +90,16 @@ class RodTwist:
         return 2.0 * self.damping_ratio * sqrt(yaw_inertia * share * (1.0 - share) / self.compliance)
 
     def free_frequency(self, yaw_inertia: float) -> float:
-        """Angular frequency of the twist with both ends free, below that of the rod on its spring.
-
-        Args:
-            yaw_inertia: the whole Izz, kg m².
-
-        Returns:
-            rad/s.
-        """
+        """Angular frequency of the twist with both ends free, rad/s; the total Izz is in kg m²."""
         share = self.inertia_share
         return sqrt(1.0 / (self.compliance * yaw_inertia * share * (1.0 - share)))
 
     def frequency(self, yaw_inertia: float, spring_stiffness: float) -> float:
-        """An upper bound on the natural frequency of the rod's twist.
+        """An upper bound on the natural frequency of the rod's twist, rad/s.
 
         Args:
             yaw_inertia: the total Izz, kg m².
             spring_stiffness: Kr, N m/rad.
-
-        Returns:
-            rad/s.
         """
         share = self.inertia_share
         return sqrt((1.0 / (self.compliance * (1.0 - share)) + spring_stiffness) / (yaw_inertia * share))
@@ -136,7 +114,6 @@ class DriveMoment:
         values: at these times, shape (n,), any unit.
         scale: N m per unit.
         delay: by which it acts later than its samples, s.
-        held: whether it is constant from one sample to the next; else linear.
         on_body: whether it acts on the body; else on the rod's upper end, as the spring does.
     """
 
@@ -148,19 +125,13 @@ class DriveMoment:
     on_body: bool = True
 
     def __post_init__(self) -> None:
-        """Copy and check the samples.
-
-        Raises:
-            TunnelError: when they do not match, or one is not finite.
-        """
+        """Copy and check the samples."""
         for name in ("time_s", "values"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         numbers = np.concatenate([self.time_s, self.values, [self.scale, self.delay]])
         if self.time_s.shape != self.values.shape or not self.time_s.size or not np.isfinite(numbers).all():
-            raise TunnelError(
-                "a drive needs as many finite values as times, and at least one",
-                remedy="correct the sampled input",
-            )
+            remedy = "correct the sampled input"
+            raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -176,14 +147,11 @@ class RunSettings:
         air_density: ρ, kg/m³.
         release_angle: rad, of the body.
         release_rate: rad/s; the rig itself releases from rest.
-        duration: s.
-        timestep: integration step, s.
+        duration, timestep: of the run, and of an integration step, s.
         parameters: further parameters of the moment law by name (see ``mjcf/plugin/README.md``); the others are
             zero.
         series: sampled inputs by name: ``wind_speed`` in m/s, ``forcing`` as a moment coefficient.
-        rod_twist: None for a rigid rod.
         program: of a further moment on the rod's upper end (see ``mjcf/plugin/expression.h``); empty: none.
-        drive: the moment of a driven run; None of a free decay.
     """
 
     spring_stiffness: float
@@ -203,11 +171,7 @@ class RunSettings:
     drive: DriveMoment | None = None
 
     def __post_init__(self) -> None:
-        """Check names and numbers. The plugin checks the bounds of the law's parameters.
-
-        Raises:
-            TunnelError: when a name is unknown or belongs to another field, or a number is out of range.
-        """
+        """Check names and numbers. The plugin checks the bounds of the law's parameters."""
         for name in ("yaw_inertia", "duration", "timestep"):
             _check(name, getattr(self, name), above=0.0)
         for name in ("spring_stiffness", "wind_speed", "air_density"):
@@ -219,28 +183,16 @@ class RunSettings:
             _check("least wind_speed of the series", min(wind.values), least=0.0)
         if not self.parameters.keys() <= _further():
             name = next(name for name in self.parameters if name not in _further())
-            raise TunnelError(
-                f"unknown parameter {name!r} of the moment law", remedy=did_you_mean(name, sorted(_further()))
-            )
+            remedy = did_you_mean(name, sorted(_further()))
+            raise TunnelError(f"unknown parameter {name!r} of the moment law", remedy=remedy)
 
     def with_moment(self, program: tuple[float, ...]) -> RunSettings:
-        """A copy with a moment on the rod's upper end added.
-
-        Args:
-            program: of the moment, as for ``program``.
-        """
+        """A copy with a moment on the rod's upper end added, by its program."""
         add = (float(operation_names().index("add")),) if self.program else ()
         return replace(self, program=(*self.program, *program, *add))
 
     def with_parameters(self, values: Mapping[str, float]) -> RunSettings:
-        """A copy with parameters of the moment law added or replaced.
-
-        Args:
-            values: by name.
-
-        Raises:
-            TunnelError: when a name is unknown or belongs to a field.
-        """
+        """A copy with parameters of the moment law added or replaced."""
         parameters = {**self.parameters, **values}
         if not values.keys() <= _further():
             return replace(self, parameters=parameters)  # which says what is wrong
@@ -249,26 +201,14 @@ class RunSettings:
         return copy
 
     def layout(self) -> tuple[object, ...]:
-        """What runs must have in common to share one compiled model.
-
-        Returns:
-            Timestep, names and lengths of the series, lengths of program and drive, the drive's delay, and whether
-            the rod is rigid.
-        """
+        """What runs must have in common to share one compiled model."""
         series = tuple((name, len(series.values)) for name, series in self.series.items())
         drive = self.drive  # a delayed one is given by its means over the steps
         driven = drive and (drive.values.size, drive.delay, float(drive.time_s[-1]) if drive.delay else 0.0)
         return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:
-        """Every parameter of the moment law.
-
-        Args:
-            rig: gives frontal area, reference length and width.
-
-        Returns:
-            Value by name, in the law's order and units.
-        """
+        """Every parameter of the moment law by name, in the law's order and units; the rig gives its sizes."""
         given = {
             "air_density": self.air_density,
             "frontal_area": rig.body.frontal_area,
@@ -285,26 +225,12 @@ class RunSettings:
 
 
 def spring_end_angle(run: RunSettings) -> float:
-    """Angle of the spring's and sensor's end at the release.
-
-    Args:
-        run: its release angle is the body's.
-
-    Returns:
-        rad; the body's own angle where the rod is rigid.
-    """
+    """Angle of the spring's and sensor's end at the release, rad: the body's own where the rod is rigid."""
     return run.release_angle / _body_per_end(run)
 
 
 def released_by_spring_end(run: RunSettings) -> RunSettings:
-    """The run with the body's release angle, given that of the spring's and sensor's end.
-
-    Args:
-        run: its release angle is that of the spring's end, which is what a record shows.
-
-    Returns:
-        The same run, its release angle that of the body.
-    """
+    """The run with the body's release angle, given one with that of the spring's end, which a record shows."""
     if run.rod_twist is None:
         return run
     return dataclasses.replace(run, release_angle=run.release_angle * _body_per_end(run))
@@ -322,8 +248,7 @@ class Motion:
 
     Args:
         time_s: shape (n,), s from the release.
-        angle: of the rod's upper end, which carries spring and sensor, shape (n,), rad.
-        rate: of the same end, shape (n,), rad/s.
+        angle, rate: of the rod's upper end, which carries spring and sensor, shape (n,), rad and rad/s.
     """
 
     time_s: Array
@@ -337,18 +262,10 @@ class Motion:
 
 
 def sampling(settings: RunSettings, sample_rate: float) -> tuple[int, int]:
-    """The number of samples in a run, and of integration steps between two samples.
+    """The number of samples in a run, and of whole integration steps between two samples.
 
     Args:
-        settings: duration and timestep, s.
         sample_rate: Hz.
-
-    Returns:
-        (samples, steps between samples).
-
-    Raises:
-        TunnelError: when the sample rate is outside its limits, or the sample interval is not a whole number of
-            timesteps.
     """
     if not limits.SLOWEST_RATE <= sample_rate <= limits.FASTEST_RATE:
         raise TunnelError(

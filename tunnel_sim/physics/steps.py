@@ -1,19 +1,14 @@
-"""How long an integration step may be. No other module decides it.
+"""How long an integration step may be; no other module decides it.
 
-With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of angular
-frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120. This amounts to a spurious damping ratio
-of (ωh)⁵/144 and a relative frequency error of −(ωh)⁴/120. The phase angle per step, ωh in rad, is limited
+With the classical Runge–Kutta method of order 4 and steps h, the amplitude of an undamped oscillation of
+angular frequency ω falls by (ωh)⁶/144 per step, and its phase lags by (ωh)⁵/120: a spurious damping ratio of
+(ωh)⁵/144 and a relative frequency error of −(ωh)⁴/120. The phase angle per step is limited for the body on
+its spring (`FREQUENCY_ERROR`), for a flexible rod's own mode to half a radian, and for any mode to
+`_UNSTABLE`.
 
-- for the body on its spring, with and without the wind, so that the frequency error is `FREQUENCY_ERROR`;
-- for a flexible rod's own mode to half a radian, which gives a relative frequency error of 5e-4 and a spurious
-  damping ratio of 2.2e-4 compared with its 1 %;
-- for any mode to `_UNSTABLE`, because the method diverges beyond it.
-
-Fits predict thousands of runs and may err up to the noise of a block mean: their steps are longer
-(`fit_substeps`) and make up for their own error (`compensated`). What is reported is predicted once more in steps
-of `REPORT_STEP` at most (`report_substeps`), a quarter of the longest of a fit.
-
-Steps are only divided by whole numbers, so that a sample interval remains a whole number of steps.
+Fits predict thousands of runs: their steps are longer (`fit_substeps`) and make up for their own error
+(`compensated`). What is reported is predicted once more in shorter steps (`report_substeps`). Steps are only
+divided by whole numbers, so that a sample interval remains a whole number of steps.
 """
 
 from __future__ import annotations
@@ -59,14 +54,7 @@ _LEAST_RANGE = 1e-6  # rad: a shorter presliding range does not shorten the step
 
 
 def whole_steps(sample_rate: float) -> float:
-    """The longest step, at most 1/`USUAL_RATE`, that divides the sample interval.
-
-    Args:
-        sample_rate: Hz.
-
-    Returns:
-        s.
-    """
+    """The longest step, s, at most 1/`USUAL_RATE`, that divides the sample interval of a rate in Hz."""
     return 1.0 / (sample_rate * max(1, ceil(USUAL_RATE / sample_rate)))
 
 
@@ -91,13 +79,10 @@ def fit_substeps(run: RunSettings, interval: float) -> int:
 def fit_stride(rig: Rig, run: RunSettings, interval: float) -> int:
     """How many block means one step of a fit covers; the motion between its ends is cubic.
 
-    Args:
-        rig: gives frontal area and reference length.
-        run: the run's physics, its rod rigid.
-        interval: between block means, s.
+    The rod is rigid. 1 where a moment has a kink, is sampled, or is not mostly linear.
 
-    Returns:
-        1 where a moment has a kink, is sampled, or is not mostly linear.
+    Args:
+        interval: between block means, s.
     """
     if run.series or run.program or any(run.parameters.get(name) for name in _ROUGH):
         return 1
@@ -113,12 +98,8 @@ def compensated(law: Mapping[str, float], wind_speed: float, step: float) -> tup
     σ (1 − (ωh)⁴/30) + ω (ωh)⁵/144, and the damper makes up for both. What is left is of the order (ωh)⁵.
 
     Args:
-        law: every parameter by name, in the law's units.
         wind_speed: m/s.
         step: h, s.
-
-    Returns:
-        The law, and the step to integrate with in place of h, s.
     """
     inertia = law["yaw_inertia"]
     flow = {name: law[name] for name in ("air_density", "frontal_area", "reference_length")}
@@ -144,26 +125,12 @@ def report_substeps(run: RunSettings, interval: float) -> int:
 
 
 def for_rod(run: RunSettings) -> RunSettings:
-    """The run with steps short enough for its rod's own oscillation; unchanged if the rod is rigid.
-
-    Args:
-        run: the run's physics, with its rod.
-
-    Returns:
-        The run with its timestep divided by a whole number, at most `MOST_SUBSTEPS`.
-    """
+    """The run with steps short enough for its rod's own oscillation; unchanged if the rod is rigid."""
     return _divided(run, min(MOST_SUBSTEPS, _substeps(_rod_rate(run) * run.timestep, ROD_TURN)))
 
 
 def for_contact(run: RunSettings) -> RunSettings:
-    """The run with steps in which the motion after a reversal covers at most half the presliding range.
-
-    Args:
-        run: the run's physics, with its friction.
-
-    Returns:
-        The run with its timestep divided by a whole number.
-    """
+    """The run with steps in which the motion after a reversal covers at most half the presliding range."""
     reach, friction = (run.parameters.get(name, 0.0) for name in ("presliding", "friction_moment"))
     if reach == 0.0:
         return run
@@ -177,14 +144,7 @@ def for_contact(run: RunSettings) -> RunSettings:
 
 
 def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
-    """The run with steps short enough for its fastest motion; unchanged where they already are.
-
-    Returns:
-        The run with its timestep divided by a whole number.
-
-    Raises:
-        TunnelError: when the steps would be shorter than `LEAST_STEP`.
-    """
+    """The run with steps short enough for its fastest motion; refused where they are below `LEAST_STEP`."""
     body, rod = body_rate(rig, run), _rod_rate(run)
     number = max(_substeps(body * run.timestep, BODY_TURN), _substeps(rod * run.timestep, ROD_TURN))
     if number > 1 and run.timestep / number < LEAST_STEP:
@@ -193,27 +153,21 @@ def follow_fastest(rig: Rig, run: RunSettings) -> RunSettings:
 
 
 def check_stable(rig: Rig, run: RunSettings) -> None:
-    """Refuse steps with which the integration would diverge.
-
-    Raises:
-        TunnelError: when the steps are too long.
-    """
+    """Refuse steps with which the integration would diverge."""
     body, rod = body_rate(rig, run), _rod_rate(run)
     if max(body, rod) * run.timestep > _UNSTABLE:
         raise _too_fast(run, body, rod)
 
 
 def body_rate(rig: Rig, run: RunSettings) -> float:
-    """The fastest rate of the body on its spring: the larger magnitude of the two roots, with or without wind.
-
-    Terms that are nonlinear in the angle count with their slope at the release.
-
-    Returns:
-        rad/s.
-    """
+    """The fastest rate of the body on its spring, rad/s, with or without wind, at the slopes of the release."""
     inertia, law = run.yaw_inertia, run.parameters
-    spring = _spring(run)
-    swing = abs(run.release_angle) * sqrt(spring / inertia) + abs(run.release_rate)
+    angle = abs(run.release_angle)
+    # stiffness of spring and gravity at the release
+    steeper = _slope(run, "stiffness_cubic", 3.0, angle, 0.2)
+    steeper += _slope(run, "stiffness_quadratic", 2.0, angle, 0.2)
+    spring = run.spring_stiffness * (1.0 + steeper) + abs(law.get("gravity_stiffness", 0.0))
+    swing = angle * sqrt(spring / inertia) + abs(run.release_rate)
     damping = run.mechanical_damping + abs(law.get("loss_factor", 0.0)) * sqrt(run.spring_stiffness * inertia)
     damping += _slope(run, "quadratic_damping", 2.0, swing, 2.0)
     still = _largest_root(spring, damping, inertia)
@@ -222,7 +176,6 @@ def body_rate(rig: Rig, run: RunSettings) -> float:
     if fastest == 0.0:
         return still
     flow = rig.body.flow(run.air_density, fastest)
-    angle = abs(run.release_angle)
     air = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
     steeper = air * _slope(run, "moment_cubic", 3.0, angle, 0.2)
     exponent = law.get("damping_quadratic_exponent", 0.0)
@@ -230,15 +183,6 @@ def body_rate(rig: Rig, run: RunSettings) -> float:
     loss = damping - aerodynamic_damping(run.derivatives.cn_r, **flow) * (1.0 + thicker)
     stiffness = (spring - air, spring - air - steeper, spring - air + steeper)
     return max(still, *(_largest_root(one, loss, inertia) for one in stiffness))
-
-
-def _spring(run: RunSettings) -> float:
-    """Stiffness of spring and gravity at the release, N m/rad."""
-    angle = abs(run.release_angle)
-    steeper = _slope(run, "stiffness_cubic", 3.0, angle, 0.2) + _slope(
-        run, "stiffness_quadratic", 2.0, angle, 0.2
-    )
-    return run.spring_stiffness * (1.0 + steeper) + abs(run.parameters.get("gravity_stiffness", 0.0))
 
 
 def _slope(run: RunSettings, name: str, textbook: float, x: float, reference: float) -> float:

@@ -53,8 +53,6 @@ class SensorProperties:
         resolution: step of the reading, rad (rad/s or rad/s² where it measures a rate or an acceleration).
         noise_std: standard deviation of the reading's noise, in the same unit.
         plausible: False accepts values that look like a wrong unit, and a low sample rate.
-        quantity: what the readings are; None: the angle.
-        zero: whether the runs have a common zero; None: the records decide.
     """
 
     sample_rate: float | None = None
@@ -85,13 +83,10 @@ class Run:
     """One run: its record and its conditions.
 
     Args:
-        id: unique in the campaign.
-        record: the sensor's reading.
         wind_speed: V, m/s; 0 is wind-off.
         spring_stiffness: Kr, N m/rad; None: the run is identified in normalised form.
         air_density: ρ, kg/m³; required where `needs_density`.
         release_angle: nominal, rad.
-        drive: the input of a driven run, which need not start with a release; None of a free decay.
     """
 
     id: str
@@ -121,11 +116,7 @@ class Run:
         return known[self.drive.column]
 
     def to_xarray(self) -> Dataset:
-        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
-
-        Raises:
-            TunnelError: where xarray, of the extra ``frames``, is not installed.
-        """
+        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes."""
         try:
             from xarray import Dataset  # only here: an extra
         except ModuleNotFoundError as error:
@@ -151,13 +142,7 @@ def needs_density(wind_speed: float, *scales: float | None) -> bool:
 
 @dataclass(frozen=True)
 class Campaign:
-    """The runs of one rig with one sensor; the sensor's zero is unknown.
-
-    Args:
-        name: short name, also of the folder.
-        runs: at least one run, with unique ids.
-        law: of the joint in a model of one's own; None: spring and damper.
-    """
+    """One or more runs, with unique ids, of a rig with a sensor; ``law``: of the joint of one's own model."""
 
     name: str
     rig: RigProperties

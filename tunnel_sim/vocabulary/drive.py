@@ -35,9 +35,7 @@ class Drive:
     """The input of a run at the samples of its record.
 
     Args:
-        column: what it is.
         values: at the times of the record, shape (n,): N m, any unit, or rad, as ``column`` says.
-        hold: between the samples.
         gain: N m per unit of a ``drive``; None where it is not stated.
     """
 
@@ -62,65 +60,42 @@ class Drive:
 
 
 def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = True) -> None:
-    """Refuse an input that cannot be that of its record.
-
-    Args:
-        record: of the response.
-        where: file and run, for messages.
-        judged: whether an input that looks clipped is refused too.
-
-    Raises:
-        TunnelError: an input of another length than the record, constant, clipped, or the response itself.
-    """
+    """Refuse an input that cannot be that of its record; where it is ``judged``, one that looks clipped too."""
     values, name = drive.values, drive.column
     if values.shape != record.yaw_rad.shape:
-        raise TunnelError(
-            f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}",
-            where=where,
-            remedy="give the input at the times of the record, one value for each sample",
-        )
+        what = f"the input {name} has {values.size} samples, the record {record.yaw_rad.size}"
+        remedy = "give the input at the times of the record, one value for each sample"
+        raise TunnelError(what, where=where, remedy=remedy)
     if not np.isfinite(values).all():
-        raise TunnelError(
-            f"the input {name} holds NaN or an infinity", where=where, remedy="give all its values"
-        )
+        remedy = "give all its values"
+        raise TunnelError(f"the input {name} holds NaN or an infinity", where=where, remedy=remedy)
     span = float(np.ptp(values))
     if span <= _CONSTANT * float(np.abs(values).max()):
-        raise TunnelError(
-            f"the input {name} is constant",
-            where=where,
-            remedy=f"leave the column out if the run is a free decay, or record what drives it in {name}",
-        )
+        remedy = f"leave the column out if the run is a free decay, or record what drives it in {name}"
+        raise TunnelError(f"the input {name} is constant", where=where, remedy=remedy)
     x, y = values - values.mean(), record.yaw_rad - record.yaw_rad.mean()
     alike = float(x @ y) ** 2 / max(float(x @ x) * float(y @ y), 1e-300)
     if 1.0 - alike < _ITSELF:
-        raise TunnelError(
-            f"the input {name} is the response itself, up to a factor",
-            where=where,
-            remedy=f"record what drives the body in {name}, not the sensor's reading",
-        )
-    if judged and _is_clipped(values, span):
-        raise TunnelError(
-            f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
-            where=where,
-            remedy="record the input in a wider range; where the actuator itself saturates, state "
-            "plausible = false under [sensor] to keep it",
-        )
-
-
-def _is_clipped(values: Array, span: float) -> bool:
-    """Whether an input stands at an extreme for some samples again and again, and is seldom near it."""
+        what = f"the input {name} is the response itself, up to a factor"
+        remedy = f"record what drives the body in {name}, not the sensor's reading"
+        raise TunnelError(what, where=where, remedy=remedy)
     ends = (float(values.min()), float(values.max()))
-    at = [values == end for end in ends]
-    if np.mean(at[0] | at[1]) > _LEVELS:
-        return False
-    for end, there in zip(ends, at, strict=True):
+    if not judged or np.mean((values == ends[0]) | (values == ends[1])) > _LEVELS:
+        return
+    # It is clipped where it stands at an extreme for some samples again and again, and is seldom near it.
+    for end in ends:
+        there = values == end
         count = int(np.count_nonzero(there))
         near = int(np.count_nonzero(np.abs(values - end) < 0.01 * span)) - count
         flat = there[2:] & there[1:-1] & there[:-2]
         stands = int(np.count_nonzero(flat)) * _FLAT > count
         if count > max(_CLIPPED * values.size, _FLAT) and stands and count > _NEIGHBOURS * max(near, 1):
-            return True
-    return False
+            raise TunnelError(
+                f"the input {name} saturates: its extreme value stands for {_CLIPPED:.0%} of the record or more",
+                where=where,
+                remedy="record the input in a wider range; where the actuator itself saturates, state "
+                "plausible = false under [sensor] to keep it",
+            )
 
 
 def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | None, where: str) -> None:
@@ -128,11 +103,6 @@ def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | No
 
     Args:
         spring_stiffness: as stated, N m/rad; None where it is not.
-        drive: the run's input; None of a free run.
-        where: file and run, for messages.
-
-    Raises:
-        TunnelError: a stiffness of zero in a free run, which does not oscillate.
     """
     if spring_stiffness == 0.0 and drive is None:
         raise TunnelError(

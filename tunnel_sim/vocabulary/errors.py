@@ -1,12 +1,16 @@
-"""The error shown to users: what is wrong, where, and the remedy; and the libraries that may be missing."""
+"""The error shown to users: what is wrong, where, and the remedy; packages that are missing, or add to this."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 _LONGEST = 4096  # characters in one part of a message: the longest path
 
@@ -14,13 +18,8 @@ _LONGEST = 4096  # characters in one part of a message: the longest path
 class TunnelError(Exception):
     """Bad input, described in one line.
 
-    Args:
-        what: what is wrong, as a short clause.
-        where: the file, run or option concerned; empty when there is none.
-        remedy: what to do about it.
-
-    The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
-    status 2.
+    The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits
+    with status 2. ``where`` is the file, run or option concerned; empty when there is none.
     """
 
     def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
@@ -32,11 +31,7 @@ class TunnelError(Exception):
 
 
 def one_line(value: object, limit: int = 120) -> str:
-    """The text of a value without line breaks or control characters.
-
-    Args:
-        limit: greatest length, characters; longer text is cut.
-    """
+    """The text of a value without line breaks or control characters, cut to a number of characters."""
     try:
         whole = str(value)
     except (RecursionError, ValueError):  # nested too deep, or an integer of thousands of digits
@@ -51,11 +46,7 @@ def shown(path: Path) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """The remedy for an unknown name: the closest known name, or the list of all.
-
-    Returns:
-        A clause such as ``did you mean 'output_error'?``.
-    """
+    """The remedy for an unknown name: the closest known name, or the list of all."""
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1)
     return f"did you mean '{close[0]}'?" if close else f"use one of {', '.join(names)}"
@@ -74,21 +65,29 @@ EXTRAS = {
 
 
 def library(name: str, use: str, extra: str, where: str = "") -> Any:
-    """A library of an extra.
-
-    Args:
-        name: of its module.
-        use: what needs it, for the message.
-        extra: one of `EXTRAS`.
-
-    Raises:
-        TunnelError: when it is not installed; the remedy is the command that installs it.
-    """
+    """A library of an extra, by the name of its module and what needs it; one of `EXTRAS`."""
     try:
         return import_module(name)
     except ImportError:
-        raise TunnelError(
-            f"{use} needs the package {name.partition('.')[0]}",
-            where=where,
-            remedy=f"run: pip install 'virtual-wind-tunnel[{extra}]'",
-        ) from None
+        what = f"{use} needs the package {name.partition('.')[0]}"
+        remedy = f"run: pip install 'virtual-wind-tunnel[{extra}]'"
+        raise TunnelError(what, where=where, remedy=remedy) from None
+
+
+def added_to(group: str) -> dict[str, EntryPoint]:
+    """The entry points of a group, such as ``tunnel.effects``, by name."""
+    from importlib.metadata import entry_points  # only here: every command would wait for it
+
+    return {point.name: point for point in entry_points(group=group)}
+
+
+@contextmanager
+def loading(group: str, name: str) -> Iterator[None]:
+    """Say in one line whatever a foreign package does wrong while its entry point is loaded within the block."""
+    try:
+        yield
+    except Exception as error:
+        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
+        what = f"cannot be loaded ({one_line(said)})"
+        remedy = "correct or uninstall its package"
+        raise TunnelError(what, where=f"entry point {group}: {name}", remedy=remedy) from error

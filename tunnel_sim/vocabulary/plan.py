@@ -1,18 +1,21 @@
-"""What to simulate: aerodynamic derivatives, the plan of a campaign and its runs.
+"""What to simulate: aerodynamic derivatives, the plan of a campaign and its runs, and waveforms that drive them.
 
-Sign convention: yaw angle β and yaw
-rate r = β̇ have the same positive direction about the rod's axis; the aerodynamic moment is N = Ka β + Ca r on the
-right-hand side of Izz β̈ + Cr β̇ + Kr β = N. A positive Cnβ lowers the frequency; a negative Cnr adds damping. A
-is the frontal area and l the model's length.
+Sign convention: yaw angle β and yaw rate r = β̇ have the same positive direction about the rod's axis; the
+aerodynamic moment is N = Ka β + Ca r on the right-hand side of Izz β̈ + Cr β̇ + Kr β = N. A positive Cnβ
+lowers the frequency; a negative Cnr adds damping.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -20,8 +23,7 @@ class AeroDerivatives:
     """Yaw-moment derivatives.
 
     Args:
-        cn_beta: Cnβ = ∂Cn/∂β, 1/rad.
-        cn_r: Cnr = ∂Cn/∂(r l/V), 1/rad.
+        cn_beta, cn_r: Cnβ = ∂Cn/∂β and Cnr = ∂Cn/∂(r l/V), 1/rad.
     """
 
     cn_beta: float
@@ -31,7 +33,7 @@ class AeroDerivatives:
 def aerodynamic_stiffness(
     cn_beta: float, *, air_density: float, wind_speed: float, frontal_area: float, reference_length: float
 ) -> float:
-    """Ka = ½ρV²·A·l·Cnβ (paper, eq. 4).
+    """Ka = ½ρV²·A·l·Cnβ (paper, eq. 4), N m/rad.
 
     Args:
         cn_beta: Cnβ, 1/rad.
@@ -39,9 +41,6 @@ def aerodynamic_stiffness(
         wind_speed: V, m/s.
         frontal_area: A, m².
         reference_length: l, m.
-
-    Returns:
-        Ka, N m/rad.
     """
     return 0.5 * air_density * wind_speed**2 * frontal_area * reference_length * cn_beta
 
@@ -49,7 +48,7 @@ def aerodynamic_stiffness(
 def aerodynamic_damping(
     cn_r: float, *, air_density: float, wind_speed: float, frontal_area: float, reference_length: float
 ) -> float:
-    """Ca = ½ρV·A·l²·Cnr (paper, eq. 5).
+    """Ca = ½ρV·A·l²·Cnr (paper, eq. 5), N m s/rad.
 
     Args:
         cn_r: Cnr, 1/rad.
@@ -57,9 +56,6 @@ def aerodynamic_damping(
         wind_speed: V, m/s.
         frontal_area: A, m².
         reference_length: l, m.
-
-    Returns:
-        Ca, N m s/rad.
     """
     return 0.5 * air_density * wind_speed * frontal_area * reference_length**2 * cn_r
 
@@ -76,8 +72,7 @@ class Truth:
     """The coefficients that the simulation uses, which the estimators are to recover.
 
     Args:
-        cn_beta: Cnβ, 1/rad.
-        cn_r: Cnr, 1/rad.
+        cn_beta, cn_r: Cnβ and Cnr, 1/rad.
         yaw_inertia: Izz of model and support, kg m².
         mechanical_damping: Cr, N m s/rad.
     """
@@ -93,13 +88,11 @@ class Condition:
     """One run to simulate.
 
     Args:
-        id: unique in the campaign; made of spring, speed, angle (or amplitude of the drive) and repeat.
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s; 0 is wind-off.
         air_density: ρ, kg/m³.
         release_angle: rad, nose-right positive; of a driven run 0, where it starts at rest.
         duration: of the record, s.
-        drive: the input of a driven run at the samples of the sensor; None of a free decay.
     """
 
     id: str
@@ -130,11 +123,7 @@ class SensorModel:
 
 @dataclass(frozen=True)
 class EffectSetting:
-    """One effect to inject, by name; ``tunnel_sim.effects`` validates it.
-
-    Args:
-        parameters: its parameters by name, SI units.
-    """
+    """One effect to inject: its name, and its parameters by name in SI units; `tunnel_sim.effects` validates it."""
 
     name: str
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -142,12 +131,7 @@ class EffectSetting:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """Everything a simulated campaign depends on, apart from the rig.
-
-    Args:
-        conditions: the runs, at least one, with unique ids.
-        effects: effects added to the nominal model.
-    """
+    """Everything a simulated campaign depends on, apart from the rig: its runs have unique ids."""
 
     name: str
     seed: int
@@ -156,3 +140,95 @@ class CampaignPlan:
     sensor: SensorModel = SensorModel()
     effects: tuple[EffectSetting, ...] = ()
     description: str = ""
+
+
+# Waveforms of peak value 1 at the times of the samples.
+
+
+def stepped_sine(time_s: Array, frequencies_hz: Sequence[float]) -> Array:
+    """A sine that dwells equally long at each frequency, without a jump of its phase; shape (n,).
+
+    Args:
+        time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
+        frequencies_hz: in their order, Hz; a single one gives a plain sine.
+    """
+    rates = np.asarray(frequencies_hz, dtype=np.float64)
+    dwell = time_s.size * (time_s[1] - time_s[0]) / rates.size
+    ends = np.append(dwell * np.arange(rates.size), np.inf)
+    cycles = np.interp(time_s, ends[:-1], np.append(0.0, np.cumsum(dwell * rates[:-1])))
+    last = time_s > ends[-2]
+    cycles[last] += rates[-1] * (time_s[last] - ends[-2])
+    values: Array = np.sin(2.0 * pi * cycles)
+    return values
+
+
+def chirp(time_s: Array, start_hz: float, end_hz: float) -> Array:
+    """A sine whose frequency changes linearly with time; shape (n,).
+
+    Args:
+        time_s: of the samples from 0 on, shape (n,), s.
+        start_hz, end_hz: frequencies at the first and the last sample, Hz.
+    """
+    slope = (end_hz - start_hz) / time_s[-1]
+    values: Array = np.sin(2.0 * pi * (start_hz + 0.5 * slope * time_s) * time_s)
+    return values
+
+
+def square(time_s: Array, frequency_hz: float) -> Array:
+    """A square wave that begins with 1; shape (n,).
+
+    Args:
+        time_s: of the samples from 0 on, shape (n,), s.
+        frequency_hz: Hz.
+    """
+    half_cycles = np.floor(2.0 * frequency_hz * time_s + 1e-9)  # a sample that rounding puts before its edge
+    return 1.0 - 2.0 * (half_cycles % 2.0)
+
+
+def lines_in_band(size: int, interval: float, low_hz: float, high_hz: float) -> Array:
+    """Which multiples of one over the record's length lie in a band, below half the sample rate; shape (k,).
+
+    Args:
+        size: number of samples n (a count).
+        interval: between samples, s.
+        low_hz, high_hz: ends of the band, included, Hz.
+    """
+    length = size * interval
+    first, last = np.ceil(low_hz * length - 1e-9), np.floor(high_hz * length + 1e-9)
+    return np.arange(max(first, 1.0), min(last, (size - 1) // 2) + 1.0)
+
+
+def multisine(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Generator | None = None) -> Array:
+    """Cosines of equal amplitude at all multiples of one over the record's length within a band; shape (n,).
+
+    Args:
+        time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
+        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line lies between.
+        rng: draws the phases; None: those of Schroeder, −π k (k − 1)/N of the k-th of N lines, which keep the peak
+            low (doi:10.1109/TIT.1970.1054411).
+    """
+    lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
+    k = np.arange(1.0, lines.size + 1.0)
+    phases = -pi * k * (k - 1.0) / lines.size if rng is None else rng.uniform(0.0, 2.0 * pi, lines.size)
+    return _of_lines(time_s.size, lines, np.exp(1j * phases))
+
+
+def band_noise(time_s: Array, low_hz: float, high_hz: float, rng: np.random.Generator) -> Array:
+    """Gaussian noise that is white within a band and absent outside it; shape (n,).
+
+    Args:
+        time_s: of the samples from 0 on, shape (n,), s, evenly spaced.
+        low_hz, high_hz: ends of the band, below half the sample rate, Hz; at least one line lies between.
+    """
+    lines = lines_in_band(time_s.size, time_s[1] - time_s[0], low_hz, high_hz)
+    return _of_lines(
+        time_s.size, lines, rng.standard_normal(lines.size) + 1j * rng.standard_normal(lines.size)
+    )
+
+
+def _of_lines(size: int, lines: Array, weights: NDArray[np.complex128]) -> Array:
+    spectrum = np.zeros(size // 2 + 1, dtype=np.complex128)
+    spectrum[lines.astype(np.int64)] = weights
+    values: Array = np.fft.irfft(spectrum, size)
+    values /= np.max(np.abs(values))
+    return values

@@ -39,11 +39,7 @@ class Record:
     yaw_rad: Array
 
     def __post_init__(self) -> None:
-        """Copy, freeze and check the arrays.
-
-        Raises:
-            ValueError: when shapes differ or there are fewer than two samples.
-        """
+        """Copy, freeze and check the arrays."""
         object.__setattr__(self, "time_s", read_only(self.time_s))
         object.__setattr__(self, "yaw_rad", read_only(self.yaw_rad))
         if self.time_s.ndim != 1 or self.time_s.shape != self.yaw_rad.shape or self.time_s.size < 2:
@@ -86,27 +82,15 @@ class Record:
 
 
 def gaps(time: Array) -> NDArray[np.bool_]:
-    """Whether samples are missing between one time and the next.
-
-    Args:
-        time: of the samples, shape (n,), s, increasing.
-
-    Returns:
-        Shape (n - 1,): whether the step is longer than four mean intervals.
-    """
+    """Where samples are missing: steps of over four mean intervals between times, shape (n,); shape (n - 1,)."""
     steps = np.diff(time)
     return steps > _GAP * steps.mean() if steps.size else np.zeros(0, dtype=np.bool_)
 
 
 def evenly_spaced(record: Record, *, bridged: bool = True) -> Record:
-    """A record on a uniform raster, for methods that need one.
+    """A record on a uniform raster, for methods that need one: itself where it is uniform.
 
-    Args:
-        bridged: whether gaps are bridged by a curve; False: by the record's mean, which adds nothing to a spectrum.
-
-    Returns:
-        The record itself where it is uniform; else a smooth curve through it at as many times, evenly spaced from
-        the first to the last. Interpolation reduces the noise, and readings within a gap are not measurements.
+    Else a smooth curve through it, which bridges gaps or leaves them at the mean; neither is a measurement.
     """
     if record.uniform:
         return record
@@ -142,18 +126,10 @@ NOISE_MARGIN = 4.0  # or by this many standard deviations of the smoothed noise,
 
 
 def count_cycles(record: Record) -> float:
-    """Cycles of the dominant oscillation within the record.
+    """Number of cycles of the dominant oscillation within the record; 0 when nothing oscillates.
 
-    Slow drift and mains hum are removed. The dominant spectral line gives the time scale; a moving average over a
-    quarter of its period removes faster components. The period follows from the crossings of the centre of
-    oscillation, with hysteresis. The number of cycles is the record's duration over that period, so the part of a
-    heavily damped run in which the swing is lost in noise counts as well.
-
-    Args:
-        record: the reading, with any zero, noise, resolution and clipping.
-
-    Returns:
-        The number of cycles; 0 when nothing oscillates.
+    The dominant spectral line gives the time scale; the period follows from the crossings of the centre, with
+    hysteresis. The part of a heavily damped run in which the swing is lost in noise counts as well.
     """
     record = evenly_spaced(record, bridged=False)
     reading = _without_hum(record)
@@ -164,10 +140,16 @@ def count_cycles(record: Record) -> float:
     # Only rounding errors remain of a constant, a linear drift or pure hum.
     if reading.size < 6 or float(np.ptp(level)) <= 1e-9 * float(np.abs(record.yaw_rad).max()):
         return 0.0
-    frequency = _dominant_frequency(level, record.sample_rate)
-    if frequency is None:
+    # The strongest spectral line, which must stand out from the noise.
+    power = np.abs(np.fft.rfft(level))[1:] ** 2
+    frequency = np.fft.rfftfreq(level.size, 1.0 / record.sample_rate)[1:]
+    # Between power and power per octave, so that neither slow drift nor brief ringing hides the oscillation.
+    background = float(np.median(power)) if level.size >= SHORT_RECORD else 0.0
+    share = np.where(power > LINE_OVER_MEDIAN * background, power * np.sqrt(frequency), 0.0)
+    best = int(np.argmax(share))
+    if not share[best] > 0.0:
         return 0.0
-    width = max(1, round(0.25 * record.sample_rate / frequency))
+    width = max(1, round(0.25 * record.sample_rate / float(frequency[best])))
     # The first swing of a heavily damped run tilts the fitted trend, so the reading with its trend is counted too.
     return max(_count(reading, width), _count(level, width))
 
@@ -219,14 +201,3 @@ def _without_hum(record: Record) -> Array:
         overlap = len(starts) * block - reading.size
         reading = reading - np.concatenate([hum[:-1].ravel(), hum[-1, overlap:]])
     return reading
-
-
-def _dominant_frequency(reading: Array, sample_rate: float) -> float | None:
-    """Frequency of the strongest spectral line, Hz; None when no line stands out from the noise."""
-    power = np.abs(np.fft.rfft(reading))[1:] ** 2
-    frequency = np.fft.rfftfreq(reading.size, 1.0 / sample_rate)[1:]
-    # Between power and power per octave, so that neither slow drift nor brief ringing hides the oscillation.
-    background = float(np.median(power)) if reading.size >= SHORT_RECORD else 0.0
-    share = np.where(power > LINE_OVER_MEDIAN * background, power * np.sqrt(frequency), 0.0)
-    best = int(np.argmax(share))
-    return float(frequency[best]) if share[best] > 0.0 else None

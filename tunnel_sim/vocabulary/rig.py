@@ -25,7 +25,6 @@ class Term:
     """A part of the moment that a linear spring and damper leave out: minus the coefficient times the expression.
 
     Args:
-        expression: of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s).
         coefficient: in the unit.
         unit: such that the product is in N m.
     """
@@ -48,9 +47,7 @@ class JointLaw:
         damping: C, N m s/rad.
         friction: moment of dry friction, N m.
         rest: the joint's position at rest, rad.
-        terms: what the restoring moment and the damping have beside K and C.
         free: which of `FREE_PARAMETERS` are fitted.
-        slide: whether the joint slides.
     """
 
     inertia: float
@@ -65,12 +62,7 @@ class JointLaw:
     @property
     def held(self) -> dict[str, float]:
         """Value of every parameter that is not fitted, by its name in a fit."""
-        known = {
-            "inertia": self.inertia,
-            "damping": self.damping,
-            "stiffness": 0.0,
-            "rest": self.rest,
-        }
+        known = {"inertia": self.inertia, "damping": self.damping, "stiffness": 0.0, "rest": self.rest}
         return {FREE_PARAMETERS[name]: value for name, value in known.items() if name not in self.free}
 
 
@@ -81,15 +73,17 @@ _STEPS = 8  # facets of a quarter round
 
 
 def davis_vertices(body: Body) -> Array:
-    """Vertices whose convex hull is the body, in its own frame.
-
-    Args:
-        body: dimensions, m, and slant, degrees.
-
-    Returns:
-        Array of shape (n, 3), m: x forward, y to the left, z up, origin at the middle of the bounding box.
-    """
-    profile = np.array(_side_profile(body))
+    """Vertices whose convex hull is the body about its middle, shape (n, 3), m: forward, to the left, up."""
+    nose, tail = body.length / 2, -body.length / 2
+    top, bottom = body.height / 2, -body.height / 2
+    drop = _SLANT_DROP * body.height if body.rear_slant_deg > 0 else 0.0
+    run = drop / tan(radians(body.rear_slant_deg)) if drop else 0.0
+    radius = _NOSE_RADIUS * body.height
+    points = [(tail, bottom), (tail, top - drop), (min(tail + run, nose), top)]
+    for angle in np.linspace(0.0, pi / 2, _STEPS + 1):  # both front edges are quarter rounds
+        points.append((nose - radius * (1 - sin(angle)), top - radius * (1 - cos(angle))))
+        points.append((nose - radius / 2 * (1 - sin(angle)), bottom + radius / 2 * (1 - cos(angle))))
+    profile = np.array(points)
     radius = _EDGE_RADIUS * body.height
     layers = []
     for angle in np.linspace(0.0, pi / 2, _STEPS + 1):
@@ -102,27 +96,12 @@ def davis_vertices(body: Body) -> Array:
     return np.concatenate(layers)
 
 
-def _side_profile(body: Body) -> list[tuple[float, float]]:
-    nose, tail = body.length / 2, -body.length / 2
-    top, bottom = body.height / 2, -body.height / 2
-    drop = _SLANT_DROP * body.height if body.rear_slant_deg > 0 else 0.0
-    run = drop / tan(radians(body.rear_slant_deg)) if drop else 0.0
-    radius = _NOSE_RADIUS * body.height
-    points = [(tail, bottom), (tail, top - drop), (min(tail + run, nose), top)]
-    for angle in np.linspace(0.0, pi / 2, _STEPS + 1):  # both front edges are quarter rounds
-        points.append((nose - radius * (1 - sin(angle)), top - radius * (1 - cos(angle))))
-        points.append((nose - radius / 2 * (1 - sin(angle)), bottom + radius / 2 * (1 - cos(angle))))
-    return points
-
-
 @dataclass(frozen=True)
 class WorkingSection:
     """The tunnel's working section.
 
     Args:
-        width: across the flow, m.
-        height: m.
-        length: along the flow, m.
+        width, height, length: m; the width is across the flow, the length along it.
     """
 
     width: float
@@ -136,13 +115,10 @@ class Body:
 
     Args:
         length: reference length l, m.
-        width: m.
-        height: m.
+        width, height, ground_clearance: m.
         rear_slant_deg: angle of the rear slant below the roof, degrees.
-        ground_clearance: m.
         mass: of model and oscillating mechanism, kg.
-        frontal_area: A, m².
-        side_area: m².
+        frontal_area, side_area: A, and that of the side, m².
     """
 
     length: float
@@ -170,8 +146,7 @@ class Rod:
     """The support rod.
 
     Args:
-        diameter: m.
-        length_above_ceiling: m.
+        diameter, length_above_ceiling: m.
     """
 
     diameter: float
@@ -185,7 +160,6 @@ class Dynamics:
     Args:
         yaw_inertia: Izz of model and support, kg m².
         mechanical_damping: Cr, N m s/rad.
-        default_spring: number of the spring used where none is named.
     """
 
     yaw_inertia: float
@@ -195,11 +169,7 @@ class Dynamics:
 
 @dataclass(frozen=True)
 class Air:
-    """The air in the tunnel.
-
-    Args:
-        density: ρ, kg/m³.
-    """
+    """The air in the tunnel, of density ρ, kg/m³."""
 
     density: float
 
@@ -228,11 +198,7 @@ class Potentiometer:
 
 @dataclass(frozen=True)
 class Rig:
-    """The whole rig.
-
-    Args:
-        springs: torsional stiffness by spring number, N m/rad (paper, Table II).
-    """
+    """The whole rig; springs are torsional stiffnesses (N m/rad) by spring number (paper, Table II)."""
 
     working_section: WorkingSection
     body: Body
@@ -243,17 +209,7 @@ class Rig:
     springs: Mapping[int, float]
 
     def spring(self, number: int) -> float:
-        """The stiffness of a numbered spring.
-
-        Args:
-            number: as in Table II.
-
-        Returns:
-            Kr, N m/rad.
-
-        Raises:
-            TunnelError: when there is no such spring.
-        """
+        """The stiffness of a numbered spring of Table II, Kr, N m/rad."""
         if number not in self.springs:
             known = ", ".join(str(n) for n in self.springs)
             raise TunnelError(f"there is no spring {number}", remedy=f"use one of {known}")

@@ -30,8 +30,6 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
     """The dimension of one quantity times a power of another.
 
     Args:
-        one: powers of kg, m and s.
-        other: powers of kg, m and s.
         power: of the other, dimensionless.
     """
     kg, m, s = (a + power * b for a, b in zip(one, other, strict=True))
@@ -40,17 +38,10 @@ def product(one: Dimension, other: Dimension, power: float = 1.0) -> Dimension:
 
 @functools.cache
 def dimension(unit: str) -> Dimension:
-    """The dimension of a unit.
+    """Powers of kg, m and s of a unit.
 
-    Args:
-        unit: factors with spaces between them and digits for powers, the denominator after one slash; or ``l/V``,
-            of a time as a multiple of the reference length over the wind speed, which is a number.
-
-    Returns:
-        Powers of kg, m and s.
-
-    Raises:
-        TunnelError: when the unit has another form or an unknown factor.
+    It has factors with spaces between them and digits for powers, the denominator after one slash; ``l/V``,
+    of a time as a multiple of length over speed, is a number.
     """
     if unit == "l/V":
         return NUMBER
@@ -66,17 +57,7 @@ def dimension(unit: str) -> Dimension:
 
 @functools.cache
 def angle_power(unit: str) -> float:
-    """How a quantity changes where all angles are multiplied by a number, and moments with them.
-
-    Args:
-        unit: as for `dimension`.
-
-    Returns:
-        The power of that number: 1 for an angle or a moment, 0 for a stiffness, -2 for 1/rad2.
-
-    Raises:
-        TunnelError: as `dimension`.
-    """
+    """The power in which a quantity grows with all angles and moments: 1 for either, 0 for a stiffness."""
     above, _, below = unit.partition("/")
     return dimension(unit)[0] + _radians(above) - _radians(below.strip("()"))
 
@@ -99,14 +80,7 @@ def _factors(text: str, sign: float) -> Dimension | None:
 
 
 def in_si(given: Dimension) -> str:
-    """The unit of a dimension in kg, m and s.
-
-    Args:
-        given: powers of kg, m and s.
-
-    Returns:
-        Such as ``kg m2/s2``; ``1`` for a number.
-    """
+    """The unit of a dimension in kg, m and s, such as ``kg m2/s2``; ``1`` for a number."""
     named = list(zip(("kg", "m", "s"), given, strict=True))
     above, below = (
         [
@@ -127,14 +101,7 @@ _USUAL = (
 
 
 def dimension_text(found: Dimension) -> str:
-    """A unit of a dimension.
-
-    Args:
-        found: whole powers of kg, m and s.
-
-    Returns:
-        As `dimension` reads it: a usual unit, or kg, m and s.
-    """
+    """A unit of a dimension of whole powers, as `dimension` reads it: a usual unit, or kg, m and s."""
     for unit in _USUAL:
         if dimension(unit) == found:
             return unit

@@ -14,7 +14,7 @@ import pytest
 from diagnosis.identifiability import identifiability
 from tests.unit.own_effects import DETENT, OwnCubic
 from tunnel_sim.effects import Effect, the_effect
-from tunnel_sim.effects.base import Drawn, with_law
+from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.engine.effect_laws import check
 from tunnel_sim.physics.run_settings import RunSettings
@@ -29,7 +29,7 @@ class Broken(OwnCubic):
 class ActsAtItsNull(Broken):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         del stated, drawn
-        return with_law(run, stiffness_cubic=self.hardening + 0.1)
+        return run.with_parameters({"stiffness_cubic": self.hardening + 0.1})
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,9 @@ class Wanders(Broken):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         del stated, drawn
         return (
-            run if self.is_null else with_law(run, stiffness_cubic=self.hardening * (1.0 + next(self.calls)))
+            run
+            if self.is_null
+            else run.with_parameters({"stiffness_cubic": self.hardening * (1.0 + next(self.calls))})
         )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.rendering import RigView
 from tunnel_sim.files.rig_file import load_rig
 

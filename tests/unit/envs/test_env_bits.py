@@ -11,9 +11,9 @@ import pytest
 from env_episodes import NAME, episode, make, same
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
-from tunnel_sim.effects.stiffness import SpringMiscalibration
+from tunnel_sim.effects.mechanics import SpringMiscalibration
 from tunnel_sim.engine.simulate import simulate
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.moment_law import state_names
 

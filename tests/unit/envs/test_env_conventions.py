@@ -16,9 +16,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo, TimeLimit
 
 import tunnel_sim.envs.rendering as rendering
-from tunnel_sim.envs import register_environments
+from tunnel_sim.envs import EnvError, register_environments
 from tunnel_sim.envs.episodes import campaign_of
-from tunnel_sim.envs.errors import EnvError
 from tunnel_sim.envs.rendering import RigView
 from tunnel_sim.files.rig_file import load_rig
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from env_episodes import NAME, make
 
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.free_decay import FreeDecayEnv
 from tunnel_sim.vocabulary.errors import TunnelError
 

@@ -8,7 +8,7 @@ import pytest
 from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers
-from tunnel_sim.envs.errors import EnvError
+from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.stable_baselines import BaselinesVecEnv
 
 ARGUMENTS = {"duration": 0.03, "preset": "operator"}

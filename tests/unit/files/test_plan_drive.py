@@ -12,8 +12,7 @@ import pytest
 from tunnel_sim.files.plan_drive import DriveTable
 from tunnel_sim.files.plan_file import PlanDocument, SensorModelTable, TruthTable, load_plan
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.excitation import square
-from tunnel_sim.vocabulary.plan import CampaignPlan
+from tunnel_sim.vocabulary.plan import CampaignPlan, square
 
 HEAD = """
 name = "driven"

@@ -6,17 +6,16 @@ Truth: the numbers that each file was made from.
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.unit.importing.import_files import Text, any_dialect, csv, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.columns import _blocks
+from tunnel_sim.files.importing.columns import find_pairs
 from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.records import _with_unique_ids, read_records
-from tunnel_sim.files.importing.tables import Channel, known_unit, split_unit
+from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.tables import Channel, Table, known_unit, split_unit
 from tunnel_sim.files.importing.text import find_dialect
 
 
@@ -199,21 +198,28 @@ def test_an_unknown_column_has_a_suggestion(tmp_path: Path) -> None:
         read_records([csv(tmp_path)], ImportChoices(angle=("yw",)))
 
 
-@pytest.mark.parametrize(
-    ("names", "blocks"),
-    [(("time", "a", "time", "b"), 2), (("t#1", "a", "clock#2", "b"), 2), (("time", "a", "clock", "b"), 1)],
-)
-def test_columns_are_several_records_where_the_times_are_repeated(
-    names: tuple[str, ...], blocks: int
-) -> None:
+def columns(*names: str) -> Table:
     units = ("s", "rad", "s", "rad")
-    channels = [Channel(name, np.zeros(3), unit) for name, unit in zip(names, units, strict=True)]
-    assert len(_blocks(channels, ImportChoices())) == blocks
+    values = (np.arange(30.0), np.sin(np.arange(30.0)), np.arange(30.0), np.sin(np.arange(30.0)))
+    return Table(tuple(map(Channel, names, values, units)))
 
 
-def test_records_of_one_name_are_numbered() -> None:
-    raws = [SimpleNamespace(id=name) for name in ("a", "b", "a")]
-    assert [name for name, _ in _with_unique_ids(raws)] == ["a-1", "b", "a-2"]  # type: ignore[arg-type]
+@pytest.mark.parametrize("names", [("time", "a", "time", "b"), ("t#1", "a", "clock#2", "b")])
+def test_columns_are_several_records_where_the_times_are_repeated(names: tuple[str, ...]) -> None:
+    pairs = find_pairs(columns(*names), ImportChoices(), "")
+    assert [(pair.time.name, pair.reading.name) for pair in pairs if pair.time] == [names[:2], names[2:]]
+
+
+def test_columns_are_one_record_where_the_times_have_different_names() -> None:
+    with pytest.raises(TunnelError, match="2 columns may be the angle"):
+        find_pairs(columns("time", "a", "clock", "b"), ImportChoices(), "")
+
+
+def test_records_of_one_name_are_numbered(tmp_path: Path) -> None:
+    for place in ("one", "two", "three"):
+        (tmp_path / place).mkdir()
+    files = [csv(tmp_path / "one", "a.csv"), csv(tmp_path / "two", "b.csv"), csv(tmp_path / "three", "a.csv")]
+    assert [run.id for run in read_records(files).campaign.runs] == ["a-1", "b", "a-2"]
 
 
 def test_names_and_units_in_two_rows(tmp_path: Path) -> None:

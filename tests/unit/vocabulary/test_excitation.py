@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from tunnel_sim.vocabulary.excitation import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
+from tunnel_sim.vocabulary.plan import band_noise, chirp, lines_in_band, multisine, square, stepped_sine
 
 RATE = 50.0
 TIME = np.arange(501) / RATE  # odd, so that the last line has no partner at half the rate

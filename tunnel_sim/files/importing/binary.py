@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
@@ -32,22 +32,19 @@ _REMEDY = "write the file again, as Parquet or as text"
 
 
 def _read_run(content: bytes, where: str, most: int) -> FileTable:
-    """The columns of a run file that are used; arguments as in `Reader`."""
+    """The columns of a run file that are used."""
     remedy = "write the file again, as Parquet or as CSV"
     schema = frame_schema(content, where, remedy, rows=most, counted="samples")
     used = [name for name in schema if name in USED_COLUMNS]
     for name in used:
         if not schema[name].is_numeric():
-            raise TunnelError(
-                f"the column {name} holds {one_line(schema[name], 30)}, not numbers",
-                where=where,
-                remedy=f"write {name} as floating-point numbers",
-            )
+            what = f"the column {name} holds {one_line(schema[name], 30)}, not numbers"
+            raise TunnelError(what, where=where, remedy=f"write {name} as floating-point numbers")
     return FileTable(read_frame(content, where, remedy, used), tuple(schema))
 
 
 def _read_tables(content: bytes, where: str) -> list[Table]:
-    """The table of a Parquet file; arguments as in `Reader`."""
+    """The table of a Parquet file, run by run where a column names the runs."""
     schema = frame_schema(content, where, _REMEDY, rows=limits.RUN_SAMPLES, counted="samples")
     runs = next((name for name, kind in schema.items() if names_runs(name) and kind == pl.String), None)
     used = [name for name, kind in schema.items() if kind.is_numeric() or kind.is_temporal() or name == runs]
@@ -70,96 +67,70 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
 
 
 PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
-"""Parquet files."""
-
 
 _HEAD = 400
 
 
 def _read(content: bytes, where: str) -> list[Table]:
-    """The tables of a workbook, one for each sheet; arguments as in `Reader`."""
+    """The tables of a workbook, one for each sheet, or one for each run of it."""
     fastexcel = library("fastexcel", "Excel", "import", where)
     tables = []
     with faults("an Excel workbook", where):
-        _check_archive(content, where)
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            entries = archive.infolist()
+        size = sum(entry.file_size for entry in entries)
+        check_count(size, limits.DATA_BYTES, "bytes once unpacked", where, "save fewer sheets, or as text")
+        names = [entry.filename.lower() for entry in entries]
+        if "xl/workbook.xml" not in names:
+            raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
+        for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
+            if any(part in name for name in names):
+                remedy = "save a copy with values only, as .xlsx or as text"
+                raise TunnelError(f"the workbook holds {what}", where=where, remedy=remedy)
         book = fastexcel.read_excel(content)
-        rows = {
-            name: _rows(book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD), where)
-            for name in book.sheet_names
-        }
+        sheets: dict[str, list[list[str]]] = {}
         described: dict[str, dict[str, Any]] = {}
-        for name in list(rows):
-            if found := _descriptions(book, name, rows[name]):
-                described |= found
-                del rows[name]
-        for name, sheet in rows.items():
-            tables += _tables(book, name, sheet, described.get(name, {}))
+        for name in book.sheet_names:
+            sheet = book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD)
+            check_count(
+                sheet.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed"
+            )
+            frame = sheet.to_polars().iter_rows() if sheet.width else ()
+            rows = [[cell or "" for cell in row] for row in frame]
+            heading = [cell.strip().lower() for cell in rows[0]] if rows else []
+            found: list[dict[str, Any]] = []
+            if "sheet" in heading:  # cells about other sheets; as texts, numbers would lose digits
+                texts = ("sheet", "run", "drive_hold")
+                kinds = {i: "string" if key in texts else "float" for i, key in enumerate(heading)}
+                body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
+                found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
+            if found and all(row["sheet"] in book.sheet_names for row in found):
+                described |= {row["sheet"]: row for row in found}
+            else:
+                sheets[name] = rows
+        for name, rows in sheets.items():
+            width = len(rows[0]) if rows else 0
+            layout = find_layout(rows, ["\t".join(row) for row in rows], ".", width)
+            if layout is None:
+                continue
+            numeric = [any(is_number(row[i]) for row in rows[layout.first :]) for i in range(width)]
+            kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
+            body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
+            headed = "names in the row above the numbers" if layout.headed else "no names of columns"
+            said = f"workbook: sheet '{name}', {width} columns, numbers from row {layout.first + 1}, {headed}"
+            stated = described.get(name, {})
+            facts = {key: cell for key, cell in stated.items() if isinstance(cell, float)}
+            if hold := stated.get("drive_hold"):
+                facts["drive_hold"] = hold_order(hold)
+            run = stated.get("run") or ""
+            part = run or (name if len(book.sheet_names) > 1 else "")
+            labels = None if layout.runs is None else body.to_series(layout.runs)
+            table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
+            tables += tables_of(body, layout, ".", labels, table)
     return tables
 
 
-def _rows(sheet: Any, where: str) -> list[list[str]]:
-    check_count(sheet.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-    return [[cell or "" for cell in row] for row in sheet.to_polars().iter_rows()] if sheet.width else []
-
-
-def _descriptions(book: Any, name: str, rows: Sequence[Sequence[str]]) -> dict[str, dict[str, Any]]:
-    """What a sheet with a column ``sheet`` says about other sheets: cells by heading, by name of the sheet."""
-    heading = [cell.strip().lower() for cell in rows[0]] if rows else []
-    if "sheet" not in heading:
-        return {}
-    # As texts, numbers would lose digits.
-    kinds = {
-        i: "string" if key in ("sheet", "run", "drive_hold") else "float" for i, key in enumerate(heading)
-    }
-    body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
-    found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
-    return (
-        {row["sheet"]: row for row in found} if all(row["sheet"] in book.sheet_names for row in found) else {}
-    )
-
-
-def _tables(book: Any, name: str, rows: Sequence[Sequence[str]], described: Mapping[str, Any]) -> list[Table]:
-    """The tables of a sheet: one, or one for each run."""
-    width = len(rows[0]) if rows else 0
-    layout = find_layout(rows, ["\t".join(row) for row in rows], ".", width)
-    if layout is None:
-        return []
-    numeric = [any(is_number(row[i]) for row in rows[layout.first :]) for i in range(width)]
-    kinds = {i: "float" if number and i != layout.runs else "string" for i, number in enumerate(numeric)}
-    body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
-    heading = "names in the row above the numbers" if layout.headed else "no names of columns"
-    said = f"workbook: sheet '{name}', {width} columns, numbers from row {layout.first + 1}, {heading}"
-    facts = {key: cell for key, cell in described.items() if isinstance(cell, float)}
-    if hold := described.get("drive_hold"):
-        facts["drive_hold"] = hold_order(hold)
-    run = described.get("run") or ""
-    part = run or (name if len(book.sheet_names) > 1 else "")
-    labels = None if layout.runs is None else body.to_series(layout.runs)
-    table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
-    return tables_of(body, layout, ".", labels, table)
-
-
-def _check_archive(content: bytes, where: str) -> None:
-    """Refuse a workbook that unpacks to too much, or that brings programs or links along."""
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        entries = archive.infolist()
-    size = sum(entry.file_size for entry in entries)
-    check_count(size, limits.DATA_BYTES, "bytes once unpacked", where, "save fewer sheets, or as text")
-    names = [entry.filename.lower() for entry in entries]
-    if "xl/workbook.xml" not in names:
-        raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
-    for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
-        if any(part in name for name in names):
-            raise TunnelError(
-                f"the workbook holds {what}",
-                where=where,
-                remedy="save a copy with values only, as .xlsx or as text",
-            )
-
-
 WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)
-"""Excel workbooks."""
-
 
 RUN_IDS = ("id", "run", "run_id")
 """Members and attributes whose text is the name of the run that a group holds."""
@@ -177,15 +148,11 @@ def tables_of_arrays(
 ) -> list[Table]:
     """Tables of arrays: those of the same group and length belong together.
 
+    Single numbers are facts of the tables of their group and below, those of a group ``rig`` of all beside
+    it.
+
     Args:
         arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
-        kind: of the file, for the remark.
-        units: stated units of arrays, by path.
-        runs: names of the runs that groups hold, by path.
-
-    Returns:
-        A table for each group of arrays. Single numbers are facts of the tables of their group and below, those of
-        a group ``rig`` of all beside it.
     """
     facts: dict[str, dict[str, float]] = {}
     groups: dict[tuple[str, int], list[Channel]] = {}
@@ -208,45 +175,29 @@ def tables_of_arrays(
         unit = units.get(path, unit)
         for i, row in enumerate(matrix):
             label = stem if matrix.shape[0] == 1 else f"{stem}[{i + 1}]"
-            groups.setdefault((group, matrix.shape[1]), []).append(
-                Channel(label, row.astype(np.float64), unit)
-            )
+            channel = Channel(label, row.astype(np.float64), unit)
+            groups.setdefault((group, matrix.shape[1]), []).append(channel)
     several = len({name for name, _ in groups}) > 1
-    return [
-        Table(
-            tuple(channels),
-            runs.get(group) or (group.replace("/", "-") if several else ""),
-            _facts_of(group, facts),
-            (f"{kind}: {len(channels)} channel{'s' if len(channels) > 1 else ''} of {length} samples",),
-            named=bool(runs.get(group)),
-        )
-        for (group, length), channels in groups.items()
-    ]
+    tables = []
+    for (group, length), channels in groups.items():
+        part = runs.get(group) or (group.replace("/", "-") if several else "")
+        stated: dict[str, float] = {}
+        for above in sorted(facts, key=len):  # the nearest group counts
+            if above == "" or group == above or group.startswith(above + "/"):
+                stated |= facts[above]
+        said = f"{kind}: {len(channels)} channel{'s' if len(channels) > 1 else ''} of {length} samples"
+        tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group))))
+    return tables
 
 
 def check_size(count: int, where: str) -> None:
-    """Refuse arrays that are too large, by the count that the file states.
-
-    Args:
-        count: of all values (a count).
-
-    Raises:
-        TunnelError: too many.
-    """
+    """Refuse arrays whose number of values, as the file states it, is too large."""
     most = limits.DATA_BYTES // 8
     check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")
 
 
-def _facts_of(group: str, facts: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for name, values in sorted(facts.items(), key=lambda item: len(item[0])):
-        if name == "" or group == name or group.startswith(name + "/"):
-            found |= values
-    return found
-
-
 def _read_hdf5(content: bytes, where: str) -> list[Table]:
-    """The tables of an HDF5 file; arguments as in `Reader`."""
+    """The tables of an HDF5 file."""
     h5py = library("h5py", "HDF5 (also MAT 7.3)", "import", where)
     with faults("an HDF5 file", where), h5py.File(io.BytesIO(content), "r") as file:
         datasets: dict[str, Any] = {}
@@ -254,9 +205,8 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
         runs: dict[str, str] = {}
 
         def visit(path: str, item: Any) -> None:
-            check_count(
-                len(datasets), limits.COLUMNS, "datasets", where, "leave out datasets that are not needed"
-            )
+            remedy = "leave out datasets that are not needed"
+            check_count(len(datasets), limits.COLUMNS, "datasets", where, remedy)
             if (
                 isinstance(item, h5py.Dataset)
                 and not path.startswith("#refs#")
@@ -269,45 +219,38 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                 if held.dtype.kind in "iuf" and held.get_space().get_simple_extent_npoints() == 1:
                     folder = path if group else path.rpartition("/")[0]
                     attributes[f"{folder}/{name}".lstrip("/")] = np.asarray(item.attrs[name])
-                elif group and name in RUN_IDS and isinstance(text := item.attrs[name], str):
-                    runs[path] = text
-                elif group and name == "drive_hold" and isinstance(text := item.attrs[name], str):
-                    attributes[f"{path}/{name}"] = np.array(hold_order(text))
+                elif group and name in RUN_IDS and isinstance(stated := item.attrs[name], str):
+                    runs[path] = stated
+                elif group and name == "drive_hold" and isinstance(stated := item.attrs[name], str):
+                    attributes[f"{path}/{name}"] = np.array(hold_order(stated))
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened
         check_size(sum(int(np.prod(item.shape, dtype=float)) for item in datasets.values()), where)
-        arrays = attributes | dict(_hdf5_columns(datasets))
+        arrays = attributes
+        for path, item in datasets.items():
+            if item.external or item.is_virtual or item.shape is None:
+                continue
+            if item.dtype.names:  # one array for each field
+                table = item[()]
+                arrays |= {f"{path}/{name}": table[name] for name in item.dtype.names}
+            elif item.dtype.kind in "iufb":
+                arrays[path] = item[()]
         units = {path: _hdf5_unit(item) for path, item in datasets.items() if _hdf5_unit(item)}
     return tables_of_arrays(arrays, "HDF5 file", units, runs)
-
-
-def _hdf5_columns(datasets: dict[str, Any]) -> list[tuple[str, NDArray[np.generic]]]:
-    """Datasets as arrays; a compound one gives one array for each of its fields."""
-    found = []
-    for path, item in datasets.items():
-        if item.external or item.is_virtual or item.shape is None:
-            continue
-        if item.dtype.names:
-            table = item[()]
-            found += [(f"{path}/{name}", table[name]) for name in item.dtype.names]
-        elif item.dtype.kind in "iufb":
-            found.append((path, item[()]))
-    return found
 
 
 def _hdf5_unit(item: Any) -> str:
     """The unit that an attribute of a dataset states."""
     for name in ("unit", "units", "Unit", "Units"):
         text = item.attrs.get(name, "")
-        found = known_unit(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
-        if found:
+        if found := known_unit(text.decode(errors="replace") if isinstance(text, bytes) else str(text)):
             return found
     return ""
 
 
 def _read_mat(content: bytes, where: str) -> list[Table]:
-    """The tables of a MAT file; arguments as in `Reader`."""
+    """The tables of a MAT file."""
     if content.startswith((b"MATLAB 7.3", b"\x89HDF")):
         return _read_hdf5(content, where)
     from scipy.io import loadmat
@@ -315,14 +258,16 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
     with faults("a MAT file", where):
         check_size(_unpacked_size(content) // 8, where)
         held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know paths only
-    leaves = dict(_leaves({name: value for name, value in held.items() if not name.startswith("__")}))
-    arrays = {path: value for path, value in leaves.items() if not isinstance(value, str)}
-    texts = {path.rpartition("/"): value for path, value in leaves.items() if isinstance(value, str)}
-    runs = {group: text for (group, _, name), text in texts.items() if name in RUN_IDS}
-    holds = {
-        path: text for path, text in leaves.items() if isinstance(text, str) and path.endswith("/drive_hold")
-    }
-    arrays |= {path: np.array(hold_order(text)) for path, text in holds.items()}
+    arrays: dict[str, NDArray[np.generic]] = {}
+    runs = {}
+    for path, value in _leaves({name: one for name, one in held.items() if not name.startswith("__")}):
+        group, below, name = path.rpartition("/")
+        if not isinstance(value, str):
+            arrays[path] = value
+        elif name in RUN_IDS:
+            runs[group] = value
+        elif below and name == "drive_hold":
+            arrays[path] = np.array(hold_order(value))
     return tables_of_arrays(arrays, "MAT file", runs=runs)
 
 
@@ -358,15 +303,14 @@ def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.gen
 
 
 def _read_tdms(content: bytes, where: str) -> list[Table]:
-    """The tables of a TDMS file, one for each group; arguments as in `Reader`."""
+    """The tables of a TDMS file, one for each group."""
     nptdms = library("nptdms", "TDMS", "import", where)
     tables = []
     with faults("a TDMS file", where), nptdms.TdmsFile.open(io.BytesIO(content)) as file:
         groups = file.groups()
         channels = [channel for group in groups for channel in group.channels()]
-        check_count(
-            len(channels), limits.COLUMNS, "channels", where, "leave out channels that are not needed"
-        )
+        remedy = "leave out channels that are not needed"
+        check_count(len(channels), limits.COLUMNS, "channels", where, remedy)
         check_size(sum(len(channel) for channel in channels), where)
         for group in groups:
             numeric = [c for c in group.channels() if len(c) and np.dtype(c.dtype).kind in "iufb"]
@@ -378,9 +322,8 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
                         name, unit = split_unit(channel.name)
                         stated = str(channel.properties.get("unit_string", ""))
                         facts |= _tdms_numbers(channel.properties)
-                        columns.append(
-                            Channel(name, channel[:].astype(np.float64), known_unit(stated) or unit)
-                        )
+                        values = channel[:].astype(np.float64)
+                        columns.append(Channel(name, values, known_unit(stated) or unit))
                 part = group.name if len(groups) > 1 else ""
                 said = (f"TDMS file: group '{group.name}', {len(columns)} channels of {length} samples",)
                 tables.append(Table(tuple(columns), part, facts, said))
@@ -394,7 +337,6 @@ def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
 
 
 HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)
-"""HDF5 files."""
 
 MAT = Reader(
     "a MAT file",
@@ -403,7 +345,5 @@ MAT = Reader(
     (b"MATLAB", b"\x89HDF", b"\x00\x00\x00\x00", b"\x0a\x00\x00\x00"),
     read_tables=_read_mat,
 )
-"""MAT files of versions 4 to 7.3."""
 
 TDMS = Reader("a TDMS file", limits.DATA_BYTES, (b"TDSm",), read_tables=_read_tdms)
-"""TDMS files of LabVIEW."""

@@ -1,9 +1,8 @@
 """Clean-up of times and readings, and where runs begin and end in a record; every change is said.
 
-A free decay crosses its centre
-every half cycle and never grows much from one half cycle to the next. Where a crossing takes longer and the
-excursions after it are larger than before, a hand has moved the body or held it, and a run begins at the turning
-point before the free motion. Any other record is one run: motion that grows or does not decay is left whole.
+A free decay crosses its centre every half cycle and never grows much from one half cycle to the next. Where a
+crossing takes longer and the excursions after it are larger than before, a hand has moved the body or held
+it. Any other record is one run.
 """
 
 from __future__ import annotations
@@ -42,7 +41,6 @@ class Cleaned:
     Args:
         time_s: shape (n,), s, increasing, from zero on.
         reading: shape (n,).
-        said: what was changed, in words.
     """
 
     time_s: Array
@@ -51,14 +49,10 @@ class Cleaned:
 
 
 def without_overflow(values: Array, said: list[str]) -> Array:
-    """Readings of a counter or a single-turn sensor without the jumps at the ends of its range.
+    """Readings of a counter or a single-turn sensor without jumps at the ends of its range, which are said.
 
     Args:
         values: as recorded, shape (n,); NaN where there is no number.
-        said: a remark is added where something is changed.
-
-    Returns:
-        The continuous reading, shape (n,).
     """
     known = np.flatnonzero(np.isfinite(values))
     numbers = values[known]
@@ -83,14 +77,7 @@ def without_overflow(values: Array, said: list[str]) -> Array:
 
 
 def restarts(time: Array) -> list[int]:
-    """Where the clock of a record begins anew because another run follows.
-
-    Args:
-        time: as recorded, shape (n,).
-
-    Returns:
-        Index of the first sample of every further run; empty where rows are only out of order.
-    """
+    """Where the times, shape (n,), begin anew because another run follows: its first samples; empty: nowhere."""
     with np.errstate(invalid="ignore"):  # rows without a finite time are left out later
         back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if not back.size or back.size > max(1.0, _RESTARTS * time.size):
@@ -108,15 +95,12 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
     Args:
         time: as recorded, shape (n,), s.
         reading: shape (n,), in radians or what the sensor measures.
-
-    Returns:
-        Increasing times from zero on, and the readings at them.
     """
     said: list[str] = []
     good = np.isfinite(time) & np.isfinite(reading)
     if not good.all():
-        first, last = (int(np.argmax(good)), good.size - int(np.argmax(good[::-1]))) if good.any() else (0, 0)
-        inside = int((~good[first:last]).sum())
+        known = np.flatnonzero(good)
+        inside = int(known[-1] - known[0] + 1 - known.size) if known.size else 0
         if inside:
             said.append(f"{inside} samples without a number left out")
         time, reading = time[good], reading[good]
@@ -124,11 +108,35 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         order = np.argsort(time, kind="stable")
         time, reading = time[order], reading[order]
         said.append("rows out of order sorted by time")
-    time, reading = _without_repeats(time, reading, said)
+    same = np.diff(time) == 0.0
+    repeated = same & (np.diff(reading) == 0.0)
+    differing = np.count_nonzero(same & ~repeated)
+    if differing > _COARSE * time.size and time[0] < time[-1]:
+        said.append(
+            f"{differing} stamps equal the one before though the readings differ: the stamps are coarser than "
+            f"the sampling, and evenly spaced times take their place"
+        )
+        time = np.linspace(time[0], time[-1], time.size)
+    elif same.any():
+        keep = np.concatenate([[True], ~same])
+        further = f", and {differing} further readings at the time of the one before" if differing else ""
+        said.append(f"{np.count_nonzero(repeated)} repeated samples left out{further}")
+        time, reading = time[keep], reading[keep]
     if time.size and time[0] != 0.0:
         said.append(f"times count from the first sample, which the file has at {time[0]:.6g} s")
     time = from_zero(time)
-    said += _about_the_clock(time)
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if steps.size > 1 else 0.0
+    if usual > 0.0:  # else beyond the resolution of floating-point numbers; the run is refused later
+        gaps = steps > 1.75 * usual
+        if gaps.any():
+            missing = int(np.round(steps[gaps] / usual - 1.0).sum())
+            where = f"in {int(gaps.sum())} gaps, up to {steps.max():.4g} s long"
+            said.append(f"about {missing} samples are missing {where}")
+        spread = float(np.abs(steps[~gaps] - usual).max())
+        if spread > _UNEVEN * usual:
+            share = f"{100.0 * spread / usual:.0f} % of a step"
+            said.append(f"time stamps differ from an even clock by up to {share}; kept")
     return Cleaned(time, reading, tuple(said))
 
 
@@ -137,9 +145,8 @@ def from_zero(time: Array) -> Array:
     if time.size < 2 or time[0] == 0.0:
         return time
     step = float(np.ptp(time)) / (time.size - 1)
-    counted: Array = np.round(
-        time - time[0], 6 - floor(log10(max(step, _FINEST)))
-    )  # a millionth of a step is kept
+    kept = 6 - floor(log10(max(step, _FINEST)))  # digits: a millionth of a step
+    counted: Array = np.round(time - time[0], kept)
     return counted
 
 
@@ -150,14 +157,6 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
         reading: of a run, shape (n,), in the unit.
         rest: as stated, in the unit.
         unit: of the reading.
-        said: a remark is added.
-        where: file and run, for messages.
-
-    Returns:
-        Shape (n,), in the unit.
-
-    Raises:
-        TunnelError: when the reading never passes the rest, as that of a body that swings must.
     """
     least, most = float(reading.min()), float(reading.max())
     if not least <= rest <= most:
@@ -170,59 +169,8 @@ def from_rest(reading: Array, rest: float, unit: str, said: list[str], where: st
     return reading - rest
 
 
-def _without_repeats(time: Array, reading: Array, said: list[str]) -> tuple[Array, Array]:
-    """Leave out repeated samples; stamps that several samples share are spread evenly."""
-    same = np.diff(time) == 0.0
-    if not same.any():
-        return time, reading
-    repeated = np.concatenate([[False], same & (np.diff(reading) == 0.0)])
-    differing = np.count_nonzero(same & ~repeated[1:])
-    if differing > _COARSE * time.size and time[0] < time[-1]:
-        said.append(
-            f"{differing} stamps equal the one before though the readings differ: the stamps are coarser than "
-            f"the sampling, and evenly spaced times take their place"
-        )
-        return np.linspace(time[0], time[-1], time.size), reading
-    keep = np.concatenate([[True], ~same])
-    said.append(
-        f"{np.count_nonzero(repeated)} repeated samples left out"
-        + (f", and {differing} further readings at the time of the one before" if differing else "")
-    )
-    return time[keep], reading[keep]
-
-
-def _about_the_clock(time: Array) -> list[str]:
-    """What an examination will find in the time stamps; they are kept as they are."""
-    steps = np.diff(time)
-    if steps.size < 2:
-        return []
-    usual = float(np.median(steps))
-    if not usual > 0.0:  # beyond the resolution of floating-point numbers; the run is refused later
-        return []
-    gaps = steps > 1.75 * usual
-    said = []
-    if gaps.any():
-        missing = int(np.round(steps[gaps] / usual - 1.0).sum())
-        said.append(
-            f"about {missing} samples are missing in {int(gaps.sum())} gaps, up to {steps.max():.4g} s long"
-        )
-    spread = float(np.abs(steps[~gaps] - usual).max())
-    if spread > _UNEVEN * usual:
-        said.append(
-            f"time stamps differ from an even clock by up to {100.0 * spread / usual:.0f} % of a step; kept"
-        )
-    return said
-
-
 def resolution(readings: Sequence[Array]) -> float | None:
-    """The step of a sensor whose readings lie on evenly spaced levels.
-
-    Args:
-        readings: of the runs, each of shape (n,).
-
-    Returns:
-        The step, in the unit of the reading; None where the readings do not repeat.
-    """
+    """The step of a sensor whose readings, each of shape (n,), lie on evenly spaced levels; None: they do not."""
     some = np.concatenate([reading[:_LEVELS_OF] for reading in readings])
     levels = np.unique(some)
     if not 3 <= levels.size <= min(_MOST_LEVELS, some.size // 2):
@@ -250,38 +198,31 @@ _HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
 
 @dataclass(frozen=True)
 class RecordPiece:
-    """A run in a record.
-
-    Args:
-        first: index of its first sample.
-        last: index behind its last sample.
-    """
+    """A run in a record: the index of its first sample, and that behind its last one."""
 
     first: int
     last: int
 
 
 def find_runs(time_s: Array, reading: Array) -> list[RecordPiece]:
-    """The runs of a record.
+    """The runs of a record: one for each release; the whole record where no hand is seen in it.
 
     Args:
         time_s: increasing, shape (n,), s.
         reading: shape (n,).
-
-    Returns:
-        One piece for each release; the whole record where no hand is seen in it.
     """
     whole = [RecordPiece(0, reading.size)]
     away = reading - np.median(reading)
-    noise = _NOISES * _noise(reading[:_NOISE_OF])
+    # White noise by fourth differences, in which a swing hardly shows.
+    some = np.abs(np.diff(reading[:_NOISE_OF], 4))
+    noise = _NOISES * (float(np.median(some)) / (0.6745 * sqrt(70.0))) if some.size else 0.0
     for _ in range(_CENTRED):
         starts, ends = _excursions(away, noise)
         if starts.size < _LEAST_HALVES:
             return whole
         # A hold or a pull draws the median aside; most swings have their centre between two turning points.
-        turns = np.array(
-            [away[a + int(np.argmax(np.abs(away[a:b])))] for a, b in zip(starts, ends, strict=True)]
-        )
+        swings = (away[a:b] for a, b in zip(starts, ends, strict=True))
+        turns = np.array([swing[int(np.argmax(np.abs(swing)))] for swing in swings])
         away = away - np.median(0.5 * (turns[1:] + turns[:-1]))
     starts, ends = _excursions(away, noise)
     if starts.size < _LEAST_HALVES:
@@ -302,32 +243,28 @@ def find_runs(time_s: Array, reading: Array) -> list[RecordPiece]:
         return [RecordPiece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
     pieces = []
     for place, (_, released) in enumerate(found):
-        first = _turning_point(time_s, away, starts[released], ends[released], usual)
+        # From the first sample of the largest reading, or from the last one of a hold.
+        size = np.abs(away[starts[released] : ends[released]])
+        near = int(starts[released]) + np.flatnonzero(size >= (1.0 - _AT_TURN) * size.max())
+        held = time_s[near[-1]] - time_s[near[0]] > _HELD * usual
+        first = int(near[-1]) if held else int(starts[released]) + int(np.argmax(size))
         if place + 1 < len(found):
             hand = found[place + 1][0]
             last = max(int(ends[hand - 1]), int(np.searchsorted(time_s, time_s[starts[hand]] - usual)))
             halves = hand - released
         else:
-            last, halves = (
-                _without_long_rest(time_s, first, moved, clear=clear),
-                peaks.size - released,
-            )
+            last = _without_long_rest(time_s, first, moved, clear=clear)
+            halves = peaks.size - released
         if halves >= _LEAST_HALVES:
             pieces.append(RecordPiece(first, last))
     return pieces or whole
 
 
 def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
-    """A run with the start and the end that are stated.
+    """A run with the start and the end that are stated; refused where fewer than two samples lie between.
 
     Args:
         time_s: of the record, shape (n,), s.
-        found: the run as it was found.
-        stated: what is stated about it.
-        where: file and run, for messages.
-
-    Raises:
-        TunnelError: when fewer than two samples lie between start and end.
     """
     if stated.start is None and stated.end is None:
         return found
@@ -337,17 +274,9 @@ def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str)
     slack = 0.5 * float(np.median(np.diff(time_s)))
     first, last = (int(place) for place in np.searchsorted(time_s, [start - slack, end + slack]))
     if last - first < 2:
-        raise TunnelError(
-            f"no samples from {start:g} to {end:g} s",
-            where=where,
-            remedy="state a start before the end, within the record",
-        )
+        remedy = "state a start before the end, within the record"
+        raise TunnelError(f"no samples from {start:g} to {end:g} s", where=where, remedy=remedy)
     return RecordPiece(first, last)
-
-
-def _noise(reading: Array) -> float:
-    """Standard deviation of white noise, by fourth differences, in which a swing hardly shows."""
-    return float(np.median(np.abs(np.diff(reading, 4)))) / (0.6745 * sqrt(70.0)) if reading.size > 4 else 0.0
 
 
 def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -379,14 +308,6 @@ def _released(lengths: Array, peaks: Array, usual: float) -> list[tuple[int, int
         for (k, at), end in zip(found, ends, strict=True)
         if peaks[at:end].max() <= _STILL_GROWING * peaks[at]
     ]
-
-
-def _turning_point(time_s: Array, away: Array, start: int, end: int, usual: float) -> int:
-    """The first sample of the largest reading, or the last one of a hold."""
-    size = np.abs(away[start:end])
-    near = start + np.flatnonzero(size >= (1.0 - _AT_TURN) * size.max())
-    first, last = int(start) + int(np.argmax(size)), int(near[-1])
-    return last if time_s[last] - time_s[near[0]] > _HELD * usual else first
 
 
 def _without_long_rest(time_s: Array, first: int, end: int, *, clear: bool) -> int:

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tunnel_sim.files.importing.cleaning import without_overflow
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
-from tunnel_sim.files.importing.inputs import is_input, is_stated
-from tunnel_sim.files.importing.tables import UNITS, Channel, Table, kind_of, known_unit
+from tunnel_sim.files.importing.tables import UNITS, Channel, Table, heading, is_input, kind_of, known_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
@@ -42,14 +42,7 @@ _DERIVATIVE = 0.9  # correlation with the derivative of another column, from whi
 
 @dataclass(frozen=True, eq=False)
 class ColumnPair:
-    """The columns of one run.
-
-    Args:
-        run: its name in the table; empty where the table holds one run.
-        time: the column of times; None where the samples follow at a sample rate.
-        reading: the column of angles, rates or accelerations.
-        said: why these columns were taken.
-    """
+    """The columns of one run and its name in the table; without times the samples follow at a sample rate."""
 
     run: str
     time: Channel | None
@@ -63,50 +56,49 @@ def stem(name: str) -> str:
 
 
 def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnPair]:
-    """The columns of each run.
-
-    Args:
-        table: of a file.
-
-    Returns:
-        The columns of each run; at least one.
-
-    Raises:
-        TunnelError: a column that is not there, no column of angles, or several that may be it.
-    """
+    """The columns of each run, one run at least."""
+    starts = [i for i, c in enumerate(table.channels) if _matches(c, choices.time or "") or is_time(c)]
+    stems = {stem(table.channels[i].name) for i in starts}
+    blocks = [table.channels]
+    # Several blocks of columns side by side, each of which begins with its own times.
+    if len(starts) > 1 and (len(stems) == 1 or all("#" in table.channels[i].name for i in starts)):
+        ends = [*starts[1:], len(table.channels)]
+        blocks = [table.channels[start:end] for start, end in zip(starts, ends, strict=True)]
     pairs = []
-    for block in _blocks(table.channels, choices):
+    for block in blocks:
         said: list[str] = []
-        time = _time(block, choices, said, where, headed=table.headed)
+        named = [channel for channel in block if is_time(channel)]
+        time = None  # where the samples follow at a stated rate
+        if choices.time is not None:
+            time = _chosen(block, choices.time, "--time", where)[0]
+        elif named:
+            time = named[0]
+            if len(named) > 1:
+                said.append(f"times from '{time.name}', the first of {len(named)} columns of times")
+        elif choices.rate is None:
+            for channel in _unconditional(block):
+                numbers = channel.values[np.isfinite(channel.values)][:_HEAD]
+                steps = np.diff(np.sort(numbers))
+                if channel.unit or _OTHER.search(channel.name) or steps.size < 8 or not steps.max() > 0.0:
+                    continue
+                usual = float(np.median(steps))
+                count = usual == 1.0 and bool((numbers == np.round(numbers)).all())
+                if not count and float(np.mean(np.abs(steps - usual) < _STEADY * usual)) > 0.9:
+                    time = channel
+                    why = "evenly stepped numbers" + (
+                        "" if table.headed else ", and the file names no columns"
+                    )
+                    said.append(f"times from '{time.name}': {why}")
+                    break
         readings = _readings(block, time, choices, said, where)
-        pairs += [
-            ColumnPair(_run_name(reading, len(readings)), time, reading, tuple(said)) for reading in readings
-        ]
+        for reading in readings:
+            mark = RUN_MARK.search(reading.name)
+            run = f"run-{mark[1]}" if mark else reading.name if len(readings) > 1 else ""
+            pairs.append(ColumnPair(run, time, reading, tuple(said)))
     if not pairs:
-        raise TunnelError(
-            f"no column of angles (columns found: {_listed(table.channels)})",
-            where=where,
-            remedy="give --angle NAME and its --unit",
-        )
+        what = f"no column of angles (columns found: {_listed(table.channels)})"
+        raise TunnelError(what, where=where, remedy="give --angle NAME and its --unit")
     return pairs
-
-
-def _run_name(reading: Channel, count: int) -> str:
-    mark = RUN_MARK.search(reading.name)
-    return f"run-{mark[1]}" if mark else reading.name if count > 1 else ""
-
-
-def _blocks(channels: Sequence[Channel], choices: ImportChoices) -> list[list[Channel]]:
-    """Groups of columns side by side, each of which begins with its own times."""
-    starts = [
-        i for i, channel in enumerate(channels) if _matches(channel, choices.time or "") or is_time(channel)
-    ]
-    stems = {stem(channels[i].name) for i in starts}
-    repeated = len(starts) > 1 and (len(stems) == 1 or all("#" in channels[i].name for i in starts))
-    if not repeated:
-        return [list(channels)]
-    ends = [*starts[1:], len(channels)]
-    return [list(channels[start:end]) for start, end in zip(starts, ends, strict=True)]
 
 
 def is_time(channel: Channel) -> bool:
@@ -117,112 +109,77 @@ def is_time(channel: Channel) -> bool:
     return kind == "time" or (kind == "" and _TIME.search(channel.name) is not None)
 
 
-def _matches(channel: Channel, wanted: str) -> bool:
-    names = (
-        channel.name,
-        stem(channel.name),
-        f"{channel.name} ({channel.unit})",
-        f"{channel.name}_{channel.unit}",
+def is_stated(channel: Channel, choices: ImportChoices) -> bool:
+    """Whether a column is stated to be the input, with its unit or without."""
+    bare = re.sub(r"\s*[(\[].*", "", channel.name.lower())
+    return choices.input is not None and choices.input.lower() in (
+        channel.name.lower(),
+        bare,
+        heading(channel),
     )
-    return wanted.lower() in (name.lower() for name in names)
+
+
+def _matches(channel: Channel, wanted: str) -> bool:
+    name, unit = channel.name, channel.unit
+    return wanted.lower() in (
+        text.lower() for text in (name, stem(name), f"{name} ({unit})", f"{name}_{unit}")
+    )
 
 
 def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> list[Channel]:
-    """The columns that a name or a number means."""
     found = [channel for channel in block if _matches(channel, wanted)]
     if not found and wanted.isdigit() and 1 <= int(wanted) <= len(block):
         found = [block[int(wanted) - 1]]
     if not found:
-        raise TunnelError(
-            f"no column '{one_line(wanted, 40)}' (columns found: {_listed(block)})",
-            where=where,
-            remedy=f"{option}: {did_you_mean(wanted, {channel.name for channel in block})}",
-        )
+        what = f"no column '{one_line(wanted, 40)}' (columns found: {_listed(block)})"
+        remedy = f"{option}: {did_you_mean(wanted, {channel.name for channel in block})}"
+        raise TunnelError(what, where=where, remedy=remedy)
     return found
-
-
-def _time(
-    block: Sequence[Channel], choices: ImportChoices, said: list[str], where: str, *, headed: bool
-) -> Channel | None:
-    """The column of times; None where the samples follow at a stated rate."""
-    if choices.time is not None:
-        return _chosen(block, choices.time, "--time", where)[0]
-    named = [channel for channel in block if is_time(channel)]
-    if named:
-        if len(named) > 1:
-            said.append(f"times from '{named[0].name}', the first of {len(named)} columns of times")
-        return named[0]
-    if choices.rate is not None:
-        return None
-    free = [c for c in _unconditional(block) if c.unit == "" and not _OTHER.search(c.name)]
-    guessed = next((c for c in free if _is_clock(c.values)), None)
-    if guessed is not None:
-        why = "evenly stepped numbers" + ("" if headed else ", and the file names no columns")
-        said.append(f"times from '{guessed.name}': {why}")
-    return guessed
-
-
-def _is_clock(values: np.ndarray) -> bool:
-    """Whether numbers, once sorted, go up in steady steps; a count of samples does not pass."""
-    numbers = values[np.isfinite(values)][:_HEAD]
-    steps = np.diff(np.sort(numbers))
-    if steps.size < 8 or not steps.max() > 0.0:
-        return False
-    usual = float(np.median(steps))
-    count = usual == 1.0 and bool((numbers == np.round(numbers)).all())
-    return not count and float(np.mean(np.abs(steps - usual) < _STEADY * usual)) > 0.9
 
 
 def _readings(
     block: Sequence[Channel], time: Channel | None, choices: ImportChoices, said: list[str], where: str
 ) -> list[Channel]:
-    """The columns that hold angles, or what the sensor measures instead."""
     if choices.angle:
         chosen = [c for name in choices.angle for c in _chosen(block, name, "--angle", where)]
         return [channel for channel in chosen if channel is not time]
-    others = [
-        c for c in _unconditional(block) if c is not time and not is_input(c) and not is_stated(c, choices)
-    ]
-    moving = [channel for channel in others if _span(channel) > 0.0]
-    levels = [
-        [
-            c
-            for c in moving
-            if kind_of(c.unit) == "angle" or (_by_name(c) and kind_of(c.unit) in ("counts", "voltage"))
-        ],
-        [c for c in moving if c.unit == "" and _by_name(c)],
-        [c for c in moving if kind_of(c.unit) == "counts"],
-        [c for c in moving if c.unit == "" and not _OTHER.search(c.name) and not _RATE.search(c.name)],
-        [c for c in moving if kind_of(c.unit) == "voltage"],
-        [c for c in moving if kind_of(c.unit) in ("rate", "acceleration")],
-    ]
+    free = [c for c in _unconditional(block) if c is not time]
+    others = [c for c in free if not is_input(c) and not is_stated(c, choices)]
+    levels: list[list[Channel]] = [[] for _ in range(6)]  # the most certain first
+    for c in others:
+        kind, named = kind_of(c.unit), _ANGLE.search(c.name) and not _RATE.search(c.name)
+        if not _span(c) > 0.0:
+            continue
+        if kind == "angle" or (named and kind in ("counts", "voltage")):
+            levels[0].append(c)
+        elif c.unit == "" and named:
+            levels[1].append(c)
+        elif kind == "counts":
+            levels[2].append(c)
+        elif c.unit == "" and not _OTHER.search(c.name) and not _RATE.search(c.name):
+            levels[3].append(c)
+        elif kind == "voltage":
+            levels[4].append(c)
+        elif kind in ("rate", "acceleration"):
+            levels[5].append(c)
     found = next((level for level in levels if level), [])
-    still = [
-        c for c in found if _span(c) < _HARDLY * max(_span(other) for other in found if other.unit == c.unit)
-    ]
+    widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
+    still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
     said += [f"'{stem(channel.name)}' is left out: it hardly moves" for channel in still]
     found = [channel for channel in found if channel not in still]
     while len(found) > 1 and (rate := _a_rate(found, time)) is not None:
         said.append(f"'{stem(rate.name)}' is left out: it is the rate of another column")
         found.remove(rate)
-    if len(found) > 1 and not (
-        len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
-    ):
-        raise TunnelError(
-            f"{len(found)} columns may be the angle: {_listed(found)}",
-            where=where,
-            remedy=f'give --angle "{found[0].name}", or another of them',
-        )
+    of_runs = len({stem(c.name) for c in found}) == 1 and all(RUN_MARK.search(c.name) for c in found)
+    if len(found) > 1 and not of_runs:
+        what = f"{len(found)} columns may be the angle: {_listed(found)}"
+        raise TunnelError(what, where=where, remedy=f'give --angle "{found[0].name}", or another of them')
     said += [f"angle from '{stem(channel.name)}'" for channel in found if len(others) > 1]
     return found
 
 
 def _unconditional(block: Sequence[Channel]) -> list[Channel]:
     return [channel for channel in block if condition_of(channel.name, channel.unit) is None]
-
-
-def _by_name(channel: Channel) -> bool:
-    return _ANGLE.search(channel.name) is not None and _RATE.search(channel.name) is None
 
 
 def _span(channel: Channel) -> float:
@@ -270,16 +227,7 @@ Calibration = tuple[Array, Array] | tuple[float, float]
 
 
 def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | None:
-    """The unit that an option names.
-
-    Args:
-        text: as typed; None where the option is not given.
-        kinds: keys of `UNITS` that it may belong to.
-        option: its name, for messages.
-
-    Raises:
-        TunnelError: not a unit of these kinds.
-    """
+    """The unit of certain kinds, keys of `UNITS`, that an option names; None where it is not given."""
     unit = known_unit(text) if text is not None else None
     if text is not None and (unit is None or kind_of(unit) not in kinds):
         names = ", ".join(name for kind in kinds for name in UNITS[kind])
@@ -288,14 +236,7 @@ def stated_unit(text: str | None, kinds: Sequence[str], option: str) -> str | No
 
 
 def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple[float | None, str]:
-    """The interval of samples that have no times.
-
-    Args:
-        facts: numbers of the file, by name.
-
-    Returns:
-        The interval, s, None where nothing states it; and what states it.
-    """
+    """The interval of samples that have no times, s, None where nothing states it; and what states it."""
     if choices.rate is not None:
         return 1.0 / choices.rate, f"{choices.rate:g} Hz as stated"
     for pattern, is_rate in ((_RATE_FACTS, True), (_STEP_FACTS, False)):
@@ -307,75 +248,44 @@ def sample_interval(facts: Mapping[str, float], choices: ImportChoices) -> tuple
 
 
 def guessed_time_unit(values: Array) -> tuple[str, float]:
-    """The unit that times without one are taken to have.
-
-    Args:
-        values: the column, shape (n,).
-
-    Returns:
-        The unit, and the usual step in it.
-    """
+    """The unit that times without one, shape (n,), are taken to have, and the usual step in it."""
     steps = np.diff(np.sort(values[np.isfinite(values)]))  # rows may be out of order
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     return "s" if step <= _SLOWEST_STEP else "ms" if step <= 1e3 * _SLOWEST_STEP else "us", step
 
 
 def guessed_angle_unit(values: Array) -> tuple[str, float]:
-    """The unit that angles without one are taken to have.
-
-    Args:
-        values: the column, shape (n,); at least one number.
-
-    Returns:
-        The unit, and half the range of the readings in it.
-    """
+    """The unit that angles without one, shape (n,), are taken to have, and half their range in it."""
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     return "deg" if swing > _HALF_TURN else "rad", swing
 
 
-def in_seconds(time: Channel, choices: ImportChoices, said: list[str], where: str) -> Array:
-    """Times in s.
-
-    Args:
-        time: the column, shape (n,).
-        said: a remark is added where the unit is guessed from the step.
-
-    Returns:
-        Shape (n,).
-
-    Raises:
-        TunnelError: a column in another unit.
-    """
-    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or time.unit
+def in_seconds(
+    pair: ColumnPair, facts: Mapping[str, float], choices: ImportChoices, said: list[str], where: str
+) -> Array:
+    """The times of a run, s, shape (n,): of their column, or at the stated rate; what is guessed is said."""
+    if pair.time is None:
+        interval, origin = sample_interval(facts, choices)
+        if interval is None:
+            raise TunnelError("no column of times", where=where, remedy="give --time NAME, or --rate in Hz")
+        said.append(f"times at {1.0 / interval:.6g} Hz: {origin}")
+        return np.arange(pair.reading.values.size, dtype=np.float64) * interval
+    values = without_overflow(pair.time.values, said)
+    unit = stated_unit(choices.time_unit, ("time",), "--time-unit") or pair.time.unit
     if unit and kind_of(unit) != "time":
-        raise TunnelError(
-            f"'{one_line(time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time",
-            where=where,
-            remedy="give --time-unit, or --time with the name of another column",
-        )
+        what = f"'{one_line(pair.time.name, 40)}' is in '{one_line(unit, 20)}', which is not a unit of time"
+        remedy = "give --time-unit, or --time with the name of another column"
+        raise TunnelError(what, where=where, remedy=remedy)
     if not unit:
-        unit, step = guessed_time_unit(time.values)
+        unit, step = guessed_time_unit(values)
         said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
-    return time.values * UNITS["time"][unit] if unit != "s" else time.values
+    return values * UNITS["time"][unit] if unit != "s" else values
 
 
 def in_radians(
     reading: Channel, choices: ImportChoices, calibration: Calibration | None, said: list[str], where: str
 ) -> tuple[Array, Quantity, str]:
-    """Readings in rad, rad/s or rad/s².
-
-    Args:
-        reading: the column, shape (n,).
-        calibration: of a voltage.
-        said: a remark is added where the unit is guessed.
-
-    Returns:
-        The readings, shape (n,), what they are, and the unit they were taken to have.
-
-    Raises:
-        TunnelError: counts without counts per turn, volts without a calibration, another unit, or a swing of more
-            than half a turn in degrees that the user has not stated.
-    """
+    """Readings in rad, rad/s or rad/s², shape (n,), what they are, and the unit they were taken to have."""
     kinds = ("angle", "counts", "voltage", "rate", "acceleration")
     unit = stated_unit(choices.unit, kinds, "--unit") or reading.unit
     if unit and kind_of(unit) not in kinds and choices.counts_per_turn is None and calibration is None:
@@ -387,7 +297,17 @@ def in_radians(
     values = reading.values
     if calibration is not None:
         volts = values * UNITS["voltage"].get(unit, 1.0)
-        values = _calibrated(volts, calibration, where)
+        first, second = calibration
+        if isinstance(first, float):
+            values = first + second * volts
+        elif np.nanmin(volts) < first[0] or np.nanmax(volts) > first[-1]:
+            raise TunnelError(
+                f"readings from {np.nanmin(volts):.4g} to {np.nanmax(volts):.4g} V go beyond the calibration table",
+                where=where,
+                remedy=f"calibrate beyond {first[0]:.4g} to {first[-1]:.4g} V, or give a formula",
+            )
+        else:
+            values = np.interp(volts, first, second)
         unit = unit if kind_of(unit) == "angle" else ""
         said.append(f"'{reading.name}' converted by the calibration")
     elif choices.counts_per_turn is not None:
@@ -408,23 +328,14 @@ def in_radians(
     swing = 0.5 * float(np.nanmax(values) - np.nanmin(values))
     # A disc between springs swings as far, but counts look like degrees.
     if unit == "deg" and choices.unit is None and calibration is None and swing > _HALF_TURN:
-        raise TunnelError(
-            f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn",
-            where=where,
-            remedy="give --unit deg if it does; of an encoder --counts-per-turn N",
-        )
+        what = f"'{one_line(reading.name, 40)}' would swing by ±{swing / factor:.4g}°, more than half a turn"
+        remedy = "give --unit deg if it does; of an encoder --counts-per-turn N"
+        raise TunnelError(what, where=where, remedy=remedy)
     return values, quantity, unit
 
 
 def read_calibration(text: str | None) -> Calibration | None:
-    """The calibration that ``--calibration`` states.
-
-    Args:
-        text: a formula such as ``0.1 + 20*V``, or the name of a text file of two columns, volts and angle.
-
-    Raises:
-        TunnelError: neither of them.
-    """
+    """The calibration: a formula such as ``0.1 + 20*V``, or that of a text file of volts and angle."""
     if text is None:
         return None
     formula = _FORMULA.match(text)
@@ -446,16 +357,3 @@ def read_calibration(text: str | None) -> Calibration | None:
     order = np.argsort(channels[0].values)
     factor = UNITS["angle"].get(channels[1].unit, 1.0)
     return channels[0].values[order], channels[1].values[order] * factor
-
-
-def _calibrated(volts: Array, calibration: Calibration, where: str) -> Array:
-    first, second = calibration
-    if isinstance(first, float):
-        return first + second * volts
-    if np.nanmin(volts) < first[0] or np.nanmax(volts) > first[-1]:
-        raise TunnelError(
-            f"readings from {np.nanmin(volts):.4g} to {np.nanmax(volts):.4g} V go beyond the calibration table",
-            where=where,
-            remedy=f"calibrate beyond {first[0]:.4g} to {first[-1]:.4g} V, or give a formula",
-        )
-    return np.interp(volts, first, second)

@@ -1,15 +1,11 @@
-"""What a user states about files, and the conditions of runs that files, names and tables state.
-
-The recipe keeps what a user states. Conditions come from a table, from the names of files, from the files
-themselves, or are stated for all.
-"""
+"""What a user states about files, and the conditions of runs: from tables, names of files, or the files."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,25 +14,31 @@ from pydantic import Field
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.tables import UNITS, Channel, kind_of, split_unit
 from tunnel_sim.files.importing.text import read_cells
-from tunnel_sim.files.toml_input import OneLine, SampleRate, StrictModel, read_document, validate
+from tunnel_sim.files.toml_input import (
+    NotNegative,
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    optional,
+    read_document,
+    validate,
+)
 from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 class Conditions(StrictModel):
     """Conditions of runs, and sizes of the rig, as in ``campaign.toml``."""
 
-    wind_speed: NotNegative | None = Field(default=None, description="a number in m/s, 0 for wind-off")
-    spring_stiffness: Positive | None = Field(default=None, description="a positive number in N m/rad")
-    air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
-    release_angle: float | None = Field(default=None, description="a number in rad")
-    yaw_inertia: Positive | None = Field(default=None, description="a positive number in kg m2")
-    frontal_area: Positive | None = Field(default=None, description="a positive number in m2")
-    reference_length: Positive | None = Field(default=None, description="a positive number in m")
-    width: Positive | None = Field(default=None, description="a positive number in m")
+    wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
+    spring_stiffness: Positive | None = optional("a positive number in N m/rad")
+    air_density: Positive | None = optional("a positive number in kg/m3")
+    release_angle: float | None = optional("a number in rad")
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    frontal_area: Positive | None = optional("a positive number in m2")
+    reference_length: Positive | None = optional("a positive number in m")
+    width: Positive | None = optional("a positive number in m")
 
 
 RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
@@ -48,62 +50,43 @@ class Stretch(StrictModel):
 
     file: OneLine = Field(description="the name of the file")
     run: OneLine = Field(description="the name of the run")
-    start: NotNegative | None = Field(
-        default=None, description="the time of the release in s from the record's first sample"
-    )
-    end: Positive | None = Field(
-        default=None, description="the time in s from the record's first sample at which the run ends"
-    )
-    rest: float | None = Field(default=None, description="the reading at rest in rad, to be subtracted")
+    start: NotNegative | None = optional("the time of the release in s from the record's first sample")
+    end: Positive | None = optional("the time in s from the record's first sample at which the run ends")
+    rest: float | None = optional("the reading at rest in rad, to be subtracted")
 
 
 class ImportChoices(StrictModel):
     """How files are to be read; what is None is found from the files."""
 
-    time: OneLine | None = Field(default=None, description="the name or number of the column of times")
+    time: OneLine | None = optional("the name or number of the column of times")
     angle: tuple[OneLine, ...] = Field(
         default=(), strict=False, description="a list of names or numbers of columns"
     )
-    unit: OneLine | None = Field(default=None, description="the unit of the angle, such as 'deg'")
-    time_unit: OneLine | None = Field(default=None, description="the unit of the times, such as 'ms'")
-    rate: SampleRate | None = Field(default=None, description="a positive number in Hz")
-    counts_per_turn: Positive | None = Field(default=None, description="a positive number")
-    calibration: OneLine | None = Field(
-        default=None, description="a formula such as '0.1 + 20*V', or the name of a table of two columns"
+    unit: OneLine | None = optional("the unit of the angle, such as 'deg'")
+    time_unit: OneLine | None = optional("the unit of the times, such as 'ms'")
+    rate: SampleRate | None = optional("a positive number in Hz")
+    counts_per_turn: Positive | None = optional("a positive number")
+    calibration: OneLine | None = optional(
+        "a formula such as '0.1 + 20*V', or the name of a table of two columns"
     )
-    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = Field(
-        default=None, description="'tab', ';', ',', '|' or 'blank'"
-    )
-    decimal: Literal[".", ","] | None = Field(default=None, description="'.' or ','")
-    start: float | None = Field(
-        default=None, description="a time of the file in s: earlier samples are left out"
-    )
-    end: float | None = Field(default=None, description="a time of the file in s: later samples are left out")
-    rest: float | None = Field(
-        default=None, description="the reading at rest in rad, to be subtracted from every run"
-    )
-    input: OneLine | None = Field(
-        default=None, description="the name of the input's column of a driven run, or 'none'"
-    )
-    input_as: InputColumn | None = Field(default=None, description="'moment_nm', 'drive' or 'base_rad'")
+    delimiter: Literal["tab", ";", ",", "|", "blank"] | None = optional("'tab', ';', ',', '|' or 'blank'")
+    decimal: Literal[".", ","] | None = optional("'.' or ','")
+    start: float | None = optional("a time of the file in s: earlier samples are left out")
+    end: float | None = optional("a time of the file in s: later samples are left out")
+    rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
+    input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
+    input_as: InputColumn | None = optional("'moment_nm', 'drive' or 'base_rad'")
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
         default=(),
         strict=False,
         description="[[choices.stretches]] tables with file, run, start, end and rest",
     )
-    name: OneLine | None = Field(
-        default=None, description="a pattern of file names such as 'S{spring}_V{wind_speed}_*'"
-    )
+    name: OneLine | None = optional("a pattern of file names such as 'S{spring}_V{wind_speed}_*'")
     conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
 
     def stretch_of(self, file: str, run: str) -> Stretch:
-        """What is stated about where a run lies and rests.
-
-        Args:
-            file: the name of the file.
-            run: the name of the run.
-        """
+        """What is stated about where a run lies in its file and rests."""
         found = (one for one in self.stretches if (one.file, one.run) == (file, run))
         # A file may have a name that no recipe can hold: nothing is stated about it.
         return next(found, Stretch.model_construct(file=file, run=run))
@@ -126,39 +109,23 @@ class Recipe(StrictModel):
 
 
 def read_recipe(path: Path) -> ImportChoices:
-    """The choices of an earlier import.
-
-    Args:
-        path: its ``import.toml``, or the campaign's folder that holds it.
-
-    Raises:
-        TunnelError: no such file, or not a recipe.
-    """
+    """The choices of an earlier import, from its ``import.toml`` or the campaign's folder that holds it."""
     path = path / IMPORT_RECIPE if path.is_dir() else path
     missing = f"an import writes {IMPORT_RECIPE} into its campaign; name that file"
     return read_document(Recipe, path, missing=missing).choices
 
 
 def parse_setting(text: str, where: str) -> Conditions:
-    """Conditions from ``key=value``, separated by commas.
-
-    Args:
-        text: such as ``wind_speed=12.5, air_density=1.2``.
-
-    Raises:
-        TunnelError: not of that form, an unknown key, or a value out of range.
-    """
+    """Conditions from ``key=value``, separated by commas, such as ``wind_speed=12.5, air_density=1.2``."""
     values: dict[str, float] = {}
     for part in text.split(","):
         key, _, value = part.partition("=")
         try:
             values[key.strip()] = float(value)
         except ValueError:
-            raise TunnelError(
-                f"'{part.strip()}' is not of the form key=number",
-                where=where,
-                remedy=f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}",
-            ) from None
+            what = f"'{part.strip()}' is not of the form key=number"
+            remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
+            raise TunnelError(what, where=where, remedy=remedy) from None
     return validate(Conditions, values, Path(where))
 
 
@@ -190,13 +157,7 @@ _EVEN = 1e-9  # of a value: a column that varies less is constant
 
 
 def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
-    """The condition or size that a column or a number states, a key of `Conditions`.
-
-    Args:
-        name: as `split_unit` gives it.
-        unit: of it.
-        alone: whether it is a single number, for which "speed" is the wind's.
-    """
+    """The condition or size, a key of `Conditions`, that a column states, or a number ``alone``."""
     if name in RIG_KEYS and unit == "":
         return name
     name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
@@ -214,15 +175,7 @@ def in_si(key: str, unit: str) -> float | None:
 
 
 def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
-    """Conditions of the runs and sizes of the rig that a file states beside its columns.
-
-    Args:
-        facts: numbers by name.
-        said: a remark is added on each.
-
-    Returns:
-        By key of `Conditions`, in its units.
-    """
+    """Conditions and sizes, by key of `Conditions` and in its units, that numbers of a file state; each is said."""
     found = {}
     for heading, value in facts.items():
         name, unit = split_unit(heading)
@@ -236,16 +189,7 @@ def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
 
 
 def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
-    """The condition of a run that a column states, in the unit of `Conditions`.
-
-    Args:
-        key: of `Conditions`.
-        rows: those of the run, shape (n,).
-        said: a remark is added where it varies, or its unit is not known.
-
-    Returns:
-        The median; zero for a wind speed that lies about zero; None where the column says nothing.
-    """
+    """The condition of a run that a column states, in the unit of `Conditions`; None where it says nothing."""
     values = column.values[rows]
     values = values[np.isfinite(values)]
     if not values.size:
@@ -267,20 +211,12 @@ def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[s
 
 def _no_unit(heading: str, key: str) -> str:
     kind = ", ".join(UNITS[_KINDS[key]])
-    return (
-        f"'{one_line(heading, 60)}' is left out: its unit is not one of {kind}; --set {key}=NUMBER states it"
-    )
+    left = f"'{one_line(heading, 60)}' is left out"
+    return f"{left}: its unit is not one of {kind}; --set {key}=NUMBER states it"
 
 
 def name_pattern(text: str) -> re.Pattern[str]:
-    """The pattern of file names as a regular expression.
-
-    Args:
-        text: such as ``S{spring}_V{wind_speed}_*``; ``*`` stands for anything, ``{}`` for a number.
-
-    Raises:
-        TunnelError: an unknown name in braces.
-    """
+    """The regular expression of a pattern such as ``S{spring}_V{wind_speed}_*``; ``*`` stands for anything."""
     parts = re.split(r"(\{\w*\}|\*)", text)
     expression = ""
     for part in parts:
@@ -290,11 +226,9 @@ def name_pattern(text: str) -> re.Pattern[str]:
         elif part.startswith("{"):
             known = _ALIASES.get(key, key)
             if known not in RUN_KEYS or f"<{known}>" in expression:
-                raise TunnelError(
-                    f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice",
-                    where=f"--name {one_line(text, 60)}",
-                    remedy=did_you_mean(key, (*_ALIASES, *RUN_KEYS)),
-                )
+                what = f"'{part}' is not a condition" if known not in RUN_KEYS else f"'{part}' occurs twice"
+                remedy = did_you_mean(key, (*_ALIASES, *RUN_KEYS))
+                raise TunnelError(what, where=f"--name {one_line(text, 60)}", remedy=remedy)
             expression += f"(?P<{known}>{_NUMBER})"
         else:
             expression += re.escape(part)
@@ -302,35 +236,18 @@ def name_pattern(text: str) -> re.Pattern[str]:
 
 
 def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
-    """Conditions in the name of a file.
-
-    Args:
-        pattern: of `name_pattern`; None: the name says nothing.
-
-    Raises:
-        TunnelError: when the name is not of that pattern.
-    """
+    """Conditions in the name of a file, which must match the pattern where there is one."""
     if pattern is None:
         return {}
     found = pattern.match(path.name)
     if found is None:
-        raise TunnelError(
-            "the name does not match --name",
-            where=shown(path),
-            remedy="correct the pattern, or rename the file",
-        )
+        remedy = "correct the pattern, or rename the file"
+        raise TunnelError("the name does not match --name", where=shown(path), remedy=remedy)
     return {key: float(re.sub("[,p]", ".", text)) for key, text in found.groupdict().items()}
 
 
 class ConditionTable:
-    """A table of conditions, one row for each file or run.
-
-    Args:
-        path: a text file with a column ``file`` or ``run``, and columns named as in ``campaign.toml``.
-
-    Raises:
-        TunnelError: not such a table, a name that occurs twice, or a value out of range.
-    """
+    """A table of conditions in a text file, one row for each file or run, with keys of ``campaign.toml``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -339,54 +256,34 @@ class ConditionTable:
         self._key = next((i for i, name in enumerate(keys) if name in ("file", "run", "id")), None)
         used = {name: i for i, name in enumerate(keys) if name in RUN_KEYS}
         if self._key is None or not used:
-            raise TunnelError(
-                f"no column {'file or run' if self._key is None else 'of conditions'} "
-                f"(columns found: {one_line(', '.join(names), 80)})",
-                where=shown(path),
-                remedy=f"name the columns file (or run) and {', '.join(RUN_KEYS)}",
-            )
+            wanted = "file or run" if self._key is None else "of conditions"
+            what = f"no column {wanted} (columns found: {one_line(', '.join(names), 80)})"
+            remedy = f"name the columns file (or run) and {', '.join(RUN_KEYS)}"
+            raise TunnelError(what, where=shown(path), remedy=remedy)
         self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and keys[i] not in used)
         self._rows: dict[str, dict[str, float]] = {}
         for row in rows:
             name = row[self._key].strip()
             if name.lower() in self._rows:
-                raise TunnelError(
-                    f"'{one_line(name)}' occurs twice", where=shown(path), remedy="leave one out"
-                )
-            self._rows[name.lower()] = _numbers({key: row[i] for key, i in used.items()}, name, path)
+                remedy = "leave one out"
+                raise TunnelError(f"'{one_line(name)}' occurs twice", where=shown(path), remedy=remedy)
+            values = {}
+            for key, text in ((key, row[i]) for key, i in used.items() if row[i].strip()):
+                try:
+                    values[key] = float(text.replace(",", "."))
+                except ValueError:
+                    raise TunnelError(
+                        f"{key} = '{one_line(text, 30)}' is not a number",
+                        where=f"{shown(path)}, '{one_line(name)}'",
+                        remedy="give a number in SI units",
+                    ) from None
+            validate(Conditions, values, path)
+            self._rows[name.lower()] = values
 
     def of(self, path: Path, run: str) -> dict[str, float]:
-        """Conditions of a run.
-
-        Args:
-            path: the file that holds it.
-
-        Raises:
-            TunnelError: when no row names the file or the run.
-        """
+        """Conditions of a run, by its name or that of the file that holds it."""
         for name in (run, path.name, path.stem):
             if name.lower() in self._rows:
                 return self._rows[name.lower()]
-        raise TunnelError(
-            f"no row for run '{one_line(run)}' of {one_line(path.name)}",
-            where=shown(self.path),
-            remedy="add a row with that run or file",
-        )
-
-
-def _numbers(cells: Mapping[str, str], name: str, path: Path) -> dict[str, float]:
-    where = f"{shown(path)}, '{one_line(name)}'"
-    values = {}
-    for key, text in cells.items():
-        if not text.strip():
-            continue
-        try:
-            values[key] = float(text.replace(",", "."))
-        except ValueError:
-            raise TunnelError(
-                f"{key} = '{one_line(text, 30)}' is not a number",
-                where=where,
-                remedy="give a number in SI units",
-            ) from None
-    validate(Conditions, values, path)
-    return values
+        what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
+        raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")

@@ -44,13 +44,7 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import (
-    HOLDS,
-    Drive,
-    Hold,
-    InputColumn,
-    checked_drive,
-)
+from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -63,13 +57,7 @@ class ImportedRun:
     """A run, or what was taken for one.
 
     Args:
-        id: of the run.
-        raw: the record in which it lies.
-        piece: its samples.
-        run: the run; None where it is left out.
-        said: why it is left out, or what is assumed of it.
         rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
-        sizes: of the rig, as the file states them, by key of `Conditions`.
     """
 
     id: str
@@ -88,15 +76,7 @@ class ImportedRun:
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """What was read from files.
-
-    Args:
-        campaign: the runs that can be used.
-        parts: these and the others, in the order of the files.
-        sources: the files.
-        choices: those of the user, and what was found instead of the others.
-        said: remarks on the campaign.
-    """
+    """What was read from files."""
 
     campaign: Campaign
     parts: tuple[ImportedRun, ...]
@@ -105,11 +85,7 @@ class Imported:
     said: tuple[str, ...]
 
     def remarks(self, path: Path | None = None) -> list[str]:
-        """How the files were read and what was changed, each once with the runs that it concerns.
-
-        Args:
-            path: of the file; None: all files.
-        """
+        """How all files or one were read and what was changed, each once with the runs that it concerns."""
         sources = [source for source in self.sources if path in (None, source.path)]
         parts = [part for part in self.parts if path in (None, part.raw.source)]
         found = [(text, s.path.name) for s in sources for table in s.tables for text in table.said]
@@ -117,17 +93,12 @@ class Imported:
         places: dict[str, list[str]] = {}
         for text, place in dict.fromkeys(found):
             places.setdefault(text, []).append(place)
-        everywhere = len(self.parts)
-        lines = [
-            f"{'all runs' if len(names) == everywhere > 1 else _listed(names)}: {text}"
-            for text, names in places.items()
-        ]
+        lines = []
+        for text, names in places.items():
+            more = f" and {len(names) - 6} more" if len(names) > 6 else ""
+            everywhere = len(names) == len(self.parts) > 1
+            lines.append(f"{'all runs' if everywhere else ', '.join(names[:6]) + more}: {text}")
         return [*lines, *self.said]
-
-
-def _listed(names: Sequence[str]) -> str:
-    names = list(dict.fromkeys(names))
-    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
 
 
 def read_records(
@@ -137,20 +108,7 @@ def read_records(
     conditions: Path | None = None,
     name: str = "",
 ) -> Imported:
-    """Read files as instruments write them.
-
-    Args:
-        files: one or more; each holds one run, several side by side, or several one after another.
-        choices: what is known about them; the rest is found.
-        conditions: a table of conditions of the files or runs.
-        name: of the campaign; the first file's when empty.
-
-    Returns:
-        The runs, with remarks on how they were read. Nothing is written.
-
-    Raises:
-        TunnelError: for the first fault, in one line that says what to give.
-    """
+    """Read files as instruments write them; nothing is written, and what ``choices`` leave open is found."""
     calibration = read_calibration(choices.calibration)
     pattern = None if choices.name is None else name_pattern(choices.name)
     table = None if conditions is None else ConditionTable(conditions)
@@ -165,44 +123,41 @@ def read_records(
         raise TunnelError("no files", remedy="name at least one")
     kinds = {raw.quantity for raw in raws}
     if len(kinds) > 1:
-        raise TunnelError(
-            f"the runs hold {' and '.join(sorted(kinds))}",
-            remedy="import one quantity at a time, with --angle",
-        )
-    parts = _parts(_with_unique_ids(raws), choices, table)
+        remedy = "import one quantity at a time, with --angle"
+        raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
+    ids = [raw.id for raw in raws]
+    parts = []
+    for at, raw in enumerate(raws):
+        label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
+        time, reading = raw.cleaned.time_s, raw.cleaned.reading
+        cut = choices.cut and raw.quantity == "angle" and not raw.whole and raw.input is None
+        pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
+        for number, piece in enumerate(pieces, 1):
+            run = label if len(pieces) == 1 else f"{label}-{number}"
+            parts.append(_part(run, raw, piece, choices, table))
     count = sum(part.piece.last - part.piece.first for part in parts)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     campaign = _campaign(parts, choices, name or one_line(files[0].stem), raws[0].quantity)
-    known = {**sources[0].known, **_found(raws, choices)}
-    resolved = choices.model_copy(
-        update={k: v for k, v in known.items() if getattr(choices, k) in (None, ())}
-    )
-    return Imported(campaign, tuple(parts), tuple(sources), resolved, _on_campaign(campaign, table))
-
-
-def _with_unique_ids(raws: Sequence[RawRecord]) -> list[tuple[str, RawRecord]]:
-    names = [raw.id for raw in raws]
-    seen: dict[str, int] = {}
-    result = []
-    for raw in raws:
-        seen[raw.id] = seen.get(raw.id, 0) + 1
-        result.append((raw.id if names.count(raw.id) == 1 else f"{raw.id}-{seen[raw.id]}", raw))
-    return result
-
-
-def _parts(
-    named: Sequence[tuple[str, RawRecord]], choices: ImportChoices, table: ConditionTable | None
-) -> list[ImportedRun]:
-    parts = []
-    for label, raw in named:
-        time, reading = raw.cleaned.time_s, raw.cleaned.reading
-        angle = raw.quantity == "angle"
-        cut = choices.cut and angle and not raw.whole and raw.input is None
-        pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
-        for number, piece in enumerate(pieces, 1):
-            name = label if len(pieces) == 1 else f"{label}-{number}"
-            parts.append(_part(name, raw, piece, choices, table))
-    return parts
+    # For the recipe: what was found, where all records share it.
+    known: dict[str, Any] = {**sources[0].known}
+    units, columns = {raw.unit for raw in raws}, tuple(dict.fromkeys(stem(raw.column) for raw in raws))
+    if len(units) == 1 and choices.counts_per_turn is None and choices.calibration is None:
+        known["unit"] = units.pop()
+    if len(columns) == 1:
+        known["angle"] = columns
+    found = {key: value for key, value in known.items() if getattr(choices, key) in (None, ())}
+    resolved = choices.model_copy(update=found)
+    said = []
+    if (step := campaign.sensor.resolution) is not None:
+        levels = "the readings lie on levels that far apart"
+        said.append(f"resolution {step:.4g} {campaign.sensor.unit}: {levels}")
+    if campaign.sensor.zero is not None:
+        said.append(
+            "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
+        )
+    if table is not None and table.ignored:
+        said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
+    return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said))
 
 
 def _part(
@@ -211,12 +166,16 @@ def _part(
     where = f"{shown(raw.source)}, run '{name}'"
     stretch = choices.stretch_of(raw.source.name, name)
     piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
-    kept = slice(piece.first, piece.last)
+    kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
-    said = _on_cut(raw.cleaned.time_s, piece)
+    said = []
+    if piece.first:
+        said.append(f"begins at {time[0]:.4g} s, where the body is released")
+    if piece.last < raw.cleaned.time_s.size:
+        said.append(f"ends at {time[-1]:.4g} s, with the motion or before the next run")
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
-        reading = from_rest(reading, rest, SensorProperties(quantity=raw.quantity).unit, said, where)
+        reading = from_rest(reading, rest, sensor.unit, said, where)
     given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
     in_table = {} if table is None else table.of(raw.source, name)
     # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
@@ -229,66 +188,39 @@ def _part(
     plausible_values(stated | sizes, where)
     if "wind_speed" not in stated:
         if _WIND_ON.search(f"{raw.source.stem} {name}"):
-            raise TunnelError(
-                "the name says that the wind is on, but not how fast",
-                where=where,
-                remedy="give --set wind_speed=SPEED (m/s), --conditions or --name",
-            )
+            what = "the name says that the wind is on, but not how fast"
+            remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
+            raise TunnelError(what, where=where, remedy=remedy)
         said.append("wind_speed is not stated: wind-off is assumed")
     rig = choices.conditions
     scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
     if "air_density" not in stated and needs_density(stated.get("wind_speed", 0.0), *scales):
-        raise TunnelError(
-            f"wind-on ({stated['wind_speed']:g} m/s) without air_density",
-            where=where,
-            remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)",
-        )
-    drive = None if raw.input is None else _drive(raw.input[0], raw.input[1][kept], raw.input_facts, said)
+        what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
+        raise TunnelError(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
+    drive = None
+    if raw.input is not None:
+        column, values = raw.input
+        order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
+        hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
+        gain = gain if column == "drive" else None
+        said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
+        said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
+        drive = Drive(column, values[kept], hold, gain)
+    time = from_zero(time)
     try:
-        if drive is None:
-            record = _judged(from_zero(time), reading, raw.quantity, stated.get("release_angle"), where)
-        else:
-            sensor = SensorProperties(quantity=raw.quantity)
-            record = checked_record(from_zero(time), reading, "the reading", sensor, None, where, driven=True)
-            checked_drive(drive, record, where)
+        record, stride = None, time.size // _JUDGED
+        release = None if drive is not None else stated.get("release_angle")
+        if drive is None and stride > 1:
+            # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+            with suppress(TunnelError):
+                checked_record(time[::stride], reading[::stride], "the reading", sensor, release, where)
+                record = Record(time, reading)
+        if record is None:
+            record = checked_record(time, reading, "the reading", sensor, release, where, drive)
     except TunnelError as error:
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
-
-
-def _drive(column: InputColumn, values: Array, facts: Mapping[str, float], said: list[str]) -> Drive:
-    """The input of a run with the hold and the gain that its file states."""
-    order, gain = facts.get("drive_hold"), facts.get("drive_gain") or None
-    hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
-    said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
-    if column != "drive" or gain is None:
-        return Drive(column, values, hold)
-    said.append(f"drive_gain = {gain:g} from the file")
-    return Drive(column, values, hold, gain)
-
-
-def _judged(
-    time: Array, reading: Array, quantity: Quantity, release_angle: float | None, where: str
-) -> Record:
-    """The record, unless a campaign cannot hold it."""
-    sensor = SensorProperties(quantity=quantity)
-    stride = time.size // _JUDGED
-    if stride > 1:
-        # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
-        with suppress(TunnelError):
-            checked_record(time[::stride], reading[::stride], "the reading", sensor, release_angle, where)
-            return Record(time, reading)
-    return checked_record(time, reading, "the reading", sensor, release_angle, where)
-
-
-def _on_cut(time: Array, piece: RecordPiece) -> list[str]:
-    said = []
-    if piece.first:
-        said.append(f"begins at {time[piece.first]:.4g} s, where the body is released")
-    if piece.last < time.size:
-        said.append(f"ends at {time[piece.last - 1]:.4g} s, with the motion or before the next run")
-    return said
 
 
 def _campaign(
@@ -297,68 +229,33 @@ def _campaign(
     runs = tuple(part.run for part in parts if part.run is not None)
     if not runs:
         part = parts[0]
-        raise TunnelError(
-            f"no run can be used; the first one is {part.said[-1]}",
-            where=f"{shown(part.raw.source)}, run '{part.id}'",
-            remedy="check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut",
-        )
-    files = list(dict.fromkeys(part.raw.source.name for part in parts))
-    rig = _rig(parts, choices)
-    return Campaign(
-        name,
-        RigProperties(**rig),
-        SensorProperties(
-            # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
-            resolution=resolution([part.reading for part in parts if part.run is not None]),
-            quantity=None if quantity == "angle" else quantity,
-            # What was subtracted is as uncertain as a line drawn by hand, in each run by itself.
-            zero="per_run" if len({part.rest for part in parts if part.run is not None}) > 1 else None,
-        ),
-        runs,
-        one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
-    )
-
-
-def _rig(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, float]:
-    """The sizes of the rig, as stated or else from the files."""
+        what = f"no run can be used; the first one is {part.said[-1]}"
+        remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
+        raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
+    # The sizes of the rig, as stated or else from the files.
     rig = choices.conditions.model_dump(include=set(RIG_KEYS), exclude_none=True)
     plausible_values(rig, "--set")
     for part in parts:
         for key, value in part.sizes.items():
             if rig.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
-                raise TunnelError(
-                    f"{key} = {value:g}, and {rig[key]:g} in another run",
-                    where=f"{shown(part.raw.source)}, run '{part.id}'",
-                    remedy=f"give --set {key}=NUMBER, or import them separately",
-                )
-    return rig
-
-
-def _found(raws: Sequence[RawRecord], choices: ImportChoices) -> dict[str, object]:
-    """What was found, for a recipe: names and units that all records share."""
-    units = {raw.unit for raw in raws}
-    columns = tuple(dict.fromkeys(stem(raw.column) for raw in raws))
-    counted = choices.counts_per_turn is not None or choices.calibration is not None
-    return {
-        **({"unit": units.pop()} if len(units) == 1 and not counted else {}),
-        **({"angle": columns} if len(columns) == 1 else {}),
-    }
-
-
-def _on_campaign(campaign: Campaign, table: ConditionTable | None) -> tuple[str, ...]:
-    said = []
-    step = campaign.sensor.resolution
-    if step is not None:
-        said.append(
-            f"resolution {step:.4g} {campaign.sensor.unit}: the readings lie on levels that far apart"
-        )
-    if campaign.sensor.zero is not None:
-        said.append(
-            "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
-        )
-    if table is not None and table.ignored:
-        said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
-    return tuple(said)
+                what = f"{key} = {value:g}, and {rig[key]:g} in another run"
+                remedy = f"give --set {key}=NUMBER, or import them separately"
+                raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
+    files = list(dict.fromkeys(part.raw.source.name for part in parts))
+    used = [part for part in parts if part.run is not None]
+    return Campaign(
+        name,
+        RigProperties(**rig),
+        SensorProperties(
+            # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
+            resolution=resolution([part.reading for part in used]),
+            quantity=None if quantity == "angle" else quantity,
+            # What was subtracted is as uncertain as a line drawn by hand, in each run by itself.
+            zero="per_run" if len({part.rest for part in used}) > 1 else None,
+        ),
+        runs,
+        one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
+    )
 
 
 _AS_TEXT = 1_000_000  # samples: a larger campaign is written as Parquet
@@ -390,17 +287,7 @@ def import_records(
 
     Args:
         files: one or more, of any known format.
-        folder: where the campaign goes.
-        choices: what is known about the files; the rest is found.
-        conditions: a table of conditions of the files or runs.
-        overwrite: whether a campaign in the folder may be replaced.
         picture: draws what was read, as PNG; None: no picture.
-
-    Returns:
-        What was read, with remarks.
-
-    Raises:
-        TunnelError: for the first fault of the files or the folder.
     """
     name = one_line(Path(folder).resolve().name)
     imported = read_records([Path(path) for path in files], choices, conditions=conditions, name=name)
@@ -415,18 +302,17 @@ def write_imported(
     overwrite: bool = False,
     picture: Callable[[Imported], bytes] | None = None,
 ) -> None:
-    """Write what was read as a campaign, with its recipe; arguments as in `import_records`.
-
-    Args:
-        folder: where the campaign goes.
-        overwrite: whether a campaign in the folder may be replaced.
-        picture: draws what was read, as PNG; None: no picture.
-
-    Raises:
-        TunnelError: the folder exists or cannot be written.
-    """
+    """Write what was read as a campaign, with its recipe; arguments as in `import_records`."""
     samples = sum(run.record.time_s.size for run in imported.campaign.runs)
-    beside = {IMPORT_RECIPE: recipe_text(imported).encode()}
+    recipe = {
+        "schema_version": 1,
+        "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
+        "originals": [
+            {"file": one_line(s.path.name), "sha256": s.sha256, "said": imported.remarks(s.path)}
+            for s in imported.sources
+        ],
+    }
+    beside = {IMPORT_RECIPE: tomli_w.dumps(recipe).encode()}
     if picture is not None:
         beside[IMPORT_PICTURE] = picture(imported)
     write_campaign(
@@ -446,11 +332,7 @@ def originals(imported: Imported) -> list[str]:
 
 
 def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
-    """``campaign.toml`` with the originals, and the keys that nobody has stated, as comments.
-
-    Args:
-        originals: comments that name the files it was made of.
-    """
+    """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too."""
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
     unknown = [f"# {key} =   # {why}" for key, why in _RIG.items() if key not in rig]
@@ -460,16 +342,3 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
         unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
     return "\n".join([*originals, *head, *blocks])
-
-
-def recipe_text(imported: Imported) -> str:
-    """The recipe: the choices that were made, the originals, and what was changed, as TOML."""
-    document = {
-        "schema_version": 1,
-        "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
-        "originals": [
-            {"file": one_line(s.path.name), "sha256": s.sha256, "said": imported.remarks(s.path)}
-            for s in imported.sources
-        ],
-    }
-    return tomli_w.dumps(document)

@@ -1,8 +1,7 @@
 """From a file to its tables: its reader is chosen, and runs in a process with limits.
 
-A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process serves
-one file after another. It is ended when it exceeds a limit, and another one takes its place. Tables come back as
-JSON and raw numbers. `tunnel_sim.vocabulary.limits` holds the limits.
+A damaged file may keep a parser busy for ever, make it ask for all memory, or end the process. One process
+serves one file after another; where it exceeds a limit another one takes its place.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ import numpy as np
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
 from tunnel_sim.files.importing.text import TEXT, read_text_tables
-from tunnel_sim.files.readers import Reader, load_reader, reader_place
+from tunnel_sim.files.readers import load_reader, reader_place
 from tunnel_sim.files.reading import check_count, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -39,24 +38,14 @@ _SERVE = (
     "from tunnel_sim.files.importing.source import serve; serve()"
 )
 _LATEST = 3.0  # times the allowed time
-_OUT_OF_TIME = -getattr(
-    signal, "SIGXCPU", math.inf
-)  # exit status of a process that Linux or macOS ended for it
+_OUT_OF_TIME = -getattr(signal, "SIGXCPU", math.inf)  # exit status where Linux or macOS ended it for its time
 _DAMAGED = "export it again, or as text"
 _lock = threading.Lock()
 _kept: list[_Server] = []
 
 
 def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
-    """The tables of a file, read in a process with limits.
-
-    Args:
-        reader: where the `Reader` of the format is, ``module:name``.
-        content: of the file.
-
-    Raises:
-        TunnelError: as the reader, or when a limit is exceeded or the process dies.
-    """
+    """The tables of a file by the reader at ``module:name``, read in a process with limits."""
     with _lock:
         if _kept and not _kept[0].usable():
             _kept.pop().end()
@@ -69,12 +58,6 @@ def read_guarded(reader: str, content: bytes, where: str) -> list[Table]:
             if not isinstance(error, TunnelError) or not _kept[0].usable():
                 _kept.pop().end()
             raise
-
-
-@atexit.register
-def _end() -> None:
-    while _kept:
-        _kept.pop().end()
 
 
 class _Server:
@@ -95,6 +78,7 @@ class _Server:
         )
         self._asked, self._answers = cast(BinaryIO, self._process.stdin), cast(BinaryIO, self._process.stdout)
         self._owner = os.getpid()
+        atexit.register(self.end)
 
     def usable(self) -> bool:
         """Whether the process runs and belongs to this one: a fork must not talk on its parent's pipes."""
@@ -102,6 +86,7 @@ class _Server:
 
     def end(self) -> None:
         """End the process at once."""
+        atexit.unregister(self.end)
         if self._owner == os.getpid():
             self._process.kill()
             self._process.wait()
@@ -129,18 +114,20 @@ class _Server:
             status = self._process.wait()
             too_long = late.is_set() or status == _OUT_OF_TIME
             ended = f"ends the program that reads it (exit status {status})"
-            raise TunnelError(
-                f"takes longer than {allowed:.3g} s to read" if too_long else ended,
-                where=where,
-                remedy=f"it may be damaged: {_DAMAGED}",
-            ) from None
+            what = f"takes longer than {allowed:.3g} s to read" if too_long else ended
+            raise TunnelError(what, where=where, remedy=f"it may be damaged: {_DAMAGED}") from None
         finally:
             watch.cancel()
         if "last" in answer:
             self._process.wait()
         if "error" in answer:
             raise TunnelError(answer["error"], where=where, remedy=answer["remedy"])
-        return _unpacked(answer["tables"], arrays)
+        values = (np.frombuffer(array) for array in arrays)
+        tables = []
+        for table in answer["tables"]:
+            channels = tuple(Channel(name, next(values), unit) for name, unit in table["channels"])
+            tables.append(Table(**table | {"channels": channels, "said": tuple(table["said"])}))
+        return tables
 
 
 def serve() -> None:
@@ -157,7 +144,16 @@ def serve() -> None:
             _limit("RLIMIT_CPU", math.ceil(time.process_time() + _LATEST * request["seconds"]) + 1)
             try:
                 tables = pkgutil.resolve_name(request["reader"]).read_tables(content.pop(), request["where"])
-                _send(answers, *_packed(tables))
+                columns = [
+                    np.ascontiguousarray(c.values, np.float64) for table in tables for c in table.channels
+                ]
+                described = [
+                    {field.name: getattr(table, field.name) for field in fields(Table)}
+                    | {"channels": [(c.name, c.unit) for c in table.channels]}
+                    for table in tables
+                ]
+                head = {"tables": described, "sizes": [c.nbytes for c in columns]}
+                _send(answers, head, [c.data for c in columns])
             except TunnelError as error:
                 _send(answers, {"error": error.what, "remedy": error.remedy, "sizes": []}, [])
             except MemoryError:
@@ -186,11 +182,7 @@ def _send(stream: BinaryIO, head: dict[str, Any], parts: Sequence[bytes | memory
 
 
 def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
-    """What `_send` has sent.
-
-    Raises:
-        EOFError: the other process has ended.
-    """
+    """What `_send` has sent; EOFError where the other process has ended."""
     line = stream.readline()
     if not line.endswith(b"\n"):
         raise EOFError
@@ -201,42 +193,9 @@ def _received(stream: BinaryIO) -> tuple[dict[str, Any], list[bytes]]:
     return head, parts
 
 
-def _packed(tables: Sequence[Table]) -> tuple[dict[str, Any], list[memoryview]]:
-    """Tables as JSON, and the values of their columns."""
-    columns = [np.ascontiguousarray(c.values, dtype=np.float64) for table in tables for c in table.channels]
-    described = [
-        {field.name: getattr(table, field.name) for field in fields(Table)}
-        | {"channels": [(c.name, c.unit) for c in table.channels]}
-        for table in tables
-    ]
-    return {"tables": described, "sizes": [c.nbytes for c in columns]}, [c.data for c in columns]
-
-
-def _unpacked(described: Sequence[dict[str, Any]], arrays: Sequence[bytes]) -> list[Table]:
-    """The tables that `_packed` has described."""
-    values = (np.frombuffer(array) for array in arrays)
-    return [
-        Table(
-            **table
-            | {
-                "channels": tuple(Channel(name, next(values), unit) for name, unit in table["channels"]),
-                "said": tuple(table["said"]),
-            }
-        )
-        for table in described
-    ]
-
-
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A file that was read.
-
-    Args:
-        path: of the file.
-        sha256: of its content.
-        tables: in the order of the file.
-        known: how it was read, for the recipe.
-    """
+    """A file that was read: its SHA-256, its tables in their order, and how it was read, for the recipe."""
 
     path: Path
     sha256: str
@@ -257,14 +216,7 @@ _BEGINNINGS = {
 
 
 def read_source(path: Path, choices: ImportChoices) -> Source:
-    """Read a file of any known format.
-
-    Returns:
-        Its tables. Nothing is known yet about the meaning of their columns.
-
-    Raises:
-        TunnelError: no such file, too large, or not of the format that its name says.
-    """
+    """Read a file of any known format; the meaning of its columns is not known yet."""
     where = shown(path)
     ending = path.suffix.lower()
     reader, place = load_reader(ending), reader_place(ending)
@@ -273,44 +225,33 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
     content = read_regular(path, reader.limit)
     if not content.strip():
         raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
-    _check_beginning(content, reader, where)
+    if not reader.magic or not content.startswith(reader.magic):
+        really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
+        if really is not None or reader.magic:
+            what = f"is not {reader.kind}" + (f": it begins like {really}" if really else "")
+            remedy = "give the file the ending of its format, or export it again"
+            raise TunnelError(what, where=where, remedy=remedy)
     known: dict[str, str] = {}
     if place is None:
         tables, known = read_text_tables(content, where, choices)
     else:
         tables = read_guarded(place, content, where)
-    tables = [
-        with_input_facts(part) for table in tables if table.channels for part in by_run(_computable(table))
-    ]
-    if not tables:
-        raise TunnelError(
-            "no column of numbers", where=where, remedy="name a file that holds times and angles"
-        )
-    count = sum(table.channels[0].values.size for table in tables)
+    found = []
+    for table in (table for table in tables if table.channels):
+        channels, said = [], [*table.said]
+        for channel in table.channels:
+            wild = np.abs(channel.values) > limits.LARGEST_NUMBER  # its powers would overflow
+            if wild.any():
+                said.append(
+                    f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing"
+                )
+                channel = replace(channel, values=np.where(wild, np.nan, channel.values))
+            channels.append(channel)
+        table = replace(table, channels=tuple(channels), said=tuple(said))
+        found += [with_input_facts(part) for part in by_run(table)]
+    if not found:
+        remedy = "name a file that holds times and angles"
+        raise TunnelError("no column of numbers", where=where, remedy=remedy)
+    count = sum(table.channels[0].values.size for table in found)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples", where, "split the file")
-    return Source(path, hashlib.sha256(content).hexdigest(), tuple(tables), known)
-
-
-def _computable(table: Table) -> Table:
-    """The table without infinities and numbers whose powers would overflow."""
-    channels, said = [], []
-    for channel in table.channels:
-        wild = np.abs(channel.values) > limits.LARGEST_NUMBER
-        if wild.any():
-            said.append(f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing")
-            channel = replace(channel, values=np.where(wild, np.nan, channel.values))
-        channels.append(channel)
-    return replace(table, channels=tuple(channels), said=(*table.said, *said)) if said else table
-
-
-def _check_beginning(content: bytes, reader: Reader, where: str) -> None:
-    if reader.magic and content.startswith(reader.magic):
-        return
-    really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
-    if really is not None or reader.magic:
-        remedy = "give the file the ending of its format, or export it again"
-        raise TunnelError(
-            f"is not {reader.kind}" + (f": it begins like {really}" if really else ""),
-            where=where,
-            remedy=remedy,
-        )
+    return Source(path, hashlib.sha256(content).hexdigest(), tuple(found), known)

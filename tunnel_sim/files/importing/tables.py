@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tunnel_sim.vocabulary.drive import HOLDS
+from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -85,15 +85,7 @@ def kind_of(unit: str) -> str:
 
 
 def split_unit(heading: str) -> tuple[str, str]:
-    """A heading as name and unit.
-
-    Args:
-        heading: such as ``Angle (deg) Run #1``, ``yaw_rad`` or ``t / s``.
-
-    Returns:
-        The name without its unit, and the unit: one of `UNITS`, the text in brackets where it is another one, or
-        an empty text.
-    """
+    """A heading such as ``Angle (deg) Run #1`` or ``t / s`` as name and unit, which may be empty."""
     heading = " ".join(heading.split())
     if "/" in heading and known_unit(heading):  # a unit alone, such as "m/s"
         return heading, ""
@@ -127,7 +119,6 @@ class Channel:
     """One column of a table.
 
     Args:
-        name: as in the file, without its unit.
         values: shape (n,), in the unit of the file; NaN where there is no number.
         unit: one of `UNITS`, another text, or empty where none is stated.
     """
@@ -146,7 +137,6 @@ class Table:
     """Columns of the same length.
 
     Args:
-        channels: the columns that hold numbers, in their order.
         part: sheet, group, structure or run in the file; empty where the file holds one table.
         facts: single numbers beside the columns, by name.
         said: how the table was read, and what was left out.
@@ -179,6 +169,17 @@ def by_run(table: Table) -> list[Table]:
     )
 
 
+def is_input(channel: Channel) -> bool:
+    """Whether a column is named as the format names an input, so that it is not the reading."""
+    return heading(channel) in INPUT_COLUMNS
+
+
+def heading(channel: Channel) -> str:
+    """The name of a column with its unit, as the format writes it."""
+    name = channel.name.strip().lower()
+    return f"{name}_{channel.unit}" if channel.unit else name
+
+
 def with_input_facts(table: Table) -> Table:
     """A table whose columns ``drive_hold`` and ``drive_gain``, as an export writes them, are single numbers."""
     stated = [channel for channel in table.channels if channel.name in INPUT_FACTS]
@@ -200,16 +201,7 @@ def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
 
 
 def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequence[str]) -> list[Table]:
-    """A table as one for each run.
-
-    Args:
-        column: that names the runs.
-        starts: the first row of each stretch of rows of one name, but for the first.
-        names: of these stretches; the rows of an empty one belong to no run.
-
-    Returns:
-        In their order; the table as it is where the column cannot name runs, because it is no such column.
-    """
+    """A table as one for each run that its column names; as it is where the column cannot name runs."""
     runs = [name for name in names if name]
     rows = table.channels[0].values.size if table.channels else 0
     if not 0 < len(names) <= rows / _LEAST_ROWS or len(set(runs)) < len(runs):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,11 +46,7 @@ _LONG_UNIT = 8  # characters: a longer text is a name
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
-    """Whether a text is a number.
-
-    Args:
-        decimal: the decimal sign.
-    """
+    """Whether a text is a number."""
     return _NUMBER[decimal].fullmatch(text) is not None
 
 
@@ -61,15 +57,7 @@ def is_missing(text: str) -> bool:
 
 @dataclass(frozen=True)
 class Layout:
-    """The head of a sheet.
-
-    Args:
-        first: index of the first row of numbers.
-        names: of the columns, without units.
-        units: of the columns, as `split_unit` gives them.
-        headed: whether the names are those of the file.
-        facts: numbers that the lines above the table state, by name, in SI units where their unit is known.
-    """
+    """The head of a sheet: its first row of numbers, its columns, and numbers stated above, in SI units."""
 
     first: int
     names: tuple[str, ...]
@@ -80,107 +68,68 @@ class Layout:
     @property
     def runs(self) -> int | None:
         """Index of the column that says to which run a row belongs."""
-        found = (
-            i
-            for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
-            if names_runs(name) and not unit
-        )
-        return next(found, None)
+        columns = enumerate(zip(self.names, self.units, strict=True))
+        return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
 
 
 def find_layout(
     rows: Sequence[Sequence[str]], lines: Sequence[str], decimal: str, width: int
 ) -> Layout | None:
-    """Find names, units and the first row of numbers.
-
-    Args:
-        rows: the first rows of the sheet, split into cells.
-        lines: the same rows as they are, for numbers stated in them.
-        decimal: the decimal sign.
-        width: number of columns (a count).
-
-    Returns:
-        The layout; None where no row holds numbers.
-    """
-    first = _first_row(rows, decimal, width)
-    if first is None:
-        return None
-    above = [
-        (index, cells)
-        for index, row in enumerate(rows[:first])
-        if (cells := _heading(row, width, lambda text: is_number(text, decimal))) is not None
-    ]
-    units: list[str] = [""] * width
-    if len(above) > 1 and _are_units(above[-1][1]):
-        units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
-    names = list(above[-1][1]) if above else []
-    split = [split_unit(name) for name in names]
-    named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
-    if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
-        named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
-    return Layout(
-        first,
-        tuple(named) or tuple(f"column {i + 1}" for i in range(width)),
-        tuple(stated or own for (_, stated), own in zip(split or [("", "")] * width, units, strict=True)),
-        bool(names),
-        _facts(lines[: above[-1][0] if above else first]),
-    )
-
-
-def _first_row(rows: Sequence[Sequence[str]], decimal: str, width: int) -> int | None:
-    """The first row from which on the columns of numbers hold numbers."""
+    """Names, units and the first row of numbers of a sheet, given the cells and lines of its head; or None."""
     tail = [row for row in rows[len(rows) // 2 :] if any(cell for cell in row)]
     numeric = [
         column
         for column in range(width)
         if 2 * sum(column < len(row) and is_number(row[column], decimal) for row in tail) > len(tail)
     ]
-    if not numeric:
-        return None
 
     def is_data(row: Sequence[str]) -> bool:
         cells = [row[column] if column < len(row) else "" for column in numeric]
         filled = sum(is_number(cell, decimal) for cell in cells)
         return filled > 0 and all(is_number(cell, decimal) or is_missing(cell) for cell in cells)
 
-    return next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
-
-
-def _heading(row: Sequence[str], width: int, number: Callable[[str], bool]) -> list[str] | None:
-    """The cells of a row that may name every column; None where it may not."""
-    cells = [cell.strip().strip('"').strip() for cell in row]
-    if cells:
-        cells[0] = cells[0].lstrip("#%!*/;").strip()
-    while len(cells) > width and not cells[-1]:
-        cells.pop()
-    texts = [cell for cell in cells if cell and not number(cell)]
-    if len(cells) > width or 2 * len(texts) < width or (width > 1 and len(texts) < 2):
+    first = next((i for i in range(len(rows)) if all(map(is_data, rows[i : i + 3]))), None)
+    if first is None:
         return None
-    return cells + [""] * (width - len(cells))
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a row holds units: known ones or others in brackets, or as many known ones as short texts."""
-    said = [cell for cell in cells if cell.strip("-")]
-    known = sum(known_unit(cell) is not None for cell in said)
-    others = [cell for cell in said if known_unit(cell) is None and not re.fullmatch(r"[\[({].*[\])}]", cell)]
-    return known > 0 and (
-        not others or (known > len(others) and all(len(cell) <= _LONG_UNIT for cell in others))
-    )
-
-
-def _facts(lines: Sequence[str]) -> dict[str, float]:
-    """Numbers such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, in SI units where the unit is known."""
-    found = {}
-    for line in lines:
-        for name, number, text in _FACT.findall(line):
+    above = []  # the rows that may name every column
+    for index, row in enumerate(rows[:first]):
+        cells = [cell.strip().strip('"').strip() for cell in row]
+        if cells:
+            cells[0] = cells[0].lstrip("#%!*/;").strip()
+        while len(cells) > width and not cells[-1]:
+            cells.pop()
+        texts = [cell for cell in cells if cell and not is_number(cell, decimal)]
+        if len(cells) <= width and 2 * len(texts) >= width and (width <= 1 or len(texts) > 1):
+            above.append((index, cells + [""] * (width - len(cells))))
+    units: list[str] = [""] * width
+    # A row of units: known ones or others in brackets, or more known ones than short texts.
+    stated = [cell for cell in above[-1][1] if cell.strip("-")] if len(above) > 1 else []
+    known = [cell for cell in stated if known_unit(cell) is not None]
+    bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
+    few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
+    if known and (not bare or few):
+        units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
+    names = list(above[-1][1]) if above else []
+    split = [split_unit(name) for name in names]
+    named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
+    facts = {}  # such as "Sample rate: 1000 Hz" or "V = 54 km/h", in SI units where the unit is known
+    for line in lines[: above[-1][0] if above else first]:
+        for fact, number, text in _FACT.findall(line):
             text = text.lstrip(";,\t ").strip("()[] ")
             unit = known_unit(text) or ""
             factor = _HERTZ.get(text.lower()) or UNITS.get(kind_of(unit), {}).get(unit, 1.0)
-            value = float(number.replace(",", ".")) * factor
             strange = text and not unit and text.lower() not in _HERTZ
-            found[f"{name.strip()} ({text})" if strange else name.strip()] = value
-    return found
+            heading = f"{fact.strip()} ({text})" if strange else fact.strip()
+            facts[heading] = float(number.replace(",", ".")) * factor
+    if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
+        named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
+    return Layout(
+        first,
+        tuple(named) or tuple(f"column {i + 1}" for i in range(width)),
+        tuple(one or own for (_, one), own in zip(split or [("", "")] * width, units, strict=True)),
+        bool(names),
+        facts,
+    )
 
 
 TEXT = Reader("a table of text", limits.CSV_BYTES)
@@ -195,13 +144,7 @@ _SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blan
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a line is split and a number is written.
-
-    Args:
-        delimiter: one character; a blank stands for any number of blanks and tabs.
-        decimal: the decimal sign.
-        width: number of columns (a count).
-    """
+    """How a line is split and a number is written; a blank stands for any number of blanks and tabs."""
 
     delimiter: str
     decimal: str
@@ -222,23 +165,24 @@ def read_text_tables(
 ) -> tuple[list[Table], dict[str, str]]:
     """The table of a text file; and how it was read, for the recipe."""
     content, encoding = _as_utf8(content, where)
-    head, body = _samples(content)
-    dialect = find_dialect(body, choices)
+    head = content[:_HEAD].decode(errors="replace").splitlines()
+    if len(content) > _HEAD:
+        head.pop()
+    head = head[:_HEAD_LINES]
+    half = len(content) // 2
+    middle = content[half : half + _MIDDLE].decode(errors="replace").splitlines()[1:-1]
+    body = middle if len(middle) >= len(head) // 2 else head[len(head) // 2 :] or head
+    dialect = find_dialect([line for line in body if line.strip() and line[0] not in "#%"], choices)
     if dialect is None:
-        raise TunnelError(
-            "no columns of numbers", where=where, remedy="give --delimiter and --decimal, or name a table"
-        )
+        remedy = "give --delimiter and --decimal, or name a table"
+        raise TunnelError("no columns of numbers", where=where, remedy=remedy)
     check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-    check_count(
-        content.count(b"\n"), limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out"
-    )
+    lines = content.count(b"\n")
+    check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
     layout = find_layout([dialect.split(line) for line in head], head, dialect.decimal, dialect.width)
     if layout is None:
-        raise TunnelError(
-            f"no numbers in the first {len(head)} lines",
-            where=where,
-            remedy="remove the lines above the table",
-        )
+        what = f"no numbers in the first {len(head)} lines"
+        raise TunnelError(what, where=where, remedy="remove the lines above the table")
     heading = "names in the line above the numbers" if layout.headed else "no names of columns"
     said = (
         f"text ({encoding}), {dialect.width} columns separated by {_SAID[dialect.delimiter]}, decimal "
@@ -248,16 +192,38 @@ def read_text_tables(
         "delimiter": next(name for name, sign in _NAMES.items() if sign == dialect.delimiter),
         "decimal": dialect.decimal,
     }
-    return _tables(content, dialect, layout, where, said), known
+    if dialect.delimiter == " ":
+        content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
+        content = re.sub(rb"[ \t]+", b" ", content)
+    options: dict[str, Any] = {
+        "separator": dialect.delimiter,
+        "has_header": False,
+        "skip_lines": layout.first,
+        "truncate_ragged_lines": True,
+    }
+    names = [f"column_{i + 1}" for i in range(dialect.width)]
+    missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
+    try:
+        labels = None
+        if (at := layout.runs) is not None:  # a name of a run is what it is, also where it is "nan"
+            schema = dict.fromkeys(names, pl.String)
+            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
+        try:
+            kinds = {name: pl.String if i == at else pl.Float64 for i, name in enumerate(names)}
+            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
+            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
+        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
+            texts = dict.fromkeys(names, pl.String)
+            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
+        table = Table((), said=(said,), facts=layout.facts)
+        return tables_of(frame, layout, dialect.decimal, labels, table), known
+    except pl.exceptions.PolarsError as error:
+        what = f"not a table of text ({one_line(error, 60)})"
+        raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
-    """The dialect in which most cells of some lines are numbers; of several, the one with most columns.
-
-    Args:
-        body: lines of the table.
-        choices: delimiter and decimal sign where they are stated.
-    """
+    """The dialect in which most cells of some lines are numbers; of several, the one with most columns."""
     delimiters = _NAMES.values() if choices.delimiter is None else (_NAMES[choices.delimiter],)
     decimals = (".", ",") if choices.decimal is None else (choices.decimal,)
     best, score = None, (0.2, 0)
@@ -297,67 +263,10 @@ def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
     return (content if b"\n" in content else content.replace(b"\r", b"\n")), encoding
 
 
-def _samples(content: bytes) -> tuple[list[str], list[str]]:
-    """The first lines, and lines of the table's body."""
-    head = content[:_HEAD].decode(errors="replace").splitlines()
-    if len(content) > _HEAD:
-        head.pop()
-    head = head[:_HEAD_LINES]
-    half = len(content) // 2
-    middle = content[half : half + _MIDDLE].decode(errors="replace").splitlines()[1:-1]
-    body = middle if len(middle) >= len(head) // 2 else head[len(head) // 2 :] or head
-    return head, [line for line in body if line.strip() and line[0] not in "#%"]
-
-
-def _tables(content: bytes, dialect: Dialect, layout: Layout, where: str, said: str) -> list[Table]:
-    """The columns of numbers, run by run where a column names the runs, with remarks on what is not a number."""
-    if dialect.delimiter == " ":
-        content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
-        content = re.sub(rb"[ \t]+", b" ", content)
-    options: dict[str, Any] = {
-        "separator": dialect.delimiter,
-        "has_header": False,
-        "skip_lines": layout.first,
-        "truncate_ragged_lines": True,
-    }
-    names = [f"column_{i + 1}" for i in range(dialect.width)]
-    missing = sorted({*MISSING[1:], *map(str.upper, MISSING[1:]), "NaN", "Inf", "-Inf"})
-    try:
-        labels = None
-        if (at := layout.runs) is not None:  # a name of a run is what it is, also where it is "nan"
-            schema = dict.fromkeys(names, pl.String)
-            labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
-        try:
-            kinds = {name: pl.String if i == layout.runs else pl.Float64 for i, name in enumerate(names)}
-            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
-            frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
-        except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
-            texts = dict.fromkeys(names, pl.String)
-            frame = pl.read_csv(content, schema=texts, null_values=missing, **options)
-        return tables_of(frame, layout, dialect.decimal, labels, Table((), said=(said,), facts=layout.facts))
-    except pl.exceptions.PolarsError as error:
-        raise TunnelError(
-            f"not a table of text ({one_line(error, 60)})",
-            where=where,
-            remedy="give every line one value for each column",
-        ) from None
-
-
 def tables_of(
     frame: pl.DataFrame, layout: Layout, decimal: str, labels: pl.Series | None, table: Table
 ) -> list[Table]:
-    """The tables of a sheet.
-
-    Args:
-        frame: numbers and texts, nulls where there are none.
-        layout: as many names and units.
-        decimal: the decimal sign of the texts.
-        labels: the run of each row, where a column names the runs.
-        table: what else is known of it.
-
-    Returns:
-        One, or one for each run, with the columns that hold numbers or times of day.
-    """
+    """The tables of a sheet with its columns of numbers or times of day: one, or one for each run of the labels."""
     channels, notes = [], {-1: table.said[0]}
     for i, (name, unit, column) in enumerate(
         zip(layout.names, layout.units, frame.get_columns(), strict=True)
@@ -372,12 +281,19 @@ def tables_of(
             number = cells.cast(pl.Float64, strict=False)
             lost = number.null_count() - column.null_count()
         if lost and number.null_count() == column.len():
-            clock = _clock(column)
-            if clock is not None:
-                number, unit = clock, "s"
+            # Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight.
+            text = column.str.strip_chars(' \t\r"')
+            parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
+            hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
+            half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
+            hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
+            hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
+            seconds = 3600.0 * hours + 60.0 * minutes + rest
+            notes[i] = f"the column '{name}' holds text and is left out"
+            if 2 * seconds.null_count() <= seconds.len():
+                midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
+                number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
-            else:
-                notes[i] = f"the column '{name}' holds text and is left out"
         elif lost:
             notes[i] = f"{lost} texts in the column '{name}' are taken as missing"
         if number.null_count() < number.len():
@@ -390,32 +306,8 @@ def tables_of(
     return [replace(one, said=(*said, *one.said[1:])) for one in tables]
 
 
-def _clock(text: pl.Series) -> pl.Series | None:
-    """Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight."""
-    text = text.str.strip_chars(' \t\r"')
-    fields = [text.str.extract(_CLOCK, group).str.replace(",", ".").cast(pl.Float64) for group in (1, 2, 3)]
-    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
-    hours = pl.select(pl.when(half.is_null()).then(fields[0]).otherwise(fields[0] % 12.0)).to_series()
-    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
-    seconds = 3600.0 * hours + 60.0 * fields[1] + fields[2]
-    if 2 * seconds.null_count() > seconds.len():
-        return None
-    midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
-    return seconds + _DAY * midnights
-
-
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    """A small table of names and texts, such as one of conditions.
-
-    Args:
-        path: the file; its first line names the columns.
-
-    Returns:
-        The names, and the cells of every further line, one for each name.
-
-    Raises:
-        TunnelError: no such file, or lines that differ in length.
-    """
+    """A small table of texts, such as one of conditions: its names, and the cells of every further line."""
     where = shown(path)
     content, _ = _as_utf8(read_regular(path, limits.DOCUMENT_BYTES), where)
     lines = [line for line in content.decode(errors="replace").splitlines() if line.strip()]
@@ -425,9 +317,7 @@ def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
     rows = [Dialect(delimiter, ".", 0).split(line) for line in lines]
     wrong = next((i for i, row in enumerate(rows) if len(row) != len(rows[0])), None)
     if wrong is not None:
-        raise TunnelError(
-            f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns",
-            where=where,
-            remedy=f"give every line one cell for each column, with {_SAID[delimiter]} between",
-        )
+        what = f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns"
+        remedy = f"give every line one cell for each column, with {_SAID[delimiter]} between"
+        raise TunnelError(what, where=where, remedy=remedy)
     return rows[0], rows[1:]

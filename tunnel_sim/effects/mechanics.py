@@ -1,26 +1,21 @@
-"""Effects of the spring, the rod and gravity."""
+"""Effects of the spring, the rod and gravity, of friction and of mechanical damping."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, isclose
+from math import cos, isclose, log, pi, sqrt
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Law
-from tunnel_sim.effects.parameters import Circumstances, Trial, exponent, parameter
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
+from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 
 
 @dataclass(frozen=True)
 class CubicStiffness(Effect):
-    """A spring that hardens or softens with the angle.
-
-    Args:
-        coefficient: relative change of stiffness per squared angle, positive when hardening, 1/rad2.
-        exponent: power of the angle in the moment (unchanged at 0.2 rad), dimensionless; 3 in the textbook form.
-    """
+    """A spring that hardens or softens with the angle."""
 
     name = "cubic_stiffness"
     place = 4
@@ -32,33 +27,18 @@ class CubicStiffness(Effect):
     signature = "The relative change of frequency from its small-amplitude value is (3/8) κ A²."
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (1.0,)
+    law_terms = ("stiffness_cubic", "stiffness_cubic_exponent")
 
     coefficient: float = parameter(
-        "κ",
-        "1/rad2",
-        "relative change of stiffness per squared angle, positive when hardening",
-        scale=0.2,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-10.0,
-        fit_upper=50.0,
-    )
-
+        "κ", "1/rad2", "relative change of stiffness per squared angle, positive when hardening",
+        scale=0.2, lower=-1e6, upper=1e6, fit_lower=-10.0, fit_upper=50.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 3.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"stiffness_cubic": self.coefficient, "stiffness_cubic_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
 class AsymmetricStiffness(Effect):
-    """A spring that is stiffer to one side.
-
-    Args:
-        coefficient: relative change of stiffness per angle, 1/rad.
-        exponent: power of the angle in the moment (unchanged at 0.2 rad), dimensionless; 2 in the textbook form.
-    """
+    """A spring that is stiffer to one side."""
 
     name = "asymmetric_stiffness"
     place = 5
@@ -73,32 +53,18 @@ class AsymmetricStiffness(Effect):
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.2,)
+    law_terms = ("stiffness_quadratic", "stiffness_quadratic_exponent")
 
     coefficient: float = parameter(
-        "κ",
-        "1/rad",
-        "relative change of stiffness per angle",
-        scale=0.05,
-        lower=-1e6,
-        upper=1e6,
-        fit_lower=-2.0,
-        fit_upper=2.0,
-    )
-
+        "κ", "1/rad", "relative change of stiffness per angle",
+        scale=0.05, lower=-1e6, upper=1e6, fit_lower=-2.0, fit_upper=2.0,
+    )  # fmt: skip
     exponent: float = exponent("p", "power of the angle in the moment (unchanged at 0.2 rad)", 2.0)
-
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"stiffness_quadratic": self.coefficient, "stiffness_quadratic_exponent": self.exponent}
 
 
 @dataclass(frozen=True)
 class FreePlay(Effect):
-    """Play between spring and rod: the spring acts through a dead zone.
-
-    Args:
-        half_width: half width of the dead zone, rad.
-    """
+    """Play between spring and rod: the spring acts through a dead zone."""
 
     name = "free_play"
     place = 6
@@ -110,24 +76,16 @@ class FreePlay(Effect):
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
     references = ("Conner, Tang, Dowell & Virgin, J. Fluids Struct. 11 (1997) 89",)
     example = (0.01,)
+    law_terms = ("free_play",)
 
     half_width: float = parameter(
         "δ", "rad", "half width of the dead zone", scale=0.002, lower=0.0, upper=0.2
     )
 
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"free_play": self.half_width}
-
 
 @dataclass(frozen=True)
 class GravityStiffness(Effect):
-    """Gravity acting on an offset centre of mass about a tilted axis.
-
-    Args:
-        stiffness: greatest restoring moment, N m/rad.
-        rest_angle: equilibrium angle under gravity alone, rad.
-    """
+    """Gravity acting on an offset centre of mass about a tilted axis."""
 
     name = "gravity_stiffness"
     place = 7
@@ -141,6 +99,7 @@ class GravityStiffness(Effect):
     )
     references = ("Nayfeh & Mook, Nonlinear Oscillations, Wiley 1979, doi 10.1002/9783527617586",)
     example = (0.4, 0.2)
+    law_terms = ("gravity_stiffness", "gravity_angle")
     turns = "stiffness"
 
     stiffness: float = parameter(
@@ -168,10 +127,6 @@ class GravityStiffness(Effect):
         (trial,) = super().trials(campaign)
         return (replace(trial, replaces="stiffness") if campaign.normalised else trial,)
 
-    def law(self) -> Law:
-        """The effect's terms of the moment law."""
-        return {"gravity_stiffness": self.stiffness, "gravity_angle": self.rest_angle}
-
     @property
     def stiffness_at_rest(self) -> float:
         """Stiffness that gravity adds to the rig at rest, N m/rad."""
@@ -180,12 +135,7 @@ class GravityStiffness(Effect):
 
 @dataclass(frozen=True)
 class RodFlexibility(Effect):
-    """A rod that twists between its upper end, which carries spring and sensor, and the body.
-
-    Args:
-        compliance: twist per moment, rad/(N m).
-        inertia_share: share of Izz at the rod's upper end, dimensionless.
-    """
+    """A rod that twists between its upper end, which carries spring and sensor, and the body."""
 
     name = "rod_flexibility"
     place = 8
@@ -239,12 +189,7 @@ class RodFlexibility(Effect):
 
 @dataclass(frozen=True)
 class SpringMiscalibration(Effect):
-    """One spring that is not as stiff as stated.
-
-    Args:
-        error: true over stated stiffness, less one, dimensionless.
-        spring_stiffness: stated stiffness of the spring concerned, N m/rad.
-    """
+    """One spring that is not as stiff as stated."""
 
     name = "spring_miscalibration"
     place = 22
@@ -262,22 +207,12 @@ class SpringMiscalibration(Effect):
     tries = 2
 
     error: float = parameter(
-        "x",
-        "1",
-        "true over stated stiffness, less one",
-        scale=0.02,
-        lower=-0.9,
-        upper=9.0,
+        "x", "1", "true over stated stiffness, less one", scale=0.02, lower=-0.9, upper=9.0
     )
     spring_stiffness: float = parameter(
-        "Kr",
-        "N m/rad",
-        "stated stiffness of the spring concerned",
-        scale=16.12,
-        lower=0.0,
-        upper=1e6,
-        chosen_spring=True,
-    )
+        "Kr", "N m/rad", "stated stiffness of the spring concerned",
+        scale=16.12, lower=0.0, upper=1e6, chosen_spring=True,
+    )  # fmt: skip
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -293,3 +228,120 @@ class SpringMiscalibration(Effect):
         if self.is_null or not concerned:
             return run
         return dataclasses.replace(run, spring_stiffness=run.spring_stiffness * (1.0 + self.error))
+
+
+@dataclass(frozen=True)
+class CoulombFriction(Effect):
+    """Dry friction in the rod's bearing and potentiometer.
+
+    With a presliding range the contact deflects before it slides (Dahl 1968; Canudas de Wit et al. 1995,
+    doi 10.1109/9.376053): z is the deflection, zero at the release; zs is the deflection at which it slides;
+    2 Tc/zs is the stiffness just after the sliding reverses.
+    """
+
+    name = "coulomb_friction"
+    place = 1
+    channel = "damping"
+    condition = "always"
+    advice = "Free the bearing and the potentiometer of their dry friction"
+    equation = (
+        "−Tc sgn β̇; rest while the other moments stay within ±Tc; general form: −Tc z/zs, ż = β̇ − |β̇| z/zs"
+    )
+    signature = (
+        "The envelope falls linearly, by 4Tc/Kr per cycle, so the damping ratio rises "
+        "as the amplitude decays, and the body can come to rest off centre."
+    )
+    references = (
+        "Feeny & Liang, J. Sound Vib. 195 (1996) 149, doi 10.1006/jsvi.1996.0411",
+        "Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, doi 10.1109/9.376053",
+    )
+    example = (0.05,)
+
+    friction_moment: float = parameter("Tc", "N m", "friction moment", scale=0.004, lower=0.0, upper=1e4)
+    presliding: float = parameter(
+        "zs",
+        "rad",
+        "deflection at which the contact slides",
+        scale=0.005,
+        lower=0.0,
+        upper=0.2,
+        fit_lower=5e-4,  # below it the contact moves faster than the integrator steps
+        form=True,
+    )
+
+    def stands(self, stiffness: float) -> float:
+        """The angle at which the spring's moment is that of the friction, rad."""
+        return self.friction_moment / stiffness if stiffness > 0.0 else 0.0
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Set the terms of the moment law, with steps short enough to resolve the presliding range."""
+        del stated, drawn
+        sliding = run.with_parameters({"friction_moment": self.friction_moment})
+        if self.is_null or self.presliding == 0.0:
+            return sliding
+        return steps.for_contact(sliding.with_parameters({"presliding": self.presliding}))
+
+
+@dataclass(frozen=True)
+class QuadraticDamping(Effect):
+    """Damping that grows with the square of the rate."""
+
+    name = "quadratic_damping"
+    place = 2
+    channel = "damping"
+    condition = "always"
+    advice = "Model the damping that grows with the rate"
+    equation = "−C2 |β̇| β̇; general form: |β̇|^n sgn β̇ for |β̇| β̇"
+    signature = "The damping ratio falls in proportion to the amplitude."
+    references = ("ITTC Recommended Procedure 7.5-02-07-04.5, roll damping of ships: B1 p + B2 |p| p",)
+    example = (0.01,)
+    law_terms = ("quadratic_damping", "quadratic_damping_exponent")
+
+    coefficient: float = parameter(
+        "C2", "N m s2/rad2", "coefficient of the squared rate",
+        scale=0.002, lower=-1e4, upper=1e4, fit_lower=0.0, rate_exponent="exponent",
+    )  # fmt: skip
+    exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
+
+
+@dataclass(frozen=True)
+class StructuralDamping(Effect):
+    """Hysteretic loss in spring and rod: the same share of the energy per cycle at every frequency."""
+
+    name = "structural_damping"
+    place = 3
+    channel = "damping"
+    condition = "always"
+    on_spring = True
+    advice = "Model the hysteretic loss: the same share of the energy per cycle at every frequency"
+    equation = "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz)"
+    signature = (
+        "Each run is linear, but the damping moment grows with the square root of the spring's stiffness."
+    )
+    references = ("Crandall, J. Sound Vib. 11 (1970) 3, doi 10.1016/S0022-460X(70)80105-5",)
+    example = (0.02,)
+    law_terms = ("loss_factor",)
+
+    loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0, fit_lower=0.0)
+
+    def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
+        """Runs cannot show which frequency sets the loss: that of the motion, or that of the rig in still air.
+
+        Causality may also stiffen the spring by (2η/π) ln(ω/ωn) (Crandall 1970). The truth may lie between
+        the two cases; their difference counts as a rectangular half-width.
+        """
+        del cn_beta
+        if not runs:
+            return 0.0, 0.0
+        stiffening = [
+            2.0 * self.loss_factor / pi * r.spring_stiffness * log(r.still_omega / r.omega) / r.per_cn_beta
+            for r in runs
+        ]
+        loss = [
+            self.loss_factor
+            * (r.spring_stiffness / r.omega - r.spring_stiffness / r.still_omega)
+            / r.per_cn_r
+            for r in runs
+        ]
+        cn_beta_std, cn_r_std = (abs(sum(s)) / len(s) / sqrt(3.0) for s in (stiffening, loss))
+        return cn_beta_std, cn_r_std
