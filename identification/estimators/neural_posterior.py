@@ -30,21 +30,21 @@ from identification.campaign.derivatives import (
     statuses_of_runs,
 )
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
-from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import (
-    CAMPAIGN_NAMES,
-    Features,
-    campaign_features,
-    record_features,
-)
-from identification.neural.posterior.network import (
+from identification.neural.demodulated import Demodulated, demodulate
+from identification.neural.posterior import (
     Posterior,
     TrainedPosterior,
     posteriors,
     read_trained,
     shipped_posteriors,
 )
-from identification.neural.posterior.rivals import Rivals
+from identification.neural.rivals import (
+    CAMPAIGN_NAMES,
+    Features,
+    Rivals,
+    campaign_features,
+    record_features,
+)
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
