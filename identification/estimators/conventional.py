@@ -18,8 +18,7 @@ from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, b
 from identification.estimators.run_by_run import Paired
 from identification.policy import LEAST_PROMINENCE
 from identification.signal.free_decay import Decay
-from identification.signal.frequency import psd_peak
-from identification.signal.peaks import PeakDecay, peak_decay
+from identification.signal.frequency import PeakDecay, peak_decay, psd_peak
 from identification.signal.run_fit import residual_check
 from identification.statistics import decay_covariance, deviations
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties

@@ -30,7 +30,7 @@ from identification.signal.decay_fit import Reading, RunFit, even_reading, proje
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay
 from identification.signal.noise import reading_noise
-from identification.signal.windows import CYCLES, modal_quantities
+from identification.signal.run_fit import CYCLES, modal_quantities
 from identification.statistics import WeightedFit, decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array

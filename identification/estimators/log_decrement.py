@@ -22,9 +22,8 @@ from identification.estimate import Status
 from identification.estimators.run_by_run import Found, RunByRun, run_estimate
 from identification.policy import LEAST_PEAK_HEIGHT
 from identification.signal.free_decay import Decay
-from identification.signal.frequency import starting_frequency
+from identification.signal.frequency import PEAK_HALF_WIDTH, follow_peaks, starting_frequency
 from identification.signal.noise import reading_noise
-from identification.signal.peaks import PEAK_HALF_WIDTH, follow_peaks
 from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array

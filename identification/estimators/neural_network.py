@@ -41,8 +41,7 @@ from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, 
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import holds_motion
 from identification.signal.noise import reading_noise
-from identification.signal.run_fit import residual_check
-from identification.signal.windows import modal_quantities
+from identification.signal.run_fit import modal_quantities, residual_check
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 

@@ -23,9 +23,8 @@ from scipy.special import chdtri
 
 from identification.policy import CLEAR_SWING, EQUAL_SWINGS, LEAST_SAMPLES, MISFIT_DEVIATIONS, MISFIT_RATE
 from identification.signal.decay_fit import Reading, RunFit, fit_run
-from identification.signal.frequency import starting_decay, starting_frequency
+from identification.signal.frequency import follow_peaks, starting_decay, starting_frequency
 from identification.signal.noise import reading_noise, white_noise
-from identification.signal.peaks import follow_peaks
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced

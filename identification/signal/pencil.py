@@ -1,15 +1,10 @@
 """The matrix pencil: poles of a damped oscillation from the shift of a Hankel matrix, and their covariance.
 
-Block means y of a decay are a sum of two exponentials λ₁ⁱ, λ₂ⁱ and a constant. Their Hankel matrix,
-with the mean of each row removed, has rank two. A shift by one block maps its column space onto itself, and this
-2×2 map has the eigenvalues λ. The two leading singular vectors of a long record are found by orthogonal iteration
-with products by FFT, so the cost grows as n log n.
-
-To first order δλ = qᴴ E v is linear in the noise's Hankel matrix E, so a convolution of q with v gives the
-weight of every block mean in δλ, and with it the covariance. Source: Hua & Sarkar, IEEE Trans. Acoust.
-Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027, which has the perturbation and the best pencil
-length; the rank reduction and the name ERA for it: Juang & Pappa, J. Guid. Control Dyn. 8 (1985) 620–627,
-doi 10.2514/3.20031.
+The Hankel matrix of a decay, with the mean of each row removed, has rank two. A shift by one value maps its
+column space onto itself, and the eigenvalues of this 2×2 map are the exponentials of the poles. The two leading
+singular vectors of a long record are found by orthogonal iteration with products by FFT. Sources: Hua & Sarkar,
+IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027 (perturbation, best length);
+Juang & Pappa, J. Guid. Control Dyn. 8 (1985) 620–627, doi 10.2514/3.20031 (rank reduction).
 """
 
 from __future__ import annotations
@@ -18,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.signal.free_decay import Decay
@@ -29,8 +23,6 @@ _LEAST_BLOCKS = 8
 _DENSE = 64  # values up to which a full decomposition is faster than the iteration, which noise alone slows
 _MAX_SWEEPS = 60
 _SETTLED = 1e-10  # change of the subspace in a sweep
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,33 +38,37 @@ class PencilDecay:
 
 
 def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | None:
-    """The decay of uniformly spaced values.
+    """The decay of uniformly spaced values; None where there are too few, or their poles are not those of a decay.
 
     Args:
         values: readings or block means of them, offset included, shape (n,), rad.
         interval: between them, s; well below half a period.
         omega: an approximate angular frequency to start the iteration, rad/s.
-
-    Returns:
-        The decay; None where there are too few values or their poles are not those of a decay.
     """
     if values.size < _LEAST_BLOCKS:
         return None
     rows = max(3, round(_LENGTH * values.size))
-    found = _leading_pair(values - values.mean(), rows, omega * interval)
-    if found is None:
+    left, sizes, right = _leading_pair(values - values.mean(), rows, omega * interval)
+    if not sizes[1] > 1e-12 * sizes[0] > 0.0:
         return None
-    left, sizes, right = found
     upper, lower = left[:-1], left[1:]
     solver = np.linalg.pinv(upper)
     poles, vectors = np.linalg.eig(solver @ lower)
-    exponents = _exponents(poles, interval)
-    if exponents is None or np.linalg.cond(vectors) > 1e8:
+    # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
+    if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)) or np.linalg.cond(vectors) > 1e8:
         return None
+    exponents = np.log(poles.astype(np.complex128)) / interval
     vectors = vectors.astype(np.complex128)
     duals = np.linalg.inv(vectors) @ solver
     images = right.astype(np.complex128) @ (vectors / sizes[:, None])
-    gradients = [_gradient(poles[i], duals[i], images[:, i]) / (poles[i] * interval) for i in (0, 1)]
+    gradients = []
+    for pole, dual, image in zip(poles, duals, images.T, strict=True):
+        # To first order δλ = Σᵢⱼ q(i) e(i + j) v(j) with the noise e: q is the shift's residual on the dual vector;
+        # the mean of v is removed, like that of the rows.
+        q = np.zeros(dual.size + 1, dtype=np.complex128)
+        q[1:] += dual
+        q[:-1] -= pole * dual
+        gradients.append(np.convolve(q, image - image.mean()) / (pole * interval))
     stiffness = exponents[0] * exponents[1]
     slope = np.array(
         [
@@ -84,27 +80,13 @@ def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | 
     return PencilDecay(decay, np.ascontiguousarray(slope.real))
 
 
-def _exponents(poles: Complex, interval: float) -> Complex | None:
-    # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
-    if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)):
-        return None
-    return np.asarray(np.log(poles.astype(np.complex128)) / interval)
-
-
-def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array, Array] | None:
-    # Left vectors (rows, 2), singular values (2,), right vectors (columns, 2) of the row-centred Hankel matrix.
+def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array, Array]:
+    """Left vectors (rows, 2), singular values (2,), right vectors (columns, 2) of the row-centred Hankel matrix."""
     columns = values.size - rows + 1
     if values.size <= _DENSE:
         hankel = sliding_window_view(values, columns)
         vectors, sizes, turn = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)
-        found = vectors[:, :2], sizes[:2], turn[:2].T
-    else:
-        found = _iterated_pair(values, rows, columns, angle)
-    sizes = found[1]
-    return found if sizes[1] > 1e-12 * sizes[0] > 0.0 else None
-
-
-def _iterated_pair(values: Array, rows: int, columns: int, angle: float) -> tuple[Array, Array, Array]:
+        return vectors[:, :2], sizes[:2], turn[:2].T
     size = next_fast_len(values.size, real=True)
     spectrum = rfft(values, size)[:, None]
 
@@ -124,12 +106,3 @@ def _iterated_pair(values: Array, rows: int, columns: int, angle: float) -> tupl
             break
     vectors, sizes, turn = np.linalg.svd(image, full_matrices=False)
     return left @ turn.T, sizes, vectors
-
-
-def _gradient(pole: complex, dual: Complex, right: Complex) -> Complex:
-    # δλ = Σᵢⱼ q(i) e(i + j) v(j): q is the shift's residual on the dual vector; the mean of v is removed, like
-    # that of the rows.
-    q = np.zeros(dual.size + 1, dtype=np.complex128)
-    q[1:] += dual
-    q[:-1] -= pole * dual
-    return np.asarray(np.convolve(q, right - right.mean()))
