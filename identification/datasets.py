@@ -84,15 +84,11 @@ def paper_springs() -> tuple[SpringRow, ...]:
 
 
 def paper_windows() -> tuple[WindowRow, ...]:
-    """Table III: damping and frequency of one wind-on run, three cycles at a time.
-
-    Returns:
-        Eight rows, in the order of time.
-    """
+    """Table III: damping and frequency of one wind-on run, three cycles at a time, in the order of time."""
+    rows = [(int(row["window"]), row) for row in _table("table3-windows.csv")]
     return tuple(
         WindowRow(number, float(row["zeta"]), float(row["omega_n_rad_per_s"]), _SECOND_READING.get(number))
-        for row in _table("table3-windows.csv")
-        for number in (int(row["window"]),)
+        for number, row in rows
     )
 
 
@@ -105,13 +101,9 @@ def paper_derivatives() -> tuple[DerivativeRow, ...]:
 
 
 def measured_campaign(name: str) -> Campaign:
-    """A packaged measured campaign.
+    """A packaged campaign of :data:`MEASURED_CAMPAIGNS`, angles in radians.
 
-    Args:
-        name: one of :data:`MEASURED_CAMPAIGNS`.
-
-    Returns:
-        The campaign, angles in radians. It states no spring stiffness, so only omega_n and zeta can be identified.
+    It states no spring stiffness, so only omega_n and zeta can be identified.
 
     Raises:
         TunnelError: there is no such campaign.

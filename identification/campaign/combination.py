@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from scipy.special import chdtri
@@ -15,16 +17,19 @@ from identification.campaign.derivatives import (
     derivatives,
     design_statuses,
     filled_estimate,
+    loads,
     noise_statuses,
     statuses_of_runs,
 )
 from identification.campaign.driven import gain_remark, is_remarked, joined_runs, run_remark, with_gains
-from identification.estimate import Estimate, RunEstimate, Status, by_severity
+from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
+from identification.signal.decay_fit import Reading, project_run
 from identification.signal.driven_fit import Gained
 from identification.signal.free_decay import Decay
+from identification.signal.run_fit import describe_run, noise_and_failure, residual_check
 from identification.statistics import determined, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
@@ -47,27 +52,19 @@ class RunDecay:
     covariance: Array | None = None
     gained: Gained | None = None
 
-    @classmethod
-    def failed(cls, run: Run, status: Status) -> RunDecay:
-        """A run without a result, and the reason."""
-        return cls(RunEstimate(run.id, (status,)))
-
 
 def combined_estimate(
     campaign: Campaign, name: str, found: Sequence[RunDecay], *, together: Combination | None = None
 ) -> Estimate:
     """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k).
 
-    Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio
-    of Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207.
+    Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio of
+    Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207. Runs without a result or a spring stiffness
+    are left out.
 
     Args:
         found: one per run, in the campaign's order.
         together: a method's own combination of the runs, which starts from that of least squares.
-
-    Returns:
-        The estimate. A run that could not be identified is left out; one without spring stiffness is identified
-        by itself only.
 
     Raises:
         TunnelError: when a wind-on run states no air density.
@@ -139,3 +136,64 @@ def _birge_ratio(design: Design, parameters: Array, decays: Array, informations:
     away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
     scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
     return scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
+
+
+Found: TypeAlias = RunDecay | Status
+"""The result for one run, or the status of its failure."""
+
+
+class RunByRun(ABC):
+    """An estimator that identifies each run by itself and then combines the runs."""
+
+    name: ClassVar[str]
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign from those that could be identified.
+
+        Raises:
+            TunnelError: a wind-on run states no air density; raised before any run is analysed.
+        """
+        for run in campaign.runs:
+            loads(run, campaign.rig)
+        pairs = [(run, self._run(run, campaign.sensor)) for run in campaign.runs]
+        found = [
+            RunDecay(RunEstimate(run.id, (one,))) if isinstance(one, Status) else one for run, one in pairs
+        ]
+        return combined_estimate(campaign, self.name, found, together=self._together(found))
+
+    @abstractmethod
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
+        """Identify one run."""
+
+    def _together(self, found: Sequence[RunDecay]) -> Combination | None:
+        """The method's own combination of the runs; None where it has none."""
+        del found
+        return None
+
+
+def run_estimate(
+    run: Run,
+    decay: Decay,
+    covariance: Array | None,
+    noise_std: float,
+    sensor: SensorProperties,
+    windows: tuple[WindowEstimate, ...] = (),
+) -> Found:
+    """The result of a method that does not judge the model: the least-squares residual does.
+
+    Args:
+        covariance: of (a, k) as the method gives it, shape (2, 2), in 1/s and 1/s²; None where it gives none.
+        noise_std: of one sample of the reading, rad.
+    """
+    reading = Reading.from_record(run.record)
+    projected = project_run(reading, decay)
+    if projected is None:
+        return Status.NOT_CONVERGED
+    _, failure = noise_and_failure(reading, *projected, sensor)
+    if failure is not None or covariance is None:
+        return failure or Status.NOT_CONVERGED
+    check = residual_check(run, decay, sensor)
+    noise = None if check is None else check.noise
+    covariance = covariance if check is None else check.widened(covariance)
+    estimate = describe_run(run, reading, *projected, covariance, noise_std**2, noise=noise, windows=windows)
+    return RunDecay(estimate, decay, covariance)

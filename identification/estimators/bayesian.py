@@ -31,10 +31,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from identification.campaign.combination import Combination, RunDecay
+from identification.campaign.combination import Combination, Found, RunByRun, RunDecay
 from identification.campaign.derivatives import Design
 from identification.estimate import NoiseLevel, Quantity, Status
-from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, fit_run, project_run
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import starting_decay

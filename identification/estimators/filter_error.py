@@ -16,9 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.campaign.combination import RunDecay
+from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import NoiseLevel, Quantity, Status
-from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
 from identification.signal.driven import driven_rows
 from identification.signal.driven_fit import DrivenRun, Gained, driven_run

@@ -1,19 +1,14 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-The analytic signal of a finite record is wrong near its ends, where the transform sees a discontinuity. So the
-record is first extended past both ends by a few cycles of an approximate decay that fades out; the remaining
-error is as small as that decay is accurate. The envelope is then demodulated with a fixed frequency and averaged
-over half cycles: for an exponential decay the averages are an exponential sequence again, and their errors are
-independent with 2 S²/m in each component for m samples.
+The analytic signal of a finite record is wrong near its ends. So the record is first extended past both ends by a
+few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency and averaged
+over half cycles: the averages of a decay are an exponential sequence again, with independent errors, √2 S/(√m A)
+of logarithm and phase alike for m samples. Where a line does not fit a run, its standard deviations are raised to
+the scatter about it.
 
-Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the noise:
-√2 S/(√m A) for the logarithm and the phase alike. Short parts of the same lines give ζ and ωn against the
-amplitude, the backbone of the rig, as the windows of the run. Where a line does not fit a run, its standard
-deviations are raised to the scatter about it.
-
-Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay
-by the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E.
-Cooper, J. Sound Vib. 348 (2015) 224–238, doi 10.1016/j.jsv.2015.03.025.
+Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay by
+the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper,
+J. Sound Vib. 348 (2015) 224–238, doi 10.1016/j.jsv.2015.03.025.
 """
 
 from __future__ import annotations
@@ -23,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len
 
+from identification.campaign.combination import Found, RunByRun, run_estimate
 from identification.estimate import Quantity, Status, WindowEstimate
-from identification.estimators.run_by_run import Found, RunByRun, run_estimate
 from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.signal.decay_fit import Reading, RunFit, even_reading, project_run
 from identification.signal.free_decay import Decay, free_decay
@@ -59,14 +54,11 @@ class Envelope:
 
 
 def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
-    """Envelope and phase of a record.
+    """Envelope and phase of a record: at least one average per half cycle.
 
     Args:
         rough: an approximate decay of the record, with its initial state; it must oscillate.
         zero: the sensor's, rad.
-
-    Returns:
-        At least one average per half cycle of the record.
     """
     from scipy.signal import hilbert  # only here: slow to load
 

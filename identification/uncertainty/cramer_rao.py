@@ -1,7 +1,7 @@
 """The Cramér–Rao bound: the smallest standard deviations any unbiased estimator can reach.
 
 Exact Fisher information of real damped sinusoids, and of motions under an input, in white Gaussian noise at given
-sample times, with their exact sensitivities. For long records of light damping it tends to
+sample times. For long records of light damping it tends to
 
     std(ζ)/ζ = 4 (S/A) √(σ/fs),   std(f)/f = ζ · std(ζ)/ζ,
 
@@ -86,8 +86,6 @@ def damped_sinusoid_bound(
     covariance[: len(kept), : len(kept)] = inverse(information[np.ix_(kept, kept)]) * noise_std**2
     # Rows: amplitude, phase, f, ωn, ζ, offset. Columns: a, k, angle, rate, offset.
     a, omega = decay.rate, decay.omega_n
-    omega_row = np.array([0.0, 0.5 / omega, 0.0, 0.0, 0.0])
-    zeta_row = np.array([1.0 / omega, -0.5 * a / omega**3, 0.0, 0.0, 0.0])
     damped_row = np.array([-a / omega_d, 0.5 / omega_d, 0.0, 0.0, 0.0])
     # In-phase part x = A cos φ is the angle, quadrature A sin φ = −(rate + a·angle)/ωd.
     in_phase, quadrature = amplitude * np.cos(phase), amplitude * np.sin(phase)
@@ -98,8 +96,8 @@ def damped_sinusoid_bound(
             (in_phase * x_row + quadrature * q_row) / amplitude,
             (in_phase * q_row - quadrature * x_row) / amplitude**2,
             damped_row / (2.0 * np.pi),
-            omega_row,
-            zeta_row,
+            np.array([0.0, 0.5 / omega, 0.0, 0.0, 0.0]),
+            np.array([1.0 / omega, -0.5 * a / omega**3, 0.0, 0.0, 0.0]),
             np.array([0.0, 0.0, 0.0, 0.0, 1.0]),
         ]
     )
@@ -122,14 +120,7 @@ class CampaignBound:
     covariance: tuple[tuple[float, ...], ...]
 
     def std(self, name: str) -> float:
-        """The smallest standard deviation of a parameter.
-
-        Args:
-            name: one of ``parameters``.
-
-        Raises:
-            KeyError: when the campaign does not determine it.
-        """
+        """The smallest standard deviation of a parameter; KeyError when the campaign does not determine it."""
         if name not in self.parameters:
             raise KeyError(name)
         place = self.parameters.index(name)
@@ -187,7 +178,13 @@ def campaign_bound(
     parameters: Array = np.linalg.lstsq(
         np.vstack(linked.links), np.array(truths, dtype=np.float64) / yaw_inertia, rcond=None
     )[0].astype(np.float64)
-    states = initial_states if initial_states is not None else _released(campaign)
+    states = initial_states
+    if states is None:
+        for run in runs:
+            if run.release_angle is None and run.drive is None:
+                remedy = "state release_angle or initial_states"
+                raise TunnelError("no initial state", where=f"run {run.id}", remedy=remedy)
+        states = [(run.release_angle or 0.0, 0.0) for run in runs]
     own = np.array([(0.0, angle, rate) for angle, rate in states])
     drifting = any(run.unrestrained for run in runs)
     filters = None
@@ -200,16 +197,6 @@ def campaign_bound(
     covariance = found.jacobian @ (inverse(information) * noise_std**2) @ found.jacobian.T
     names = tuple(name for name in PARAMETERS if name in found.names)
     return CampaignBound(names, tuple(map(tuple, covariance.tolist())))
-
-
-def _released(campaign: Campaign) -> list[tuple[float, float]]:
-    states = []
-    for run in campaign.runs:
-        if run.release_angle is None and run.drive is None:
-            where = f"run {run.id}"
-            raise TunnelError("no initial state", where=where, remedy="state release_angle or initial_states")
-        states.append((run.release_angle or 0.0, 0.0))
-    return states
 
 
 def _whitening(

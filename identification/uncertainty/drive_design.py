@@ -1,11 +1,9 @@
 """The drive that tells most about Cnβ and Cnr, of those that a plan can express and a rig allows.
 
 Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, in the noise of its sensor
-and in the random moment of the plan's buffeting. A stepped sine begins at the resonances and loses
-frequencies as long as that lowers the bound. Its frequencies, and the ends of a multisine and a chirp, are then
-moved one at a time. The best of these, of sines at the resonances and of a broad multisine is taken. The response
-is linear in the input, so that the amplitude follows from the limits. Optimal inputs for linear systems: Goodwin &
-Payne, Dynamic System Identification (1977), ch. 6.
+and in the random moment of the plan's buffeting. The response is linear in the input, so that the amplitude
+follows from the limits. Optimal inputs for linear systems: Goodwin & Payne, Dynamic System Identification (1977),
+ch. 6.
 """
 
 from __future__ import annotations
@@ -80,10 +78,19 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
         for c in plan.conditions
     )
     campaign = Campaign(plan.name, RigProperties.of(rig), SensorProperties.of(sensor), runs)
+    moments = None  # spectral intensity over the inertia at the natural frequency of each run, rad²/s³
+    if plan.effects:
+        from tunnel_sim.effects import effect_from  # only here: most plans have none
+
+        effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
+        if any(effect.random == "broad_band" for effect in effects):
+            moments = []
+            for condition in plan.conditions:
+                scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
+                rate = sqrt(_decay(plan, condition, rig)[1])
+                moments.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
     try:
-        bound = campaign_bound(
-            campaign, **asdict(plan.truth), noise_std=noise, random_moments=_random_moments(plan, rig)
-        )
+        bound = campaign_bound(campaign, **asdict(plan.truth), noise_std=noise, random_moments=moments)
     except np.linalg.LinAlgError:
         bound = CampaignBound((), ())
     if not {"cn_beta", "cn_r"} <= set(bound.parameters):
@@ -142,9 +149,9 @@ def within_limits(
     unit = driven_plan(document, drive.model_copy(update={"amplitudes_nm": [1.0]}), duration)
     plan = plan_from(unit, rig, document.name)
     largest = min(limits.moment, limits.angle / _peak_between_samples(plan, drive, rig))
-    return driven_plan(
-        document, drive.model_copy(update={"amplitudes_nm": [_rounded_down(largest)]}), duration
-    )
+    digit = 10.0 ** (_DIGITS - 1 - floor(log10(largest)))
+    rounded_down = floor(largest * digit) / digit
+    return driven_plan(document, drive.model_copy(update={"amplitudes_nm": [rounded_down]}), duration)
 
 
 def propose_drive(
@@ -156,15 +163,16 @@ def propose_drive(
     duration: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> PlanDocument:
-    """The driven plan whose bound is the lowest that the search finds.
+    """The driven plan, of one run for each spring and speed, whose bound is the lowest that the search finds.
+
+    A stepped sine begins at the resonances and loses frequencies as long as that lowers the bound. Its
+    frequencies, and the ends of a multisine and a chirp, are then moved one at a time. The best of these, of
+    sines at the resonances and of a broad multisine is taken.
 
     Args:
         document: of free decays; its conditions, sensor and truth are kept.
         duration: of each record, s; None: the plan's.
         progress: called after each input that was tried.
-
-    Returns:
-        A plan of one driven run for each spring and speed, by a moment on the body.
 
     Raises:
         TunnelError: as `plan_bound` and `peak_response`.
@@ -177,7 +185,12 @@ def propose_drive(
             "the wind overcomes the spring: a run has no resonance",
             remedy="lower wind_speeds, or stiffen springs",
         )
-    coarse = _thinned(document, _PER_CYCLE * _BROAD * resonances[-1])
+    coarse, rate = document, _PER_CYCLE * _BROAD * resonances[-1]
+    if rate < document.sample_rate:  # fewer readings of as much information
+        sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
+        noise = _noise(sensor) * sqrt(rate / document.sample_rate)
+        thin = SensorModelTable(sample_rate=rate, noise_std=noise, resolution=0.0)
+        coarse = document.model_copy(update={"sensor": thin})
     tried: dict[str, float] = {}
 
     def score(drive: DriveTable) -> float:
@@ -252,11 +265,6 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS + 1}g}")
 
 
-def _rounded_down(value: float) -> float:
-    unit = 10.0 ** (_DIGITS - 1 - floor(log10(value)))
-    return floor(value * unit) / unit
-
-
 def _score(unit: PlanDocument, rig: Rig, limits: Limits, goal: Goal) -> float:
     """Logarithm of Cnr's standard deviation or of the geometric mean of both; infinite for a refused input."""
     drive = unit.drive
@@ -288,16 +296,6 @@ def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> fl
     return peak_response(plan, rig) / max(cos(pi * fastest / plan.sensor.sample_rate), 0.5)
 
 
-def _thinned(document: PlanDocument, sample_rate: float) -> PlanDocument:
-    """The same plan with fewer readings of as much information."""
-    if sample_rate >= document.sample_rate:
-        return document
-    sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
-    noise = _noise(sensor) * sqrt(sample_rate / document.sample_rate)
-    thin = SensorModelTable(sample_rate=sample_rate, noise_std=noise, resolution=0.0)
-    return document.model_copy(update={"sensor": thin})
-
-
 def _noise(sensor: SensorModel) -> float:
     return hypot(sensor.noise_std, sensor.resolution / sqrt(12.0))
 
@@ -317,18 +315,3 @@ def _air(condition: Condition, rig: Rig) -> dict[str, float]:
         "frontal_area": rig.body.frontal_area,
         "reference_length": rig.body.length,
     }
-
-
-def _random_moments(plan: CampaignPlan, rig: Rig) -> list[float] | None:
-    """Spectral intensity of the buffeting of each run over the inertia, at its natural frequency, rad²/s³."""
-    from tunnel_sim.effects import effect_from  # only here: most plans have none
-
-    effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
-    if not any(effect.random == "broad_band" for effect in effects):
-        return None
-    found = []
-    for condition in plan.conditions:
-        scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
-        rate = sqrt(_decay(plan, condition, rig)[1])
-        found.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
-    return found
