@@ -95,7 +95,11 @@ def combined_estimate(
     if combined is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     parameters, covariance = combined
-    ratio = _birge_ratio(linked, parameters, decays, informations)
+    ratio, freedom = 1.0, sum(np.count_nonzero(weight.diagonal()) for weight in informations) - linked.size
+    if freedom > 0:
+        away = [decay - link @ parameters for decay, link in zip(decays, linked.links, strict=True)]
+        scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
+        ratio = scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
     if together is not None:
         parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
     size = design.size
@@ -127,15 +131,6 @@ def _own(pairs: Sequence[tuple[int, Run, RunDecay]], *, driven: bool) -> tuple[A
         information[:2, :2] = inverse(item.covariance)
         informations.append(information)
     return np.array(decays), informations
-
-
-def _birge_ratio(design: Design, parameters: Array, decays: Array, informations: Sequence[Array]) -> float:
-    freedom = sum(np.count_nonzero(weight.diagonal()) for weight in informations) - design.size
-    if freedom < 1:
-        return 1.0
-    away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
-    scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-    return scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
 
 
 Found: TypeAlias = RunDecay | Status

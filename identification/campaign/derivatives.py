@@ -113,9 +113,7 @@ def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
 def _within_range(name: str, value: float, unit: str, run: Run) -> None:
     if not 1.0 / _GREATEST < abs(value) < _GREATEST:
         raise TunnelError(
-            f"{name} = {value:g} {unit} is out of range",
-            where=f"run {run.id}",
-            remedy="correct its unit",
+            f"{name} = {value:g} {unit} is out of range", where=f"run {run.id}", remedy="correct its unit"
         )
 
 

@@ -98,43 +98,6 @@ def _outcome(pairing: _Pairing, frequency: Array, rate: Array, *, with_line: boo
     return np.concatenate(([inertia, damping], moments[0], moments[1]))
 
 
-def paired_estimate(
-    campaign: Campaign,
-    estimate: Estimate,
-    known: Sequence[tuple[PairedRun, tuple[float, float]]],
-    statuses: set[Status],
-) -> Estimate:
-    """The campaign's coefficients from its runs, each wind-on run against the wind-off runs of its spring.
-
-    Wind-on runs without a wind-off run of their spring, and runs without a stated spring, are left out.
-
-    Args:
-        known: the runs that could be identified, at least one, each with what `derivatives.loads` gives.
-        statuses: found so far.
-    """
-    sprung = [(one, load) for one, load in known if one.run.spring_stiffness is not None]
-    if any(run.spring_stiffness is None for run in campaign.runs):
-        statuses = statuses | {Status.NO_STIFFNESS}
-    if not sprung:
-        return replace(estimate, statuses=by_severity(statuses))
-    statuses = set(statuses)
-    pairing = _pair(sprung)
-    windy = sum(one.run.wind_on for one, _ in sprung)
-    if windy == 0:
-        statuses.add(Status.NO_WIND_ON)
-    if len(pairing.on) < windy:
-        statuses.add(Status.NO_WIND_OFF_PAIR)
-    if windy and not has_size(campaign.rig):
-        statuses.add(Status.NO_REFERENCE_SIZE)
-    if not pairing.off:
-        return replace(estimate, statuses=by_severity(statuses))
-    seen = [one for one, _ in sprung]
-    line = wind_off(estimate.runs, campaign.runs)
-    if line["wind_off_inertia"] is None:
-        return replace(estimate, statuses=by_severity(statuses | {Status.INERTIA_NOT_POSITIVE}))
-    return _filled(replace(estimate, statuses=by_severity(statuses), **line), pairing, seen, campaign.rig)
-
-
 def _mean_std(values: Array) -> float:
     # Of the mean, from the scatter; 0 for too few values, so that the propagated one is used.
     if values.size < LEAST_FOR_SCATTER:
@@ -181,7 +144,7 @@ def _filled(estimate: Estimate, pairing: _Pairing, seen: Sequence[PairedRun], ri
         for name, value, std in zip(names, jacobian @ centre, stds, strict=True)
     }
     values, stds = centre.tolist(), np.linalg.norm(moves, axis=1).tolist()
-    air = {
+    air: dict[str, dict[str, Any]] = {
         seen[i].run.id: {
             "aerodynamic_stiffness": Quantity(values[2 + k], stds[2 + k], "N m/rad"),
             "aerodynamic_damping": Quantity(values[2 + count + k], stds[2 + count + k], "N m s/rad"),
@@ -205,6 +168,8 @@ class Paired(ABC):
     def estimate(self, campaign: Campaign) -> Estimate:
         """Identify every run, then the campaign by pairs of wind-on and wind-off runs of a spring.
 
+        Wind-on runs without a wind-off run of their spring, and runs without a stated spring, are left out.
+
         Raises:
             TunnelError: a wind-on run states no air density; raised before any run is analysed.
         """
@@ -218,7 +183,26 @@ class Paired(ABC):
         statuses = of_runs & {Status.MODEL_DEPARTS, Status.NOISE_DISAGREES}
         if len(known) < len(found):
             statuses.add(Status.RUN_LEFT_OUT)
-        return paired_estimate(campaign, estimate, known, statuses)
+        if any(run.spring_stiffness is None for run in campaign.runs):
+            statuses.add(Status.NO_STIFFNESS)
+        sprung = [(one, load) for one, load in known if one.run.spring_stiffness is not None]
+        if not sprung:
+            return replace(estimate, statuses=by_severity(statuses))
+        pairing = _pair(sprung)
+        windy = sum(one.run.wind_on for one, _ in sprung)
+        if windy == 0:
+            statuses.add(Status.NO_WIND_ON)
+        if len(pairing.on) < windy:
+            statuses.add(Status.NO_WIND_OFF_PAIR)
+        if windy and not has_size(campaign.rig):
+            statuses.add(Status.NO_REFERENCE_SIZE)
+        line = wind_off(estimate.runs, campaign.runs)
+        if pairing.off and line["wind_off_inertia"] is None:
+            statuses.add(Status.INERTIA_NOT_POSITIVE)
+        estimate = replace(estimate, statuses=by_severity(statuses))
+        if not pairing.off or line["wind_off_inertia"] is None:
+            return estimate
+        return _filled(replace(estimate, **line), pairing, [one for one, _ in sprung], campaign.rig)
 
     @abstractmethod
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:

@@ -125,10 +125,7 @@ class DecayPosterior:
         decays = self.centre[:, None] + self.scale @ _points(fine)
         real = decays[1] > 0.0
         omega = np.sqrt(decays[1][real])
-        return (
-            _summary(omega, weights[real]),
-            _summary(decays[0][real] / omega, weights[real]),
-        )
+        return (_summary(omega, weights[real]), _summary(decays[0][real] / omega, weights[real]))
 
 
 def posterior_of(

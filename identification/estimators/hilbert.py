@@ -118,8 +118,32 @@ class Hilbert(RunByRun):
             decay, covariance = lines
         if seen is None or decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
-        windows = () if covariance is None else _backbone(seen, noise_std, self.cycles_per_window)
-        return run_estimate(run, decay, covariance, noise_std, sensor, windows)
+        windows: list[WindowEstimate] = []  # lines through consecutive parts of the envelope
+        length = 2 * self.cycles_per_window  # two averages per cycle
+        deviation = noise_std * np.sqrt(2.0 / seen.samples)
+        last = seen.time.size - length if covariance is not None and length else -1
+        for begin in range(0, last + 1, length or 1):
+            part = slice(begin, begin + length)
+            amplitude = float(np.exp(np.log(seen.amplitude[part]).mean()))
+            if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
+                break
+            pair = _two_lines(seen, part, np.full(length, deviation / amplitude))
+            own, own_covariance = _decay(seen, *pair)
+            if own.stiffness <= 0.0:
+                break
+            step = float(seen.time[1] - seen.time[0])
+            omega_n, zeta = modal_quantities(own, own_covariance)
+            windows.append(
+                WindowEstimate(
+                    start_s=float(seen.time[begin] - 0.5 * step),
+                    duration_s=length * step,
+                    amplitude=Quantity(amplitude, float(deviation / np.sqrt(length)), "rad"),
+                    omega_n=omega_n,
+                    zeta=zeta,
+                    cycles=self.cycles_per_window,
+                )
+            )
+        return run_estimate(run, decay, covariance, noise_std, sensor, tuple(windows))
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
@@ -152,31 +176,3 @@ def _decay(seen: Envelope, logarithm: WeightedFit, phase: WeightedFit) -> tuple[
         rate, omega_d, float(logarithm.covariance[1, 1]), float(phase.covariance[1, 1])
     )
     return Decay(rate, omega_d**2 + rate**2), covariance
-
-
-def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEstimate, ...]:
-    # Lines through consecutive parts of the envelope; two averages per cycle.
-    windows: list[WindowEstimate] = []
-    length = 2 * cycles
-    deviation = noise_std * np.sqrt(2.0 / seen.samples)
-    step = float(seen.time[1] - seen.time[0])
-    for begin in range(0, seen.time.size - length + 1, length or 1):
-        part = slice(begin, begin + length)
-        amplitude = float(np.exp(np.log(seen.amplitude[part]).mean())) if length else 0.0
-        if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
-            break
-        decay, covariance = _decay(seen, *_two_lines(seen, part, np.full(length, deviation / amplitude)))
-        if decay.stiffness <= 0.0:
-            break
-        omega_n, zeta = modal_quantities(decay, covariance)
-        windows.append(
-            WindowEstimate(
-                start_s=float(seen.time[begin] - 0.5 * step),
-                duration_s=length * step,
-                amplitude=Quantity(amplitude, float(deviation / np.sqrt(length)), "rad"),
-                omega_n=omega_n,
-                zeta=zeta,
-                cycles=cycles,
-            )
-        )
-    return tuple(windows)

@@ -36,13 +36,7 @@ from identification.neural.posterior import (
     read_trained,
     shipped_posteriors,
 )
-from identification.neural.rivals import (
-    CAMPAIGN_NAMES,
-    Features,
-    Rivals,
-    campaign_features,
-    record_features,
-)
+from identification.neural.rivals import CAMPAIGN_NAMES, Features, Rivals, campaign_features, record_features
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
 from identification.signal.noise import stated_noise
 from identification.statistics import inverse

@@ -220,38 +220,39 @@ def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     the rest is longer than the motion. A rest is left where it is unless that is so and it is off the centre
     beyond chance.
     """
-    found = [_without_rest(run, campaign.sensor) for run in campaign.runs]
-    remarks = tuple(remark for _, remark in found if remark is not None)
-    return (replace(campaign, runs=tuple(run for run, _ in found)) if remarks else campaign), remarks
-
-
-def _without_rest(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | None]:
-    record, resolution = run.record, sensor.resolution or 0.0
-    time, yaw = record.time_s, record.yaw_rad
-    if not float(np.abs(yaw).max()) < _SQUARABLE:
-        return run, None  # refused later, for what it is
-    last = float(np.median(yaw[-max(yaw.size // 20, 1) :]))
-    near = max(_RESTING * float(np.abs(yaw - last).max()), resolution, 5.0 * reading_noise(record, sensor))
-    moving = np.flatnonzero(np.abs(yaw - last) > near)
-    if moving.size < LEAST_SAMPLES or 2 * int(moving[-1]) >= yaw.size:
-        return run, None
-    end = int(moving[-1]) + 1
-    centre = centre_of(replace(run, record=Record(time[:end], yaw[:end])), resolution)
-    frequency = starting_frequency(Record(time[:end], yaw[:end]))
-    if centre is None or frequency is None:
-        return run, None
-    early, late = (float(half.mean()) for half in np.array_split(yaw[end:], 2))
-    off = abs(0.5 * (early + late) - centre.zero)
-    if off < MISFIT_DEVIATIONS * centre.std or abs(late - early) > _SETTLED * off:
-        return run, None
-    kept = int(np.searchsorted(time, time[end] + _KEPT / frequency))
-    if kept >= yaw.size:
-        return run, None
-    remark = Remark(
-        Outcome.CUT,
-        (run.id,),
-        f"at rest from {time[end]:.3f} s on, {off:.2g} {sensor.unit} beside the centre of the motion; the record "
-        f"is used up to {time[kept]:.3f} s",
-        "cut the record by hand if that is wrong",
-    )
-    return replace(run, record=Record(time[:kept], yaw[:kept])), remark
+    shorter: dict[str, Run] = {}
+    remarks = []
+    for run in campaign.runs:
+        record, resolution = run.record, campaign.sensor.resolution or 0.0
+        time, yaw = record.time_s, record.yaw_rad
+        if not float(np.abs(yaw).max()) < _SQUARABLE:
+            continue  # refused later, for what it is
+        last = float(np.median(yaw[-max(yaw.size // 20, 1) :]))
+        near = max(
+            _RESTING * float(np.abs(yaw - last).max()),
+            resolution,
+            5.0 * reading_noise(record, campaign.sensor),
+        )
+        moving = np.flatnonzero(np.abs(yaw - last) > near)
+        if moving.size < LEAST_SAMPLES or 2 * int(moving[-1]) >= yaw.size:
+            continue
+        end = int(moving[-1]) + 1
+        centre = centre_of(replace(run, record=Record(time[:end], yaw[:end])), resolution)
+        frequency = starting_frequency(Record(time[:end], yaw[:end]))
+        if centre is None or frequency is None:
+            continue
+        early, late = (float(half.mean()) for half in np.array_split(yaw[end:], 2))
+        off = abs(0.5 * (early + late) - centre.zero)
+        if off < MISFIT_DEVIATIONS * centre.std or abs(late - early) > _SETTLED * off:
+            continue
+        kept = int(np.searchsorted(time, time[end] + _KEPT / frequency))
+        if kept >= yaw.size:
+            continue
+        what = (
+            f"at rest from {time[end]:.3f} s on, {off:.2g} {campaign.sensor.unit} beside the centre of the motion; "
+            f"the record is used up to {time[kept]:.3f} s"
+        )
+        remarks.append(Remark(Outcome.CUT, (run.id,), what, "cut the record by hand if that is wrong"))
+        shorter[run.id] = replace(run, record=Record(time[:kept], yaw[:kept]))
+    runs = tuple(shorter.get(run.id, run) for run in campaign.runs)
+    return (replace(campaign, runs=runs) if remarks else campaign), tuple(remarks)

@@ -175,7 +175,16 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     cycles = length * float(np.median(windows.frequency))
     changes = (abs(slope) + MISFIT_DEVIATIONS * std) * length
     if cycles >= LEAST_STEADY_CYCLES and max(changes, np.log(windows.amplitude).std()) < STEADY_CHANGE:
-        return None, _steady_remark(run, windows)
+        amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
+        what = (
+            f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
+            f"{significant(frequency, 3)} Hz for {length * frequency:.0f} cycles (its amplitude changes by "
+            f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
+            "which has no damping ratio"
+        )
+        remedy = "record its growth from rest, or a decay at a lower wind speed"
+        figures = {"kind": "steady", "settled_rad": amplitude, **windows.figures()}
+        return None, Remark(Outcome.LEFT_OUT, (run.id,), what, remedy, figures)
     # Whether the last quarter's power exceeds the first one's beyond what the envelope of a buffeted rig does. A
     # window's power is then exponentially distributed: χ² of two degrees of freedom.
     quarter = windows.amplitude.size // 4
@@ -184,7 +193,13 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     )
     if not fdtrc(2 * quarter, 2 * quarter, last / first) < REFUSAL_RATE:
         return run, None
-    settled = _settled_from(windows)
+    # First window of the limit cycle; None where the amplitude still grows at the end.
+    below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
+    start, settled = int(below[-1]) + 1 if below.size else 0, None
+    if windows.time.size - start >= LEAST_GROWTH_WINDOWS:
+        slope, std = _slope(windows.time[start:], windows.amplitude[start:])
+        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:start].max(initial=0.0)):
+            settled = start
     limit = np.inf if settled is None else LINEAR_SHARE * _last(windows.amplitude)
     # From the smallest amplitude to the last window below the limit, rad.
     above = np.flatnonzero(windows.amplitude > limit)
@@ -237,36 +252,6 @@ def _slope(time: Array, amplitude: Array) -> tuple[float, float]:
     """Rate of the amplitude's logarithm and its standard deviation by the scatter, 1/s."""
     (slope, _), covariance = np.polyfit(time, np.log(amplitude), 1, cov=True)
     return float(slope), float(np.sqrt(covariance[0, 0]))
-
-
-def _settled_from(windows: AmplitudeWindows) -> int | None:
-    """First window of the limit cycle; None where the amplitude still grows at the end."""
-    below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
-    first = int(below[-1]) + 1 if below.size else 0
-    if windows.time.size - first < LEAST_GROWTH_WINDOWS:
-        return None
-    slope, std = _slope(windows.time[first:], windows.amplitude[first:])
-    return (
-        first
-        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:first].max(initial=0.0))
-        else None
-    )
-
-
-def _steady_remark(run: Run, windows: AmplitudeWindows) -> Remark:
-    slope, std = _slope(windows.time, windows.amplitude)
-    amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
-    cycles = np.ptp(windows.time) * frequency
-    return Remark(
-        Outcome.LEFT_OUT,
-        (run.id,),
-        f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
-        f"{significant(frequency, 3)} Hz for {cycles:.0f} cycles (its amplitude changes by "
-        f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
-        "which has no damping ratio",
-        "record its growth from rest, or a decay at a lower wind speed",
-        {"kind": "steady", "settled_rad": amplitude, **windows.figures()},
-    )
 
 
 def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, settled: int | None) -> Remark:

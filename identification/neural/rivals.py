@@ -325,10 +325,7 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
 
 
 def campaign_features(
-    runs: Sequence[Run],
-    seen: Sequence[Demodulated],
-    design: Design,
-    alone: Sequence[Rivals],
+    runs: Sequence[Run], seen: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
 ) -> Features | None:
     """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs determine no coefficient.
 

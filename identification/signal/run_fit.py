@@ -12,14 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.estimate import (
-    NoiseLevel,
-    Quantity,
-    RunEstimate,
-    Status,
-    WindowEstimate,
-    by_severity,
-)
+from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import FEW_CYCLES, LEAST_ENERGY, LEAST_WINDOW_ENERGY
 from identification.signal.decay_fit import (
     ANGLE,

@@ -105,7 +105,7 @@ def load_uncertainties(path: Path) -> InputUncertainties:
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
-    missing, where = "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md", shown(path)
+    where, missing = shown(path), "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md"
     document = read_document(_Document, path, missing=missing)
     common = {name: value for name, value in document.common.model_dump().items() if value > 0.0}
     individual = {name: value for name, value in document.individual.model_dump().items() if value > 0.0}
@@ -171,12 +171,11 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """The budget of an estimate.
+    """The budget of an estimate, noise first.
 
     Args:
         names: of p quantities: the estimate's parameters, and ``wind_off_inertia``.
         values: shape (p,).
-        components: noise first.
     """
 
     names: tuple[str, ...]
@@ -191,8 +190,7 @@ class Budget:
 
     def std(self, name: str) -> float:
         """Combined standard uncertainty of a quantity, in its unit."""
-        place = self.names.index(name)
-        return sqrt(float(self.covariance[place, place]))
+        return sqrt(float(self.covariance.diagonal()[self.names.index(name)]))
 
     def share(self, component: Component, name: str) -> float:
         """Share of a component of the budget in the variance of a quantity, as a fraction."""
@@ -470,7 +468,11 @@ def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
 
 
 def with_scaled_input(run: Run, name: str, factor: float) -> Run:
-    """A run with one stated input, by its name, multiplied by a factor (1); the same run where it states none."""
+    """A run with one stated input changed; the same run where it states none.
+
+    Args:
+        factor: what the input is multiplied by (1).
+    """
     value = getattr(run, name)
     changed: dict[str, Any] = {} if value is None else {name: value * factor}
     return replace(run, **changed)

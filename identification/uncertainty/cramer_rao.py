@@ -24,7 +24,7 @@ from identification.signal.driven_fit import normal_equations
 from identification.signal.filter import discretised, steady_filters
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -189,26 +189,20 @@ def campaign_bound(
     drifting = any(run.unrestrained for run in runs)
     filters = None
     if random_moments is not None:
-        coefficients = np.array([link[:2] @ parameters for link in linked.links])
-        filters = _whitening(runs, coefficients, np.asarray(random_moments), noise_std**2)
+        # From readings to innovations, of the variance of a reading.
+        dynamics, drive = np.zeros((2, len(runs), 2, 2))
+        dynamics[:, 0, 1] = 1.0
+        for of_run, link in zip(dynamics, linked.links, strict=True):
+            rate, stiffness = link[:2] @ parameters
+            of_run[1] = -stiffness, -2.0 * rate
+        drive[:, 1, 1] = random_moments
+        interval = np.array([run.record.duration / (run.record.time_s.size - 1) for run in runs])
+        variance = noise_std**2
+        steady = steady_filters(*discretised(dynamics, drive, interval), np.full(len(runs), variance))
+        filters = [(numerator * np.sqrt(variance / spread), poles) for numerator, poles, spread in steady]
     normal = normal_equations(runs, linked.links, parameters, own, own_zeros=drifting, filters=filters)[1]
     information, _ = eliminate(normal, np.zeros(len(normal)), design.size)
     found = derivatives(design, parameters[: design.size])
     covariance = found.jacobian @ (inverse(information) * noise_std**2) @ found.jacobian.T
     names = tuple(name for name in PARAMETERS if name in found.names)
     return CampaignBound(names, tuple(map(tuple, covariance.tolist())))
-
-
-def _whitening(
-    runs: Sequence[Run], coefficients: Array, intensities: Array, variance: float
-) -> list[tuple[Array, Array]]:
-    """The runs' filters from readings to innovations, of the variance of a reading; coefficients (a, k) by run."""
-    dynamics, drive = np.zeros((2, len(runs), 2, 2))
-    dynamics[:, 0, 1] = 1.0
-    dynamics[:, 1, 0], dynamics[:, 1, 1] = -coefficients[:, 1], -2.0 * coefficients[:, 0]
-    drive[:, 1, 1] = intensities
-    interval = np.array([run.record.duration / (run.record.time_s.size - 1) for run in runs])
-    steady = steady_filters(*discretised(dynamics, drive, interval), np.full(len(runs), variance))
-    return [
-        (numerator * np.sqrt(variance / spread), denominator) for numerator, denominator, spread in steady
-    ]

@@ -196,7 +196,7 @@ def propose_drive(
     def score(drive: DriveTable) -> float:
         key = drive.model_dump_json()
         if key not in tried:
-            tried[key] = _score(driven_plan(coarse, drive, length), rig, limits, goal)
+            tried[key] = _score(driven_plan(coarse, drive, length), drive, rig, limits, goal)
             progress()
         return tried[key]
 
@@ -265,10 +265,8 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS + 1}g}")
 
 
-def _score(unit: PlanDocument, rig: Rig, limits: Limits, goal: Goal) -> float:
+def _score(unit: PlanDocument, drive: DriveTable, rig: Rig, limits: Limits, goal: Goal) -> float:
     """Logarithm of Cnr's standard deviation or of the geometric mean of both; infinite for a refused input."""
-    drive = unit.drive
-    assert drive is not None
     try:
         check_drive(drive, unit.samples, unit.sample_rate, unit.name)
     except TunnelError:
@@ -279,9 +277,8 @@ def _score(unit: PlanDocument, rig: Rig, limits: Limits, goal: Goal) -> float:
     if goal == "cn_r":
         return log(bound.std("cn_r")) - log(amplitude)
     places = [bound.parameters.index(name) for name in ("cn_beta", "cn_r")]
-    return 0.25 * float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1]) - log(
-        amplitude
-    )
+    volume = float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1])
+    return 0.25 * volume - log(amplitude)
 
 
 def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> float:
