@@ -1,13 +1,10 @@
 """Filter error: maximum likelihood with a random moment on the model and noise in the sensor.
 
-This is for runs in a turbulent stream. There the motion departs randomly from the decay, so the residual of
-output error is not white and its intervals are too narrow or, after widening, too wide. Here a Kalman filter
-predicts every sample from the previous ones, and decay rate, stiffness and intensity of the moment maximise the
-likelihood of the prediction errors; the initial state and the sensor's zero are fitted by least squares. For a
-run without a random moment the result is that of output error. The input of a driven run is exact between its
-samples; for a body without a spring no random moment is sought. Sources: Maine & Iliff, SIAM J. Appl. Math. 41
-(1981) 558–579, doi 10.1137/0141046; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
-10.2514/4.102790.
+This is for runs in a turbulent stream, where the residual of output error is not white and its intervals are too
+narrow or, after widening, too wide. A Kalman filter predicts every sample from the previous ones, and decay rate,
+stiffness and intensity of the moment maximise the likelihood of the prediction errors
+(`identification.signal.filter`). For a run without a random moment the result is that of output error; for a body
+without a spring no random moment is sought.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.campaign.combination import driven_estimate
 from identification.campaign.derivatives import (
     build_design,
     combine,
@@ -23,7 +24,6 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.driven import driven_estimate
 from identification.estimate import Estimate, Quantity, Status, by_severity
 from identification.signal.decay_fit import fit_decays
 from identification.signal.driven_fit import driven_run

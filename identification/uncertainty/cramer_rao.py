@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.campaign.combination import with_gains
 from identification.campaign.derivatives import build_design, derivatives, has_size
-from identification.campaign.driven import with_gains
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import information_at
 from identification.signal.driven_fit import normal_equations
