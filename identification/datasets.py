@@ -33,7 +33,6 @@ class SpringRow:
     """One spring of Table II, measured with the wind off.
 
     Args:
-        number: of the spring.
         stiffness_n_m_per_rad: Kr, N m/rad.
         frequency_hz: of the free oscillation, Hz.
     """
@@ -65,7 +64,6 @@ class DerivativeRow:
     """One row of Table IV.
 
     Args:
-        method: ``neural network`` or ``conventional``.
         cn_beta_per_rad: Cnβ, 1/rad; positive lowers the frequency.
         cn_r_per_rad: Cnr, 1/rad; negative adds damping.
     """

@@ -96,12 +96,7 @@ def with_std(value: float, std: float | None) -> str:
 
 
 def concise(value: float, std: float | None) -> str:
-    """As `with_std` in the short notation of metrology, such as ``0.4951(12)``, for narrow columns.
-
-    Args:
-        value: the estimate, any unit.
-        std: its standard deviation, in the same unit; None where it is not known.
-    """
+    """The short notation of metrology, such as ``0.4951(12)``, for narrow columns: arguments as in `with_std`."""
     special = _special(value, std)
     if special or std is None:
         return special
@@ -165,7 +160,6 @@ def estimated(given: Mapping[str, Any], mark: str = "") -> str:
         given: value, std and unit; ``bound`` where it stopped at the end of its range, ``determined`` where it is
             false, and ``interval`` where that is not value ± 1.96 std. A std of zero means that the value was
             given, not fitted.
-        mark: of the unit, where it is to be shown.
     """
     if not given.get("determined", True):
         return UNDETERMINED
@@ -186,11 +180,7 @@ UNDETERMINED = "not determined by these runs"
 
 
 def p_text(value: float) -> str:
-    """A p-value, never rounded to 0: two significant digits, such as ``= 3.7e-08``, or ``< 1e-300``.
-
-    Args:
-        value: a probability.
-    """
+    """The text of a probability, never rounded to 0: such as ``= 3.7e-08``, or ``< 1e-300``."""
     return f"= {value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
 
 

@@ -32,7 +32,6 @@ class ScoredEstimate:
 
     Args:
         truth: true value, in the quantity's unit.
-        found: the estimate; None where the method failed.
         bound: smallest standard deviation any unbiased estimator can have, in the same unit; None where not
             known.
     """
@@ -109,7 +108,6 @@ class Score:
     """The figures of a method, each with its standard error; None where fewer than two trials gave an estimate.
 
     Args:
-        failures: those without an estimate.
         bias: mean error, in the quantity's unit.
         relative_bias: mean of error over the size of the truth, %; None where a truth is zero.
         bias_in_stds: mean of error over the reported standard deviation; None where one of these is zero.
@@ -211,14 +209,11 @@ class Change:
 
 
 def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ...]:
-    """Every aspect of a method over one cell, or over several together.
+    """Every aspect of a method over one cell, or over several together; the baseline's trials come first.
 
     ``bias`` is the mean error, worse when it moves away from zero; ``spread`` the root mean square error;
     ``outliers`` the share of errors beyond six medians of their size; ``coverage`` that of 95 % intervals, worse
     further from 95 %.
-
-    Args:
-        before: the baseline's trials, one entry per cell.
 
     Raises:
         ValueError: when the cells differ in number, or a bound is known on one side only.
@@ -250,7 +245,6 @@ def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool
     """Which of several tests are significant, by S. Holm, Scand. J. Stat. 6 (1979) 65–70.
 
     Args:
-        p_values: one per test.
         rate: probability of at least one false alarm among them.
     """
     order = sorted(range(len(p_values)), key=p_values.__getitem__)

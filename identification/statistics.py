@@ -33,7 +33,6 @@ def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array
     Args:
         information: shape (m, m).
         score: shape (m,).
-        keep: how many unknowns to keep.
     """
     cross = information[keep:, :keep]
     solved = scaled_solve(information[keep:, keep:], np.column_stack((cross, score[keep:])))
@@ -67,10 +66,7 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
 
 
 def inverse(information: Array) -> Array:
-    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
-
-    Args:
-        information: shape (m, m).
+    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit, shape (m, m).
 
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
@@ -80,13 +76,10 @@ def inverse(information: Array) -> Array:
 
 
 def determined(matrix: Array) -> bool:
-    """Whether a symmetric matrix is positive definite to working precision, whatever the units of its unknowns.
+    """Whether a symmetric matrix, shape (m, m), is positive definite to working precision, whatever its units.
 
     An information matrix is checked before it is inverted, and a covariance before it is used. With a condition
     number above 1e13, after scaling to a unit diagonal, the inverse holds less than three correct digits.
-
-    Args:
-        matrix: shape (m, m).
     """
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix).all() and diagonal.min() > _SMALLEST and diagonal.max() < 1.0 / _SMALLEST):
@@ -101,7 +94,6 @@ def embed(link: Array, *, with_zero: bool) -> Array:
 
     Args:
         link: from the shared parameters to (a, k), shape (2, p).
-        with_zero: whether the zero is among the shared parameters.
     """
     if not with_zero:
         return link

@@ -111,7 +111,6 @@ def update_belief(
     """The posterior after all runs of a campaign: one joint fit with the prior, not run by run.
 
     Args:
-        links: one per run, see `run_link`.
         runs: readings and their own fits, which only start the joint one.
         noise_std: of the reading, quantisation included, rad.
 
@@ -205,7 +204,6 @@ def linear_run(
     Args:
         link: from φ to (a, k), shape (2, 4).
         time: its sample times since the release, shape (n,), s.
-        decay: the true one.
         angle: of the release, rad.
         zero: the true one, rad.
         noise: of the reading, shape (n,), rad.

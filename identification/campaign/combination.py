@@ -49,8 +49,6 @@ class RunDecay:
     """The result of a method for one run alone.
 
     Args:
-        estimate: the run's result, or the status of its failure.
-        decay: decay rate and stiffness; None where the run could not be identified.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None where decay is.
         gained: of a driven run, (a, k, g) with the gain g of its input per unit inertia, and its information.
     """
@@ -71,7 +69,6 @@ def combined_estimate(
     are left out.
 
     Args:
-        found: one per run, in the campaign's order.
         together: a method's own combination of the runs, which starts from that of least squares.
 
     Raises:
@@ -213,9 +210,7 @@ def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statu
     gain, and what a body without a spring shows, are remarks.
 
     Args:
-        estimate: with the results of the runs.
         pairs: every run and its own fit, which starts the joint one.
-        statuses: of the campaign, from its runs.
     """
     statuses = statuses | noise_statuses([item.noise for _, item in pairs])
     fitted = [(run, item) for run, item in pairs if item.fit is not None]

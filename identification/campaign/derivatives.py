@@ -48,7 +48,6 @@ class Design:
         columns: places of g, n, d, m in φ; only of those that the campaign separates.
         stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
         damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
-        has_size: whether the rig states A and l.
     """
 
     links: tuple[Array, ...]
@@ -228,7 +227,6 @@ def filled_estimate(
     given.
 
     Args:
-        runs: those that the design links.
         covariance: of the values found, shape (p, p).
     """
     air: dict[str, dict[str, Any]] = {}  # stiffness and damping of the air in every wind-on run

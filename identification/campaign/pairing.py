@@ -38,7 +38,6 @@ class PairedRun:
         frequency_std: its standard deviation, Hz.
         rate: decay rate σ = ζωn, 1/s.
         rate_std: its standard deviation, 1/s.
-        omega_n: natural angular frequency, rad/s.
     """
 
     run: Run
@@ -56,9 +55,6 @@ class _Pairing:
     Args:
         stiffness: Kr, N m/rad, shape (r,).
         loads: factors of Cnβ and Cnr, shape (r, 2).
-        off: places of the wind-off runs.
-        on: places of the wind-on runs that have a wind-off run of their spring.
-        partners: per place in ``on``, the places of those wind-off runs.
     """
 
     stiffness: Array

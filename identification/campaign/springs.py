@@ -28,7 +28,6 @@ class SpringFit:
         inertia: its gradient Izz, kg m².
         intercept: N m/rad.
         residual_percent: stated stiffness over the line's, less one, per spring, %.
-        flagged: whether a spring is an outlier.
         p_value: probability that correct springs deviate at least as much as this set.
     """
 

@@ -52,7 +52,6 @@ class NoiseKnowledge:
 
     Args:
         variance: S² of one value of the reading, rad²; None where it is unknown and integrated out.
-        samples: number of samples behind one value.
         within: sum of squares within the blocks, rad², which thinning removes from the residual.
         freedom: ν, number of samples less that of linear unknowns.
     """
@@ -92,11 +91,7 @@ class DecayPosterior:
         return self.centre + self.scale @ mean, self.scale @ covariance @ self.scale.T
 
     def log_likelihood_at(self, decays: Array) -> Array:
-        """ℓ(a, k), shape (n,), for combining runs; beyond the grid it falls like a normal distribution.
-
-        Args:
-            decays: shape (n, 2), 1/s and 1/s².
-        """
+        """ℓ of decays (a, k), shape (n, 2), 1/s and 1/s²; beyond the grid it falls like a normal distribution."""
         z = np.linalg.solve(self.scale, (decays - self.centre).T)
         edge = float(self.axis[-1])
         inside = np.clip(z, -edge, edge)
@@ -123,8 +118,6 @@ def posterior_of(
     None where the record is too short to bound the decay.
 
     Args:
-        thin: the run, or block means of it.
-        start: of the grid, near the posterior's peak.
         covariance: a guess at that of (a, k), shape (2, 2).
     """
     centre, spread = np.array([start.rate, start.stiffness]), covariance
@@ -301,7 +294,6 @@ class Bayesian(RunByRun):
 
     Args:
         blocks_per_cycle: block means per period that the posterior is computed from, at least.
-        seed: of the draws that combine the runs.
     """
 
     name = "bayesian"

@@ -43,7 +43,6 @@ class Envelope:
         amplitude: shape (n,), rad.
         phase: less that of the carrier, unwrapped, shape (n,), rad.
         carrier: the demodulating angular frequency, rad/s.
-        samples: number of samples in an average.
     """
 
     time: Array

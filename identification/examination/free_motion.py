@@ -185,7 +185,6 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
     included, which may hold the body at another place in the end.
 
     Args:
-        run: from its release on.
         resolution: step of the reading, in its unit; 0 where it is not stated.
     """
     frequency = starting_frequency(run.record)

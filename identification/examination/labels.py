@@ -91,11 +91,7 @@ class _Misfit:
 
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
-    """Refuse springs or wind speeds that are assigned to the wrong runs; none if the statements may be right.
-
-    Args:
-        swings: of the runs; those without a stated spring are ignored.
-    """
+    """Refuse stated springs or wind speeds that are assigned to the wrong runs; none if they may be right."""
     known = [swing for swing in swings if swing.run.spring_stiffness is not None]
     if len(known) < _LEAST_RUNS:
         return ()
@@ -122,10 +118,7 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 
 
 def other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
-    """What the springs of the runs may be worth, where their statements contradict the frequencies.
-
-    Args:
-        swings: of the runs; those without a stated spring are ignored.
+    """What the stated springs of the runs may be worth, where their statements contradict the frequencies.
 
     Returns:
         Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn,
@@ -340,13 +333,10 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
 
 
 def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tuple[Remark, ...]:
-    """Note a stated inertia that the springs contradict by more than a nominal inertia is off.
+    """Note a stated inertia that the springs, with the wind off, contradict by more than a nominal one is off.
 
     The remark names the slip of units that it looks like; there is none where the campaign states ``plausible =
     false``.
-
-    Args:
-        swings: of the runs; only those with the wind off and a stated spring count.
     """
     still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     stated = campaign.rig.yaw_inertia

@@ -45,7 +45,6 @@ class Demodulated:
         third: of the third harmonic, shape (w,).
         noise: standard deviation of a block mean within the windows, rad.
         samples: block means in each window, shape (w,).
-        block: samples in a block mean.
         fast_noise: noise between neighbouring samples of the record over that of white noise of the same level.
         duration: of the record, s.
     """

@@ -74,11 +74,7 @@ class DataSpec:
 
 
 def training_pairs(spec: DataSpec, which: str) -> tuple[Array, Array]:
-    """Inputs, shape (N, inputs), and targets, shape (N,), of a network's training set, before scaling.
-
-    Args:
-        which: ``damping`` or ``frequency``.
-    """
+    """Inputs, shape (N, inputs), and targets, shape (N,), of the training set of ``damping`` or ``frequency``."""
     if which == DAMPING:
         zeta = np.linspace(*spec.zeta_range, spec.zeta_count)
         return network_inputs(zeta), zeta
@@ -128,7 +124,6 @@ class Network:
     """A trained network with the posterior of its weights.
 
     Args:
-        sizes: units per layer, inputs first, one output.
         weights: matrix (row by row) and bias of each layer in turn, shape (n,).
         directions: eigenvectors of the data's information that stand out of the prior, shape (k, n).
         precision: posterior precision along each of them, shape (k,).
@@ -158,11 +153,7 @@ class Network:
         return self._backward(inputs)[0]
 
     def posterior_std(self, inputs: Array) -> float:
-        """√(gᵀ A⁻¹ g), in the output's unit, with g its derivative by the weights and A = 2βJᵀJ + 2α (MacKay 1992).
-
-        Args:
-            inputs: shape (inputs,).
-        """
+        """√(gᵀ A⁻¹ g) at one point of shape (inputs,), in the output's unit; A = 2βJᵀJ + 2α (MacKay 1992)."""
         jacobian = self._backward(inputs)[1]
         along = self.directions @ jacobian
         rest = jacobian - self.directions.T @ along
@@ -187,11 +178,7 @@ class Network:
 
 
 def parameter_count(sizes: Sequence[int]) -> int:
-    """Number of weights and biases.
-
-    Args:
-        sizes: units per layer.
-    """
+    """Number of weights and biases of the units per layer."""
     return sum((before + 1) * after for before, after in pairwise(sizes))
 
 
@@ -200,7 +187,6 @@ def split_weights(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Arr
 
     Args:
         weights: shape (n,).
-        sizes: units per layer.
     """
     layers, place = [], 0
     for before, after in pairwise(sizes):

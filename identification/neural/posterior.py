@@ -43,13 +43,7 @@ def distribution(weights: Array, means: Array, stds: Array, values: Array) -> Ar
 
 
 def quantiles(weights: Array, means: Array, stds: Array) -> Array:
-    """The quantiles at `LEVELS`, by bisection, shape (b, 3, d).
-
-    Args:
-        weights: shape (b, r).
-        means: shape (b, r, d).
-        stds: shape (b, r, d).
-    """
+    """The quantiles at `LEVELS`, by bisection, shape (b, 3, d): arguments as in `distribution`."""
     there = (weights > _NEGLIGIBLE)[..., None]
     low = np.where(there, means - _FAR * stds, np.inf).min(axis=1)[:, None, :]
     high = np.where(there, means + _FAR * stds, -np.inf).max(axis=1)[:, None, :]
@@ -98,12 +92,7 @@ class Output:
 def weight_shapes(
     rivals: int, features: int, runs: int, quantities: int, effects: int
 ) -> dict[str, tuple[int, ...]]:
-    """Shapes of the trained weights by name; a matrix ends in ``.w`` and its bias in ``.b``.
-
-    Args:
-        features: of a rival.
-        runs: features of a run.
-    """
+    """Shapes of the trained weights by name; a matrix ends in ``.w`` and its bias in ``.b``."""
     layers = {
         "token1": (features, TOKEN),
         "token2": (TOKEN, TOKEN),
@@ -299,8 +288,6 @@ class Posterior:
         values: medians, SI, shape (d,).
         intervals: 95 % intervals, SI, shape (d, 2).
         covariance: of normal distributions with these intervals and the mixture's correlations, SI, shape (d, d).
-        effects: probability of each effect by name.
-        unlike: whether the sample is unlike anything trained on.
     """
 
     values: Array

@@ -168,7 +168,6 @@ class Rivals:
         own: share of a column that the nominal parameters cannot imitate, shape (r,).
         remaining: χ² of each rival, shape (r,).
         freedom: number of values less number of nominal unknowns.
-        valid: whether the campaign shows the rival at all, shape (r,).
     """
 
     parameters: Array
@@ -281,7 +280,6 @@ class Features:
         runs: features of each run, shape (n, k); the last one is 1 with the wind on, else 0.
         shifts: of the quantities under each rival, in standard deviations, shape (r, d); 0 where not determined.
         covariances: of the quantities under each rival, in the same unit, shape (r, d, d).
-        valid: shape (r,).
         values: of the quantities by the nominal fit, SI, shape (d,).
         stds: their standard deviations, SI, shape (d,); 1 where not determined.
         known: which quantities are determined, shape (d,).
@@ -327,13 +325,7 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
 def campaign_features(
     runs: Sequence[Run], seen: Sequence[Demodulated], design: Design, alone: Sequence[Rivals]
 ) -> Features | None:
-    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs determine no coefficient.
-
-    Args:
-        runs: those that the design links, each with its stiffness.
-        seen: windows of the runs.
-        alone: the rivals of each run by itself.
-    """
+    """Features of a campaign, for Cnβ, Cnr, Izz and Cr; None where the runs determine no coefficient."""
     # The windows' own decays are added to their deviations.
     parts, blocks = [], []
     for one, link in zip(seen, design.links, strict=True):

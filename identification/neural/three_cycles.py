@@ -40,13 +40,10 @@ class Shape:
 
 
 def normalise(points: Array) -> Shape:
-    """Remove the mean, and scale the largest value of the first half cycle to 1, so that amplitude and zero go.
+    """Remove the mean of 100 points, shape (100,), and scale the largest value of the first half cycle to 1.
 
-    The largest value is that of a quartic through the points of the half cycle, which is less sensitive to noise.
-
-    Args:
-        points: means over the hundredths of three cycles from a zero crossing on, the first half cycle positive,
-            shape (100,). The scale is 0 or less where this half cycle does not rise above the mean.
+    That is the value of a quartic through the points of the half cycle, which is less sensitive to noise. The
+    scale is 0 or less where the half cycle does not rise above the mean.
     """
     centred = points - points.mean()
     place = int(np.argmax(_FINE @ centred[:_FIRST_HALF]))
@@ -57,11 +54,7 @@ def normalise(points: Array) -> Shape:
 
 
 def response_points(zeta: Array) -> Array:
-    """The 100 points of e^{−6πκτ} sin 6πτ (paper, eq. 12) before normalisation, with κ = ζ/√(1 − ζ²) and τ = t/t3.
-
-    Args:
-        zeta: damping ratios, below 1, shape (n,); the points have the shape (n, 100).
-    """
+    """The 100 points of e^{−6πκτ} sin 6πτ (paper, eq. 12) with κ = ζ/√(1 − ζ²), shape (n, 100), of ratios (n,)."""
     ratio = np.asarray(zeta, dtype=np.float64)[:, None]
     pole = 2.0 * np.pi * CYCLES * (1j - ratio / np.sqrt(1.0 - ratio**2))
     integral = (np.exp(pole * np.linspace(0.0, 1.0, POINTS + 1)) / pole).imag
@@ -69,11 +62,7 @@ def response_points(zeta: Array) -> Array:
 
 
 def network_inputs(zeta: Array) -> Array:
-    """The first network's inputs for impulse responses, shape (n, 100).
-
-    Args:
-        zeta: damping ratios, below 1, shape (n,).
-    """
+    """The first network's inputs for impulse responses, shape (n, 100), of damping ratios below 1, shape (n,)."""
     return np.array([normalise(points).inputs for points in response_points(zeta)])
 
 

@@ -105,7 +105,6 @@ def log_evidence(
         eigenvalues: λ of JᵀJ at the optimum, those that are not zero, shape (k,).
         squared_errors: E_D there, in squared units of the scaled output.
         squared_weights: E_W there, (1).
-        counts: numbers N of training pairs and n of weights.
     """
     samples, weights = counts
     determinant = float(np.sum(np.log(2.0 * (held.beta * eigenvalues + held.alpha))))
@@ -133,10 +132,7 @@ class Progress:
 
     Args:
         weights: shape (n,).
-        held: α and β.
         damping: μ; dimensionless.
-        iteration: number of steps taken.
-        finished: whether no step lowers F any longer.
     """
 
     weights: Array
@@ -151,7 +147,6 @@ class Problem:
     """Training pairs, scaled.
 
     Args:
-        sizes: units per layer.
         inputs: shape (N, inputs).
         targets: shape (N,).
     """
@@ -209,13 +204,7 @@ def _forward(
 
 
 def outputs_and_jacobian(weights: Tensor, sizes: tuple[int, ...], inputs: Tensor) -> tuple[Tensor, Tensor]:
-    """The network's outputs, shape (N,), and their derivatives by the weights, shape (N, n), in closed form.
-
-    Args:
-        weights: shape (n,).
-        sizes: units per layer.
-        inputs: scaled, shape (N, inputs).
-    """
+    """The outputs, shape (N,), and their derivatives by the n weights, shape (N, n), in closed form."""
     import torch
 
     layers, activations, outputs = _forward(weights, sizes, inputs)
@@ -372,14 +361,7 @@ _NO_ERRORS = NetworkErrors(0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """Everything a training depends on.
-
-    Args:
-        seed: of the first weights, the noise and the test set.
-        starts: number of trainings of each network, from different weights.
-        damping_steps: number of Levenberg–Marquardt steps of the first network, at most.
-        frequency_steps: number of those of the second.
-    """
+    """Everything a training depends on."""
 
     seed: int = 1
     data: DataSpec = _DATA
@@ -423,10 +405,9 @@ def train(
     progress: Callable[[int, str], None] = lambda _done, _text: None,
     keep: Callable[[Checkpoint], None] = lambda _checkpoint: None,
 ) -> TrainedNetworks:
-    """Train both networks.
+    """Train both networks, or resume an interrupted training of the same specification.
 
     Args:
-        resume: progress of an interrupted training of the same specification.
         progress: called after every step with the work done and a description.
         keep: called with a checkpoint after every step; an exception from it ends the training.
     """

@@ -78,7 +78,6 @@ class DecayFit:
         parameters: φ, shape (p,).
         zero: the sensor's zero, rad; the mean where every run has its own.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
-        converged: whether the step fell below the tolerance.
     """
 
     parameters: Array
@@ -196,20 +195,14 @@ def projected_cost(reading: Reading, decay: Decay) -> float:
 
 
 def information_at(time: Array, decay: Decay, angle: float, rate: float) -> Array:
-    """JᵀJ of one run's reading in the local order (a, k, zero, angle, rate), shape (5, 5).
-
-    Args:
-        time: since the initial state, shape (n,), s.
-        angle: initial angle, rad.
-        rate: initial rate, rad/s.
-    """
+    """JᵀJ of one run's reading in the local order (a, k, zero, angle, rate): arguments as in `linearised_at`."""
     return linearised_at(time, decay, angle, rate, np.zeros(time.size))[0]
 
 
 def linearised_at(
     time: Array, decay: Decay, angle: float, rate: float, residual: Array
 ) -> tuple[Array, Array]:
-    """JᵀJ as in `information_at`, and the score Jᵀ residual, shape (5,).
+    """JᵀJ in the local order, shape (5, 5), and the score Jᵀ residual, shape (5,).
 
     Args:
         time: since the initial state, shape (n,), s.
@@ -339,7 +332,6 @@ def mean_of_blocks(values: Array, factor: int) -> Array:
 
     Args:
         values: shape (n,).
-        factor: number of values in a block.
     """
     if factor == 1:
         return values

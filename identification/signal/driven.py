@@ -75,7 +75,6 @@ def driven_start(
         time: of the samples, shape (n,), s.
         reading: of the response, shape (n,), rad.
         values: of the input, shape (n,).
-        sprung: whether there is a stiffness to be found; else k is 0.
 
     Returns:
         a (1/s), k (1/s²) and g (rad/s² per unit); None where the response holds no motion.

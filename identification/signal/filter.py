@@ -264,7 +264,6 @@ class KnownInput:
 
     Args:
         response: to unit gain at the values of the fit, shape (n,), as a function of the decay.
-        by_root: whether it acts through the spring, so that its gain is k.
     """
 
     response: Callable[[Decay], Array]
@@ -288,10 +287,8 @@ def fit_driven(
     Args:
         values: block means of one run, shape (n,), rad.
         interval: between them, s.
-        start: output error's decay.
         deviations: its standard deviations of (a, k), shape (2,), in 1/s and 1/s².
         noise_variance: of one block mean, rad².
-        known: the input of a driven run; None of a free decay.
     """
     fit = _DrivenLikelihood(values, interval, noise_variance, deviations, known)
     bare = fit.at(Driven(start, 0.0))

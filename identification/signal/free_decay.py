@@ -126,9 +126,7 @@ def free_decay(time: Array, decay: Decay, angle: float, rate: float) -> Array:
 def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
     """Weights of the rows of `response_rows` in ∂β/∂a [rad s] and ∂β/∂k [rad s²], shape (2, 4).
 
-    Args:
-        angle: initial angle β₀, rad.
-        rate: initial rate r₀, rad/s.
+    The arguments as in `free_decay`.
     """
     a, k = decay.rate, decay.stiffness
     return np.array(
@@ -140,11 +138,9 @@ def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
 
 
 def envelope_amplitude(decay: Decay, angle: float, rate: float) -> float:
-    """√(β₀² + ((r₀ + aβ₀)/ωd)²), the envelope at the time of the initial state, rad; |β₀| where nothing oscillates.
+    """√(β₀² + ((r₀ + aβ₀)/ωd)²), the envelope at the time of the initial state; |β₀| where nothing oscillates.
 
-    Args:
-        angle: initial angle β₀, rad.
-        rate: initial rate r₀, rad/s.
+    In rad, with arguments as in `free_decay`.
     """
     if decay.omega_d == 0.0:
         return abs(angle)

@@ -33,7 +33,6 @@ class Residual:
 
     Args:
         values: reading less model, shape (n,), rad.
-        block: samples in an eighth of a cycle.
         unknowns: number of parameters fitted to the run's own data.
         peak: largest distance of the reading from the sensor's zero, rad.
     """

@@ -48,8 +48,6 @@ class FittedRun:
 
     Args:
         fit: None where the run could not be identified; the estimate's status says why.
-        noise: what the fit's residual says of the noise; None where the fit is.
-        estimate: the run's own result.
     """
 
     reading: Reading
@@ -64,10 +62,9 @@ class FittedRun:
 
 
 def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int | None = None) -> FittedRun:
-    """Identify ωn, ζ, the initial state and the sensor's zero of one run by maximum likelihood.
+    """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, whatever its spring.
 
     Args:
-        run: its wind and spring are not used.
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.
     """
     reading = Reading.from_record(run.record)
@@ -126,10 +123,7 @@ def residuals_of(
 
 
 def decay_covariance_of(fitted: RunFit) -> Array:
-    """Covariance of (a, k) per noise variance, at the optimum of the least squares, shape (2, 2).
-
-    Times the noise variance in rad² it is in 1/s and 1/s².
-    """
+    """Covariance of (a, k) at the optimum of the least squares, shape (2, 2), over the noise variance in rad²."""
     return inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])]
 
 
@@ -168,7 +162,6 @@ def describe_run(
         zero: its sensor zero, rad.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
         noise_variance: of one sample of the reading, rad².
-        noise: the level behind the standard deviations; None where the method does not use it.
     """
     if not determined(covariance):
         return RunEstimate(run.id, (Status.NOT_DETERMINED,))
@@ -212,11 +205,7 @@ class ResidualCheck:
     covariance: Array
 
     def widened(self, covariance: Array) -> Array:
-        """A method's covariance of (a, k), raised to that of least squares where the model departs.
-
-        Args:
-            covariance: the method's own, shape (2, 2), in 1/s and 1/s².
-        """
+        """A covariance of (a, k), shape (2, 2), raised to that of least squares where the model departs."""
         if not self.noise.departs:
             return covariance
         return widened_covariance(covariance, np.sqrt(self.covariance.diagonal()))

@@ -155,7 +155,6 @@ class Component:
     """One line of the budget.
 
     Args:
-        kind: GUM's evaluation: ``A`` by statistics, ``B`` by other means.
         covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may reduce
             it.
         note: why it is zero or unknown; otherwise empty.
@@ -226,9 +225,7 @@ def make_budget(
     """The budget of a campaign's coefficients.
 
     Args:
-        identify: the estimator that made it; it is called again with changed campaigns.
         others: other estimators, by name, whose spread counts as the choice of model.
-        progress: called with a description of each step.
 
     Raises:
         TunnelError: when the estimate has no coefficients.

@@ -69,7 +69,6 @@ def damped_sinusoid_bound(
         frequency: damped frequency f, Hz, above 0.
         zeta: damping ratio, below 1.
         noise_std: S, rad.
-        offset_known: whether the offset is known.
 
     Raises:
         ValueError: for an amplitude or frequency that is not positive, or |ζ| of 1 or more.
@@ -112,7 +111,6 @@ class CampaignBound:
     The zero is common to the runs, unless one of them has no spring.
 
     Args:
-        parameters: names, as in `Estimate.parameters`.
         covariance: smallest covariance, shape (p, p), in the products of their units.
     """
 

@@ -56,11 +56,10 @@ class Limits:
 
 
 def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
-    """The bound of a plan's coefficients at its truth, with the quantisation, and with its buffeting.
+    """The bound of a plan's coefficients at its truth, of free decays and runs driven by a moment.
 
-    Args:
-        plan: free decays and runs driven by a moment. Of its effects only buffeting counts; its moment is taken as
-            white with the intensity that it has at each run's natural frequency.
+    Of its effects only buffeting counts; its moment is taken as white with the intensity that it has at each
+    run's natural frequency.
 
     Raises:
         TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
@@ -143,7 +142,6 @@ def within_limits(
     """The driven plan whose input is as large as the limits allow.
 
     Args:
-        drive: of one amplitude, which is replaced.
         duration: of each record, s.
     """
     unit = driven_plan(document, drive.model_copy(update={"amplitudes_nm": [1.0]}), duration)
@@ -172,7 +170,6 @@ def propose_drive(
     Args:
         document: of free decays; its conditions, sensor and truth are kept.
         duration: of each record, s; None: the plan's.
-        progress: called after each input that was tried.
 
     Raises:
         TunnelError: as `plan_bound` and `peak_response`.
