@@ -63,17 +63,17 @@ class _Pairing:
     on: list[int]
     partners: list[list[int]]
 
-
-def _pair(sprung: Sequence[tuple[PairedRun, tuple[float, float]]]) -> _Pairing:
-    stiffness = np.array([one.run.spring_stiffness for one, _ in sprung], dtype=np.float64)
-    off = [i for i, (one, _) in enumerate(sprung) if not one.run.wind_on]
-    partners = {
-        i: [j for j in off if np.isclose(stiffness[j], stiffness[i], rtol=1e-9)]
-        for i, (one, _) in enumerate(sprung)
-        if one.run.wind_on
-    }
-    on = [i for i, found in partners.items() if found]
-    return _Pairing(stiffness, np.array([load for _, load in sprung]), off, on, [partners[i] for i in on])
+    @classmethod
+    def of(cls, sprung: Sequence[tuple[PairedRun, tuple[float, float]]]) -> _Pairing:
+        stiffness = np.array([one.run.spring_stiffness for one, _ in sprung], dtype=np.float64)
+        off = [i for i, (one, _) in enumerate(sprung) if not one.run.wind_on]
+        partners = {
+            i: [j for j in off if np.isclose(stiffness[j], stiffness[i], rtol=1e-9)]
+            for i, (one, _) in enumerate(sprung)
+            if one.run.wind_on
+        }
+        on = [i for i, found in partners.items() if found]
+        return cls(stiffness, np.array([load for _, load in sprung]), off, on, [partners[i] for i in on])
 
 
 def _outcome(pairing: _Pairing, frequency: Array, rate: Array, *, with_line: bool) -> Array:
@@ -184,7 +184,7 @@ class Paired(ABC):
         sprung = [(one, load) for one, load in known if one.run.spring_stiffness is not None]
         if not sprung:
             return replace(estimate, statuses=by_severity(statuses))
-        pairing = _pair(sprung)
+        pairing = _Pairing.of(sprung)
         windy = sum(one.run.wind_on for one, _ in sprung)
         if windy == 0:
             statuses.add(Status.NO_WIND_ON)

@@ -138,7 +138,15 @@ def posterior_of(
             centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape)
         )
         mean, spread = found.moments()
-        if _holds(found, mean, spread):
+        # It is held where hardly any weight is at the border, in a grid of about the right place and size.
+        weights = np.exp(found.log_posterior - found.log_posterior.max())
+        inner = weights[1:-1, 1:-1].sum()
+        inverse = np.linalg.inv(scale)
+        own = np.sqrt(np.linalg.eigvalsh(inverse @ spread @ inverse.T))
+        off = np.abs(inverse @ (mean - centre)).max()
+        low, high = _SCALE_BAND
+        border = weights.sum() - inner
+        if border <= _BORDER_MASS * weights.sum() and low < own[0] and own[1] < high and off < 1.0:
             return found
         centre = mean
         width, step = _FINER if width == _FIRST[0] else (_WIDENING * width, _FINER[1])
@@ -149,18 +157,6 @@ def _spline(axis: Array, values: Array) -> RectBivariateSpline:
     # A spline overshoots where the prior cuts off the posterior; linear interpolation does not.
     degree = 1 if np.any(np.abs(np.diff(values, axis=0)) > -_FLOOR / 4.0) else 3
     return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
-
-
-def _holds(found: DecayPosterior, mean: Array, covariance: Array) -> bool:
-    weights = np.exp(found.log_posterior - found.log_posterior.max())
-    inner = weights[1:-1, 1:-1].sum()
-    inverse = np.linalg.inv(found.scale)
-    own = np.sqrt(np.linalg.eigvalsh(inverse @ covariance @ inverse.T))
-    off = np.abs(inverse @ (mean - found.centre)).max()
-    low, high = _SCALE_BAND
-    return bool(
-        weights.sum() - inner <= _BORDER_MASS * weights.sum() and low < own[0] and own[1] < high and off < 1.0
-    )
 
 
 def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple[Array, Array]:

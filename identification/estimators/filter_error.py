@@ -111,7 +111,15 @@ def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit
     if projected is None:
         return Status.NOT_CONVERGED
     fitted, zero = projected
-    noise = _judged(before, found, noise_std)
+    # The model is judged by the innovations, which are white if it is right; the residual is not.
+    values, expected = found.innovations.values, found.innovations.variance
+    level = noise_level(
+        [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
+        SensorProperties(noise_std=float(np.sqrt(expected))),
+    )
+    departs = level.departs or level.disagrees
+    ratio = max(level.slow_ratio, float(values @ values) / values.size / expected) if departs else 1.0
+    noise = replace(before, std=noise_std, departs=departs, slow_ratio=ratio)
     covariance = found.covariance * noise.slow_ratio
     # The initial state is that of least squares; the part of it due to the moment is of the power of the residual.
     variance = max(noise_std, noise.residual_std) ** 2
@@ -125,15 +133,3 @@ def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit
     weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
     gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
     return RunDecay(estimate, decay, covariance[:2, :2], gained)
-
-
-def _judged(before: NoiseLevel, found: DrivenFit, noise_std: float) -> NoiseLevel:
-    # The model is judged by the innovations, which are white if it is right; the residual is not.
-    values, variance = found.innovations.values, found.innovations.variance
-    level = noise_level(
-        [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
-        SensorProperties(noise_std=float(np.sqrt(variance))),
-    )
-    departs = level.departs or level.disagrees
-    ratio = max(level.slow_ratio, float(values @ values) / values.size / variance) if departs else 1.0
-    return replace(before, std=noise_std, departs=departs, slow_ratio=ratio)

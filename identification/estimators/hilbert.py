@@ -120,14 +120,13 @@ class Hilbert(RunByRun):
         windows: list[WindowEstimate] = []  # lines through consecutive parts of the envelope
         length = 2 * self.cycles_per_window  # two averages per cycle
         deviation = noise_std * np.sqrt(2.0 / seen.samples)
-        last = seen.time.size - length if covariance is not None and length else -1
-        for begin in range(0, last + 1, length or 1):
+        shown = covariance is not None and length > 0
+        for begin in range(0, seen.time.size - length + 1, length) if shown else ():
             part = slice(begin, begin + length)
             amplitude = float(np.exp(np.log(seen.amplitude[part]).mean()))
             if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
                 break
-            pair = _two_lines(seen, part, np.full(length, deviation / amplitude))
-            own, own_covariance = _decay(seen, *pair)
+            _, own, own_covariance = _fitted(seen, part, np.full(length, deviation / amplitude))
             if own.stiffness <= 0.0:
                 break
             step = float(seen.time[1] - seen.time[0])
@@ -152,26 +151,22 @@ def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array
         return None
     scale = float(np.exp(np.mean(np.log(seen.amplitude[:4]) + decay.rate * seen.time[:4])))
     expected = scale * np.exp(-decay.rate * seen.time)
-    found = None
     for _ in range(2):
         below = np.flatnonzero(expected < LEAST_ENVELOPE * deviation)
         count = int(below[0]) if below.size else expected.size
         if count < _LEAST_POINTS:
             return None
-        found = _two_lines(seen, slice(0, count), deviation / expected[:count])
-        expected = np.exp(found[0].values[0] - found[0].values[1] * seen.time)
-    return None if found is None else _decay(seen, *found)
+        logarithm, decay, covariance = _fitted(seen, slice(0, count), deviation / expected[:count])
+        expected = np.exp(logarithm.values[0] - logarithm.values[1] * seen.time)
+    return decay, covariance
 
 
-def _two_lines(seen: Envelope, part: slice, deviation: Array) -> tuple[WeightedFit, WeightedFit]:
+def _fitted(seen: Envelope, part: slice, deviation: Array) -> tuple[WeightedFit, Decay, Array]:
+    """The line of the logarithm, and with that of the phase the decay and the covariance of (a, k)."""
     columns = np.column_stack((np.ones(deviation.size), -seen.time[part]))
     logarithm = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
-    return logarithm, weighted_fit(columns, seen.phase[part], deviation**2)
-
-
-def _decay(seen: Envelope, logarithm: WeightedFit, phase: WeightedFit) -> tuple[Decay, Array]:
+    phase = weighted_fit(columns, seen.phase[part], deviation**2)
     rate, omega_d = float(logarithm.values[1]), seen.carrier - float(phase.values[1])
-    covariance = decay_covariance(
-        rate, omega_d, float(logarithm.covariance[1, 1]), float(phase.covariance[1, 1])
-    )
-    return Decay(rate, omega_d**2 + rate**2), covariance
+    variances = float(logarithm.covariance[1, 1]), float(phase.covariance[1, 1])
+    covariance = decay_covariance(rate, omega_d, *variances)
+    return logarithm, Decay(rate, omega_d**2 + rate**2), covariance
