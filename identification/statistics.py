@@ -104,28 +104,16 @@ def embed(link: Array, *, with_zero: bool) -> Array:
     return extended
 
 
-@dataclass(frozen=True, eq=False)
-class WeightedFit:
-    """Linear least squares.
-
-    Args:
-        values: of the unknowns, shape (p,).
-        covariance: shape (p, p); widened where the scatter is beyond chance.
-        residual: shape (n,).
-    """
-
-    values: Array
-    covariance: Array
-    residual: Array
-
-
-def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
-    """Least squares with known variances, which are raised where the scatter is beyond chance.
+def weighted_fit(columns: Array, target: Array, variance: Array) -> tuple[Array, Array]:
+    """Linear least squares with known variances, which are raised where the scatter is beyond chance.
 
     Args:
         columns: one per unknown, shape (n, p) with n above p.
         target: shape (n,).
         variance: of the target's points, shape (n,).
+
+    Returns:
+        The unknowns, shape (p,), and their covariance, shape (p, p).
     """
     weights = 1.0 / variance
     normal = columns.T @ (columns * weights[:, None])
@@ -134,7 +122,7 @@ def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
     freedom = target.size - values.size
     scatter = float(residual @ (weights * residual))
     beyond = scatter > float(chdtri(freedom, MISFIT_RATE))
-    return WeightedFit(values, inverse(normal) * (scatter / freedom if beyond else 1.0), residual)
+    return values, inverse(normal) * (scatter / freedom if beyond else 1.0)
 
 
 def decay_covariance(rate: float, omega_d: float, rate_variance: float, omega_variance: float) -> Array:

@@ -45,7 +45,6 @@ class PairedRun:
     frequency_std: float
     rate: float
     rate_std: float
-    omega_n: Quantity
 
 
 @dataclass(frozen=True, eq=False)

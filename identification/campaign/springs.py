@@ -42,7 +42,6 @@ def fit_springs(
     stiffness: Sequence[float],
     frequency_hz: Sequence[float],
     *,
-    false_alarm_rate: float = SPRING_FLAG_RATE,
     rng: np.random.Generator | None = None,
 ) -> SpringFit:
     """Fit the line by least squares and flag outliers.
@@ -59,7 +58,6 @@ def fit_springs(
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
         frequency_hz: wind-off frequency with it, Hz, shape (n,).
-        false_alarm_rate: probability that a spring of a correct set is flagged.
         rng: draws the calibration; one of a fixed seed where None, so that the result is repeatable.
 
     Raises:
@@ -89,7 +87,7 @@ def fit_springs(
         rng = np.random.default_rng(1) if rng is None else rng
         chances, order = _take_out_the_worst((springs / omega_squared)[None, :])
         least = _take_out_the_worst(rng.standard_normal((_TRIALS, springs.size)))[0].min(axis=1)
-        beyond = np.flatnonzero(chances[0] <= np.quantile(least, false_alarm_rate))
+        beyond = np.flatnonzero(chances[0] <= np.quantile(least, SPRING_FLAG_RATE))
         if beyond.size:
             flagged[order[0, : beyond[-1] + 1]] = True
         p_value = (1 + int(np.sum(least <= chances[0].min()))) / (1 + _TRIALS)

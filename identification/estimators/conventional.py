@@ -47,15 +47,12 @@ class Conventional(Paired):
         statuses = noise_statuses([noise])
         if run.spring_stiffness is None:
             statuses.add(Status.NO_STIFFNESS)
-        omega_n = Quantity(omega, omega_std, "rad/s")
         estimate = RunEstimate(
             id=run.id,
             statuses=by_severity(statuses),
-            omega_n=omega_n,
+            omega_n=Quantity(omega, omega_std, "rad/s"),
             zeta=Quantity(peaks.rate / omega, zeta_std, "1"),
             sensor_zero=Quantity(peaks.zero, peaks.zero_std, "rad"),
             noise=noise,
         )
-        return estimate, PairedRun(
-            run, peak.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std, omega_n
-        )
+        return estimate, PairedRun(run, peak.frequency, peaks.frequency_std, peaks.rate, peaks.rate_std)

@@ -26,7 +26,7 @@ from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay
 from identification.signal.noise import reading_noise
 from identification.signal.run_fit import CYCLES, modal_quantities
-from identification.statistics import WeightedFit, decay_covariance, weighted_fit
+from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -157,16 +157,15 @@ def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array
         if count < _LEAST_POINTS:
             return None
         logarithm, decay, covariance = _fitted(seen, slice(0, count), deviation / expected[:count])
-        expected = np.exp(logarithm.values[0] - logarithm.values[1] * seen.time)
+        expected = np.exp(logarithm[0] - logarithm[1] * seen.time)
     return decay, covariance
 
 
-def _fitted(seen: Envelope, part: slice, deviation: Array) -> tuple[WeightedFit, Decay, Array]:
+def _fitted(seen: Envelope, part: slice, deviation: Array) -> tuple[Array, Decay, Array]:
     """The line of the logarithm, and with that of the phase the decay and the covariance of (a, k)."""
     columns = np.column_stack((np.ones(deviation.size), -seen.time[part]))
-    logarithm = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
-    phase = weighted_fit(columns, seen.phase[part], deviation**2)
-    rate, omega_d = float(logarithm.values[1]), seen.carrier - float(phase.values[1])
-    variances = float(logarithm.covariance[1, 1]), float(phase.covariance[1, 1])
-    covariance = decay_covariance(rate, omega_d, *variances)
+    logarithm, by_envelope = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
+    phase, by_phase = weighted_fit(columns, seen.phase[part], deviation**2)
+    rate, omega_d = float(logarithm[1]), seen.carrier - float(phase[1])
+    covariance = decay_covariance(rate, omega_d, float(by_envelope[1, 1]), float(by_phase[1, 1]))
     return logarithm, Decay(rate, omega_d**2 + rate**2), covariance

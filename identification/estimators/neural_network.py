@@ -86,12 +86,11 @@ class NeuralNetwork(Paired):
             zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
         if run.spring_stiffness is None:
             statuses.add(Status.NO_STIFFNESS)
-        omega_n = Quantity(omega, omega_std, "rad/s")
         trained = [one for one in readings if networks.trained_for(one.zeta, one.omega_n)]
         estimate = RunEstimate(
             id=run.id,
             statuses=by_severity(statuses),
-            omega_n=omega_n,
+            omega_n=Quantity(omega, omega_std, "rad/s"),
             zeta=Quantity(zeta, zeta_std, "1"),
             noise=None if check is None else check.noise,
             windows=tuple(_shown(one, networks) for one in trained),
@@ -104,7 +103,6 @@ class NeuralNetwork(Paired):
             frequency_std=damped_std / (2.0 * np.pi),
             rate=zeta * omega,
             rate_std=float(np.hypot(omega * zeta_std, zeta * omega_std)),
-            omega_n=omega_n,
         )
         return estimate, paired
 

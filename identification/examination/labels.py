@@ -73,21 +73,9 @@ class _Misfit:
     freedom: int
 
     @property
-    def contradicts(self) -> bool:
-        """Whether the residuals are beyond chance."""
-        return self.freedom > 0 and self.squares > float(chdtri(self.freedom, REFUSAL_RATE))
-
-    @property
     def agrees(self) -> bool:
         """Whether the residuals are within chance."""
         return self.squares <= float(chdtri(self.freedom, MISFIT_RATE))
-
-    def mends(self, before: _Misfit, trials: int) -> bool:
-        """Whether the statements now agree, or agree better than before by more than chance."""
-        if self.agrees:
-            return True
-        ratio = before.squares / max(self.squares, 1e-300)
-        return ratio > float(fdtri(self.freedom, self.freedom, 1.0 - REFUSAL_RATE / max(trials, 1)))
 
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -101,10 +89,14 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         ("wind_speed", _of_winds, _winds_exchanged),
     ):
         stated, away = misfit(labels)
-        if not stated.contradicts:
+        if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, REFUSAL_RATE))):
             continue
         trials = [(places, misfit(other)[0]) for places, other in exchange(labels, away)]
-        mended = [(places, found) for places, found in trials if found.mends(stated, len(trials))]
+        mended = []  # that agree, or agree better than what is stated by more than chance
+        for places, found in trials:
+            ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
+            if found.agrees or ratio > float(fdtri(freedom, freedom, 1.0 - REFUSAL_RATE / len(trials))):
+                mended.append((places, found))
         if not mended:
             continue
         # Exchanges that fit as well as the best one cannot be distinguished.

@@ -97,14 +97,10 @@ class ThreeCycles:
     Args:
         start_s: of the first crossing since the record's first sample, s.
         t3: time of three damped cycles, s.
-        zero: of the sensor, rad.
-        decay: envelope's ratio over half a cycle, (1).
     """
 
     start_s: float
     t3: float
-    zero: float
-    decay: float
     shape: Shape
     noise: Propagation
 
@@ -160,7 +156,6 @@ class _Place:
 
     start: float
     half: float
-    zero: float = 0.0
     decay: float = 1.0
     slope: float = 0.0
 
@@ -247,7 +242,7 @@ def _refined(trace: _Trace, place: _Place) -> _Place | None:
         moves = np.clip((zero - levels) / (slope * model), -0.25 * place.half, 0.25 * place.half)
         line = _line_weights(decay) @ (instants + moves)
         moved = abs(float(line[0]) - place.start)
-        place = _Place(float(line[0]), float(line[1]), zero, decay, slope)
+        place = _Place(float(line[0]), float(line[1]), decay, slope)
         if not place.half > 0.0 or place.start < 0.0:
             return None
         if moved < _SETTLED * place.half:
@@ -311,7 +306,7 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
         sign * np.column_stack((by_start, by_length)),
         int(first),
     )
-    return ThreeCycles(place.start, t3, place.zero, place.decay, shape, noise)
+    return ThreeCycles(place.start, t3, shape, noise)
 
 
 def _shares(trace: _Trace, edges: Array, part: slice) -> Array:

@@ -246,7 +246,6 @@ class DrivenFit:
 
     Args:
         covariance: of (a, k, ln q), shape (3, 3).
-        drop: of −2 ln L against no random moment at all, dimensionless.
         gained: covariance of (a, k, g) with the gain g of a known input, shape (3, 3); zeros for g where there is
             none, or where it is k.
     """
@@ -254,7 +253,7 @@ class DrivenFit:
     model: Driven
     covariance: Array
     innovations: Innovations
-    drop: float
+
     gained: Array
 
 
@@ -301,7 +300,7 @@ def fit_driven(
         return None
     if bare.cost - found.innovations.cost > MOMENT_DROP_FOR_CORNER:
         found = fit.with_corner(found)
-    return replace(found, drop=bare.cost - found.innovations.cost, gained=fit.with_gain(found))
+    return replace(found, gained=fit.with_gain(found))
 
 
 class _DrivenLikelihood:
@@ -389,7 +388,7 @@ class _DrivenLikelihood:
                     model, here, lower = trial, there, True
                     break
             if not lower or size < _SETTLED:
-                return DrivenFit(model, covariance, here, 0.0, np.zeros((3, 3)))
+                return DrivenFit(model, covariance, here, np.zeros((3, 3)))
         return None
 
 

@@ -178,7 +178,6 @@ class Budget:
     """
 
     names: tuple[str, ...]
-    units: tuple[str, ...]
     values: Array
     components: tuple[Component, ...] = ()
 
@@ -238,7 +237,7 @@ def make_budget(
             remedy="state spring_stiffness, or leave --budget and --uncertainties out",
         )
     quantities: list[Quantity] = [getattr(estimate, name) for name in names]
-    budget = Budget(names, tuple(q.unit for q in quantities), np.array([q.value for q in quantities]))
+    budget = Budget(names, np.array([quantity.value for quantity in quantities]))
     covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])
     places = [budget.names.index(name) for name in estimate.parameters]
     covariance[np.ix_(places, places)] = estimate.covariance_matrix
