@@ -92,6 +92,7 @@ def demodulate(record: Record) -> Demodulated | Status:
         sizes = np.abs(windows.amplitudes[:, 0])
         if last:
             break
+        # Lines through logarithm and phase: the decay rate, and a correction of the frequency.
         noise = max(windows.noise, _ROUGH * peak)
         weight = windows.samples * np.maximum(sizes, noise) ** 2
         weight[sizes < noise * np.sqrt(2.0 / windows.samples)] *= 1e-3
