@@ -22,8 +22,8 @@ from rich.table import Table
 from benchmarks.estimators import AMPLITUDE, records
 from identification import identify
 from identification.estimators.neural_posterior import NeuralPosterior
-from identification.neural.posterior.features import CAMPAIGN_NAMES, RECORD_NAMES
-from identification.neural.posterior.network import distribution, forward, variances
+from identification.neural.posterior import distribution, forward, variances
+from identification.neural.rivals import CAMPAIGN_NAMES, RECORD_NAMES
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
 from tunnel_lab.experiments.training_samples import read_shards

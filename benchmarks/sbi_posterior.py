@@ -23,8 +23,8 @@ from rich.console import Console
 
 from benchmarks.estimators import AMPLITUDE, records
 from benchmarks.neural_posterior import Row, show_clean
-from identification.neural.posterior.demodulated import WINDOWS, Demodulated, demodulate
-from identification.neural.posterior.features import record_features
+from identification.neural.demodulated import WINDOWS, Demodulated, demodulate
+from identification.neural.rivals import record_features
 from identification.signal.frequency import starting_frequency
 from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.experiments.training import FAR

@@ -15,8 +15,7 @@ from diagnosis.likelihood.nondimensional import free_frequency, frequency, respo
 from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
-from identification.examination.clock import with_clocks
-from identification.examination.examine import examine
+from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark

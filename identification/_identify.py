@@ -10,7 +10,6 @@ from identification.estimators import Estimator, make_estimator
 from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.statistics import widened_by_contradictions
-from identification.status import Examined
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import checked_drive
@@ -23,21 +22,18 @@ def identify(
     """Identify a campaign's coefficients and each of its runs.
 
     The campaign is examined first (`identification.examination.examine`): the estimate's remarks say what was
-    left out or cut.
+    left out or cut. Values that could not be identified are None; the statuses say why and what to do.
 
     Args:
-        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one file
-            of a data logger.
-        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
-            settings, such as ``OutputError(cycles_per_window=5)``.
+        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one
+            file of a data logger.
+        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own settings,
+            such as ``OutputError(cycles_per_window=5)``.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
 
-    Returns:
-        The estimate. Values that could not be identified are None; the statuses say why and what to do.
-
     Raises:
-        TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
-            records that the examination refuses, and, with ``throw``, when no run could be identified.
+        TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density, records
+        that the examination refuses, and, with ``throw``, when no run could be identified.
     """
     campaign = as_campaign(campaign)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
@@ -48,30 +44,26 @@ def identify(
     left = examined.campaign
     found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
     found = widened_by_contradictions(found, left, examined.remarks)
-    estimate = _of_all_runs(campaign, examined, as_angles(found, campaign.sensor))
+    estimate = as_angles(found, campaign.sensor)
+    if examined.remarks:  # they belong to the estimate, and so does every run of the campaign, in its order
+        of_runs = {run.id: run for run in estimate.runs}
+        cycling = {name for one in examined.remarks if in_limit_cycle(one.figures) for name in one.runs}
+        why = {
+            run.id: Status.LIMIT_CYCLE if run.id in cycling else Status.REPEATED_RUN
+            for run in campaign.runs
+            if run.id not in of_runs
+        }
+        of_runs |= {name: RunEstimate(name, (status,)) for name, status in why.items()}
+        estimate = replace(
+            estimate,
+            runs=tuple(of_runs[run.id] for run in campaign.runs),
+            statuses=by_severity({*estimate.statuses, *why.values()}),
+            remarks=(*examined.remarks, *estimate.remarks),
+        )
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)
     return estimate
-
-
-def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> Estimate:
-    """The estimate with the remarks of the examination and an entry for every run of the campaign, in its order."""
-    if not examined.remarks:
-        return estimate
-    found = {run.id: run for run in estimate.runs}
-    cycling = {name for remark in examined.remarks if in_limit_cycle(remark.figures) for name in remark.runs}
-    left_out = {
-        run.id: RunEstimate(run.id, (Status.LIMIT_CYCLE if run.id in cycling else Status.REPEATED_RUN,))
-        for run in campaign.runs
-        if run.id not in found
-    }
-    return replace(
-        estimate,
-        runs=tuple(found.get(run.id) or left_out[run.id] for run in campaign.runs),
-        statuses=by_severity({*estimate.statuses, *(run.status for run in left_out.values())}),
-        remarks=(*examined.remarks, *estimate.remarks),
-    )
 
 
 DRIVEN_ESTIMATORS = ("output_error", "filter_error")
@@ -79,10 +71,7 @@ DRIVEN_ESTIMATORS = ("output_error", "filter_error")
 
 
 def refuse_driven(campaign: Campaign, name: str) -> None:
-    """Refuse driven runs that an estimator would take for free decays.
-
-    Args:
-        name: of the estimator.
+    """Refuse driven runs that an estimator, by its name, would take for free decays.
 
     Raises:
         TunnelError: naming the first such run.

@@ -33,7 +33,6 @@ class SpringRow:
     """One spring of Table II, measured with the wind off.
 
     Args:
-        number: of the spring.
         stiffness_n_m_per_rad: Kr, N m/rad.
         frequency_hz: of the free oscillation, Hz.
     """
@@ -65,7 +64,6 @@ class DerivativeRow:
     """One row of Table IV.
 
     Args:
-        method: ``neural network`` or ``conventional``.
         cn_beta_per_rad: Cnβ, 1/rad; positive lowers the frequency.
         cn_r_per_rad: Cnr, 1/rad; negative adds damping.
     """
@@ -84,15 +82,11 @@ def paper_springs() -> tuple[SpringRow, ...]:
 
 
 def paper_windows() -> tuple[WindowRow, ...]:
-    """Table III: damping and frequency of one wind-on run, three cycles at a time.
-
-    Returns:
-        Eight rows, in the order of time.
-    """
+    """Table III: damping and frequency of one wind-on run, three cycles at a time, in the order of time."""
+    rows = [(int(row["window"]), row) for row in _table("table3-windows.csv")]
     return tuple(
         WindowRow(number, float(row["zeta"]), float(row["omega_n_rad_per_s"]), _SECOND_READING.get(number))
-        for row in _table("table3-windows.csv")
-        for number in (int(row["window"]),)
+        for number, row in rows
     )
 
 
@@ -105,13 +99,9 @@ def paper_derivatives() -> tuple[DerivativeRow, ...]:
 
 
 def measured_campaign(name: str) -> Campaign:
-    """A packaged measured campaign.
+    """A packaged campaign of :data:`MEASURED_CAMPAIGNS`, angles in radians.
 
-    Args:
-        name: one of :data:`MEASURED_CAMPAIGNS`.
-
-    Returns:
-        The campaign, angles in radians. It states no spring stiffness, so only omega_n and zeta can be identified.
+    It states no spring stiffness, so only omega_n and zeta can be identified.
 
     Raises:
         TunnelError: there is no such campaign.

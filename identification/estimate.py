@@ -1,7 +1,6 @@
 """The result of an estimator: values with standard deviations, and statuses that say what to do.
 
-All estimators return an `Estimate`. A value that could not be identified is None, never NaN, and a `Status` says
-why and what to do.
+A value that could not be identified is None, never NaN, and a `Status` says why and what to do.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import numpy as np
 import polars as pl
 from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter
 
+from identification.printing import as_html, as_text, estimate_brief, estimate_parts
 from identification.status import Remark
 from identification.status import Status as Status
 from identification.status import by_severity as by_severity
@@ -233,20 +233,14 @@ class Estimate:
 
     def __str__(self) -> str:
         """The coefficients and the first runs as short tables, and the notes on them."""
-        from identification.printing import as_text, estimate_parts
-
         return as_text(estimate_parts(self.to_json_dict()))
 
     def __repr__(self) -> str:
         """The coefficients, the number of runs, and where to go from here, in three lines."""
-        from identification.printing import estimate_brief
-
         return estimate_brief(self.to_json_dict())
 
     def _repr_html_(self) -> str:
         """The same as `__str__` for notebooks."""
-        from identification.printing import as_html, estimate_parts
-
         return as_html(estimate_parts(self.to_json_dict()))
 
     def coefficients_frame(self) -> pl.DataFrame:
@@ -287,10 +281,7 @@ class Estimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Estimate:
-        """The inverse of `to_json_dict`.
-
-        Args:
-            data: the document; further keys, such as those of the budget, are ignored.
+        """The inverse of `to_json_dict`; further keys, such as those of the budget, are ignored.
 
         Raises:
             TunnelError: when it is not an estimate: a key is missing, or a value has the wrong type or is not
@@ -318,16 +309,6 @@ def estimate_schema() -> dict[str, Any]:
     return found
 
 
-_LONG = {
-    "quantity": pl.String,
-    "value": pl.Float64,
-    "std": pl.Float64,
-    "unit": pl.String,
-    "low": pl.Float64,
-    "high": pl.Float64,
-}
-
-
 def as_pandas(frame: pl.DataFrame) -> DataFrame:
     """A frame for pandas, by its columns: Polars' own way needs pyarrow.
 
@@ -343,14 +324,10 @@ def as_pandas(frame: pl.DataFrame) -> DataFrame:
 
 
 def long_frame(quantities: Mapping[str, Mapping[str, Any] | None]) -> pl.DataFrame:
-    """A row for each quantity.
+    """A row for each quantity: columns quantity, value, std, unit, and low and high, the ends of its 95 % interval.
 
     Args:
-        quantities: value, std, unit and perhaps interval by name; None where there is none.
-
-    Returns:
-        Columns quantity, value, std, unit, and low and high, the ends of the 95 % interval; null where there is
-        no quantity.
+        quantities: value, std, unit and perhaps interval by name; None where there is none, which gives nulls.
     """
     rows = []
     for name, given in quantities.items():
@@ -360,21 +337,19 @@ def long_frame(quantities: Mapping[str, Mapping[str, Any] | None]) -> pl.DataFra
             low, high = given.get("interval") or (given["value"] - reach, given["value"] + reach)
             row |= {key: given[key] for key in ("value", "std", "unit")} | {"low": low, "high": high}
         rows.append(row)
-    return pl.DataFrame(rows, schema=_LONG)
+    numbers = dict.fromkeys(("value", "std"), pl.Float64)
+    ends = dict.fromkeys(("low", "high"), pl.Float64)
+    return pl.DataFrame(rows, schema={"quantity": pl.String, **numbers, "unit": pl.String, **ends})
 
 
 def wide_frame(
     rows: Sequence[Mapping[str, Any]], plain: Mapping[str, type[pl.DataType]], quantities: Sequence[str]
 ) -> pl.DataFrame:
-    """A row for each document, two columns for each quantity.
+    """A row for each document: the plain columns, then the value of each quantity, and its ``_std``.
 
     Args:
         plain: keys whose values are taken as they are, with their types.
         quantities: keys of quantities, which have a value and a std, or are None.
-
-    Returns:
-        The plain columns, then for each quantity its value under its name and its standard deviation under the
-        name with ``_std``; null where there is none.
     """
     columns: dict[str, list[Any]] = {name: [row[name] for row in rows] for name in plain}
     for name in quantities:

@@ -1,7 +1,6 @@
 """How results are printed: numbers with their standard deviations, tables, and the parts of an estimate.
 
-Two significant digits of the standard deviation determine those of the value. Tables and paragraphs are printed as
-plain text for a console and as HTML for a notebook. An estimate is printed from its JSON document.
+Two significant digits of the standard deviation determine those of the value.
 """
 
 from __future__ import annotations
@@ -51,35 +50,21 @@ NEGLIGIBLE = 1e-9
 
 
 def unit_mark(unit: str) -> str:
-    """A unit with raised powers.
-
-    Args:
-        unit: of a document, such as ``m3/rad`` or ``N m s2/rad2``.
-
-    Returns:
-        Text such as ``m³/rad``; a 1 stays.
-    """
+    """A unit of a document with raised powers: ``m³/rad`` of ``m3/rad``; a 1 stays."""
     return re.sub(r"(?<=[A-Za-z])[234]\b", lambda found: "²³⁴"[int(found[0]) - 2], unit)
 
 
 def coefficient_label(name: str, unit: str) -> str:
-    """A coefficient's symbol and unit.
-
-    Returns:
-        Text such as ``Cnβ [1/rad]``.
-    """
+    """A coefficient's symbol and unit, such as ``Cnβ [1/rad]``."""
     return f"{COEFFICIENTS.get(name, name)} [{unit_mark(unit)}]"
 
 
 def significant(value: float, digits: int = 4) -> str:
-    """A number whose uncertainty is not known.
+    """A number whose uncertainty is not known, in fixed notation where that is short.
 
     Args:
         value: the number, any unit.
         digits: significant digits (a count).
-
-    Returns:
-        Fixed notation where it is short, otherwise with a power of ten.
     """
     if not math.isfinite(value):
         return "not finite"
@@ -92,14 +77,11 @@ def significant(value: float, digits: int = 4) -> str:
 
 
 def with_std(value: float, std: float | None) -> str:
-    """A value and its standard deviation, both rounded to two significant digits of the latter.
+    """A value and its standard deviation, such as ``0.4951 ± 0.0012`` or ``(1.234 ± 0.056)e-05``.
 
     Args:
         value: the estimate, any unit.
         std: its standard deviation, in the same unit; None where it is not known.
-
-    Returns:
-        Text such as ``0.4951 ± 0.0012`` or ``(1.234 ± 0.056)e-05``.
     """
     special = _special(value, std)
     if special or std is None:
@@ -114,15 +96,7 @@ def with_std(value: float, std: float | None) -> str:
 
 
 def concise(value: float, std: float | None) -> str:
-    """The same as `with_std` in the short notation of metrology, for narrow columns.
-
-    Args:
-        value: the estimate, any unit.
-        std: its standard deviation, in the same unit; None where it is not known.
-
-    Returns:
-        Text such as ``0.4951(12)``: the deviation counts in the last digits, unless it has a point itself.
-    """
+    """The short notation of metrology, such as ``0.4951(12)``, for narrow columns: arguments as in `with_std`."""
     special = _special(value, std)
     if special or std is None:
         return special
@@ -136,14 +110,11 @@ def concise(value: float, std: float | None) -> str:
 
 
 def in_stds(error: float, std: float | None) -> str:
-    """An error in standard deviations.
+    """An error in standard deviations, such as ``+0.8 σ``; ``–`` where the standard deviation is not known.
 
     Args:
         error: estimate − truth, any unit.
         std: standard deviation of the estimate, in the same unit; None where it is not known.
-
-    Returns:
-        Text such as ``+0.8 σ``; ``–`` where the standard deviation is not known.
     """
     if std is None or not math.isfinite(std) or std <= 0.0:
         return "–"
@@ -152,14 +123,7 @@ def in_stds(error: float, std: float | None) -> str:
 
 
 def unit(text: str) -> str:
-    """A unit as printed, in brackets.
-
-    Args:
-        text: as in an estimate's JSON, such as ``kg m2``.
-
-    Returns:
-        Text such as ``[kg m²]``.
-    """
+    """A unit of an estimate's JSON as printed: ``[kg m²]`` of ``kg m2``."""
     return f"[{unit_mark(text)}]"
 
 
@@ -185,60 +149,38 @@ def _exponent(value: float, digits: int) -> int:
 
 
 def at_bound(given: Mapping[str, Any]) -> str:
-    """The mark of a parameter that stopped at the end of its range.
-
-    Args:
-        given: value, std and unit, and ``bound`` where there is one.
-
-    Returns:
-        Text such as `` (at its upper bound)``; empty inside the range.
-    """
+    """The mark of a parameter at the end of its range, such as `` (at its upper bound)``; empty inside it."""
     return f" (at its {given['bound']} bound)" if given.get("bound") else ""
 
 
 def estimated(given: Mapping[str, Any], mark: str = "") -> str:
-    """An estimate of a document.
+    """An estimate of a document: ``0.4951 ± 0.0012``, ``0.4951 ± 0.0012 (0.4939 to 0.4986)``, or not determined.
 
     Args:
         given: value, std and unit; ``bound`` where it stopped at the end of its range, ``determined`` where it is
             false, and ``interval`` where that is not value ± 1.96 std. A std of zero means that the value was
             given, not fitted.
-        mark: of the unit, where it is to be shown.
-
-    Returns:
-        Text such as ``0.4951 ± 0.0012``, with an interval ``0.4951 ± 0.0012 (0.4939 to 0.4986)``, or
-        ``not determined by these runs``.
     """
     if not given.get("determined", True):
         return UNDETERMINED
     value = with_std(given["value"], given["std"]) if given["std"] else significant(given["value"])
-    return f"{value} {mark}".rstrip() + at_bound(given) + _ends(given)
-
-
-def _ends(given: Mapping[str, Any]) -> str:
-    """The interval with as many digits as the value; empty where there is none."""
+    text = f"{value} {mark}".rstrip() + at_bound(given)
     if not given.get("interval") or not given["std"]:
-        return ""
+        return text
+    # The ends of the interval have as many digits as the value.
     texts = [with_std(end, given["std"]) for end in given["interval"]]
-    powers = [text.rpartition(")")[2] if text.startswith("(") else "" for text in texts]
+    powers = [end.rpartition(")")[2] if end.startswith("(") else "" for end in texts]
     low, high = (
-        text.partition(" ± ")[0].removeprefix("(") + power for text, power in zip(texts, powers, strict=True)
+        end.partition(" ± ")[0].removeprefix("(") + power for end, power in zip(texts, powers, strict=True)
     )
-    return f" ({low} to {high})"
+    return f"{text} ({low} to {high})"
 
 
 UNDETERMINED = "not determined by these runs"
 
 
 def p_text(value: float) -> str:
-    """A p-value, never rounded to 0.
-
-    Args:
-        value: a probability.
-
-    Returns:
-        Two significant digits, such as ``= 3.7e-08``, or ``< 1e-300``.
-    """
+    """The text of a probability, never rounded to 0: such as ``= 3.7e-08``, or ``< 1e-300``."""
     return f"= {value:.2g}" if value >= _LEAST_P else f"< {_LEAST_P:.0e}"
 
 
@@ -302,14 +244,7 @@ class TextTable:
 
 
 def as_text(parts: Iterable[str | TextTable]) -> str:
-    """Paragraphs and tables as plain text, with an empty line around each table.
-
-    Args:
-        parts: in their order; tables without rows are left out.
-
-    Returns:
-        The text, without a line end at its end.
-    """
+    """Paragraphs and tables as plain text, with an empty line around each table; empty ones are left out."""
     blocks = [
         f"\n{part.text()}\n" if isinstance(part, TextTable) else textwrap.fill(part, WIDTH)
         for part in _filled(parts)
@@ -318,14 +253,7 @@ def as_text(parts: Iterable[str | TextTable]) -> str:
 
 
 def as_html(parts: Iterable[str | TextTable]) -> str:
-    """Paragraphs and tables as HTML.
-
-    Args:
-        parts: in their order; tables without rows are left out.
-
-    Returns:
-        One ``div``.
-    """
+    """Paragraphs and tables as one ``div`` of HTML; empty ones are left out."""
     blocks = [
         part.html() if isinstance(part, TextTable) else f"<p>{escape(part)}</p>" for part in _filled(parts)
     ]
@@ -344,11 +272,7 @@ SHOWN_RUNS = 16
 
 
 def estimate_parts(document: Document) -> list[str | TextTable]:
-    """What is printed of an estimate.
-
-    Returns:
-        The coefficients, the runs, and a paragraph for each note.
-    """
+    """What is printed of an estimate: the coefficients, the runs, and a paragraph for each note."""
     notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     notes += status_lines(document)
     left = len(document["runs"]) - SHOWN_RUNS
@@ -374,11 +298,7 @@ def estimate_brief(document: Document) -> str:
 
 
 def coefficients_table(document: Document) -> TextTable:
-    """The campaign's coefficients that could be identified.
-
-    Returns:
-        A table; without rows when the campaign gives normalised form only.
-    """
+    """The campaign's coefficients that could be identified; no rows where there are none."""
     names = {**SYMBOLS, "wind_off_inertia": "Izz, gradient of Kr over ωn²"}
     rows = tuple(
         (f"{symbol} {unit(document[name]['unit'])}", _with_std(document[name]))
@@ -390,11 +310,7 @@ def coefficients_table(document: Document) -> TextTable:
 
 
 def runs_table(document: Document) -> TextTable:
-    """Natural frequency and damping ratio of the first runs.
-
-    Returns:
-        A table with a row for each run, `SHOWN_RUNS` of them at most.
-    """
+    """Natural frequency and damping ratio of the first runs, `SHOWN_RUNS` of them at most."""
     rows = tuple(
         (run["id"], _with_std(run["omega_n"]), _with_std(run["zeta"]), run["status"].replace("_", " "))
         for run in document["runs"][:SHOWN_RUNS]
@@ -404,11 +320,7 @@ def runs_table(document: Document) -> TextTable:
 
 
 def status_lines(document: Document) -> list[str]:
-    """What the estimate and its runs have to say, each thing once.
-
-    Returns:
-        A line for each status other than "identified", with the runs it concerns and the remedy.
-    """
+    """What the estimate and its runs have to say, each status once, with the runs it concerns and the remedy."""
     runs: dict[str, list[str]] = {name: [] for name in document["statuses"] if name != "ok"}
     for run in document["runs"]:
         for name in run["statuses"]:

@@ -1,17 +1,8 @@
 """Estimates against the truth: accuracy, and whether a method got worse than a baseline.
 
-Accuracy is bias, RMSE, RMSE over the bound, coverage and failures, each with the sampling error that follows
-from the number of trials. These are pure functions of numbers; the caller knows the estimators and the records.
-Standard errors of bias and RMSE are those of means (delta method for the root); shares have Wilson's intervals
-(E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209–212, doi 10.1080/01621459.1927.10502953).
-
-Whether a method got worse than a baseline is tested at a stated false-alarm rate. The tests use only ranks and
-counts, so they are exact, or nearly so, for any distribution of the errors. If nothing changed, old and new
-trials are exchangeable, and so is any choice made from both together (a direction, a threshold). Many tests
-share one false-alarm rate by Holm's method.
-
-Sources: rank sum over strata, P. van Elteren, Bull. Int. Stat. Inst. 37 (1960) 351–361; Fisher's exact test;
-S. Holm, Scand. J. Stat. 6 (1979) 65–70.
+Standard errors of bias and RMSE are those of means (delta method for the root). The tests against a baseline use
+only ranks and counts, so they are exact, or nearly so, for any distribution of the errors. If nothing changed,
+old and new trials are exchangeable, and so is any choice made from both together (a direction, a threshold).
 """
 
 from __future__ import annotations
@@ -22,6 +13,7 @@ from math import hypot, sqrt
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.estimate import Quantity
 from identification.policy import DIFFERENCE_RATE, LEAST_CHANGE, OUTLIER_MEDIANS
@@ -40,9 +32,8 @@ class ScoredEstimate:
 
     Args:
         truth: true value, in the quantity's unit.
-        found: the estimate; None where the method failed.
-        bound: smallest standard deviation any unbiased estimator can have, in the same unit; None where it is
-            not known.
+        bound: smallest standard deviation any unbiased estimator can have, in the same unit; None where not
+            known.
     """
 
     truth: float
@@ -87,10 +78,7 @@ class Trials:
 
 
 def collect(outcomes: Iterable[ScoredEstimate]) -> Trials:
-    """Outcomes as arrays.
-
-    Args:
-        outcomes: of one method and one quantity.
+    """Outcomes of one method and one quantity as arrays.
 
     Raises:
         ValueError: when units are mixed or an estimate is not finite.
@@ -117,12 +105,9 @@ def collect(outcomes: Iterable[ScoredEstimate]) -> Trials:
 
 @dataclass(frozen=True)
 class Score:
-    """The figures of a method. A figure is None where fewer than two trials gave an estimate.
-
-    Each `Quantity` is a figure with its standard error.
+    """The figures of a method, each with its standard error; None where fewer than two trials gave an estimate.
 
     Args:
-        failures: those without an estimate.
         bias: mean error, in the quantity's unit.
         relative_bias: mean of error over the size of the truth, %; None where a truth is zero.
         bias_in_stds: mean of error over the reported standard deviation; None where one of these is zero.
@@ -142,10 +127,7 @@ class Score:
 
 
 def score(trials: Trials) -> Score:
-    """Score the trials of one method and one quantity.
-
-    Args:
-        trials: at least one.
+    """Score the trials of one method and one quantity, at least one.
 
     Raises:
         ValueError: when there is no trial.
@@ -192,13 +174,9 @@ def root_mean_square(values: Array, unit: str) -> Quantity:
 
 
 def overall(scores: Iterable[Score]) -> Quantity | None:
-    """One figure for many cells: the root mean square of their RMSE over the bound, with its standard error.
+    """The root mean square over cells of their RMSE over the bound, with its standard error.
 
-    Args:
-        scores: of one method and one quantity, one per cell; those without the figure are left out.
-
-    Returns:
-        The figure, of unit 1; None where no cell has one.
+    None where no cell has one.
     """
     figures = [one.rmse_over_bound for one in scores if one.rmse_over_bound is not None]
     if not figures:
@@ -231,43 +209,43 @@ class Change:
 
 
 def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ...]:
-    """Every aspect of a method over one cell, or over several together.
+    """Every aspect of a method over one cell, or over several together; the baseline's trials come first.
 
     ``bias`` is the mean error, worse when it moves away from zero; ``spread`` the root mean square error;
     ``outliers`` the share of errors beyond six medians of their size; ``coverage`` that of 95 % intervals, worse
     further from 95 %.
 
-    Args:
-        before: the baseline's trials, one entry per cell.
-        now: the same cells.
-
     Raises:
         ValueError: when the cells differ in number, or a bound is known on one side only.
     """
     pairs = list(zip(before, now, strict=True))
-    scaled = [_scaled(old, new) for old, new in pairs]
-    same = all(
-        np.array_equal(old.truth, new.truth) for old, new in pairs
-    )  # the truths are drawn, so equal truths mean equal records
+    for old, new in pairs:
+        if old.error.size and new.error.size and (old.bound is None) != (new.bound is None):
+            raise ValueError("a bound is known on one side only")
+    # The truths are drawn, so equal truths mean equal records.
+    same = all(np.array_equal(old.truth, new.truth) for old, new in pairs)
+    scaled = [(old.scaled, new.scaled) for old, new in pairs]
+    failures, covered, beyond = np.zeros((3, 2, 2), dtype=int)  # number and total, before and now
+    for pair, errors in zip(pairs, scaled, strict=True):
+        both = np.abs(np.concatenate(errors))
+        limit = OUTLIER_MEDIANS * float(np.median(both)) if both.size else 0.0
+        for side, trials in enumerate(pair):
+            failures[side] += trials.failures, trials.count
+            covered[side] += trials.covered, trials.error.size
+            beyond[side] += int(np.sum(np.abs(errors[side]) > limit)), trials.error.size
     return (
-        _bias(scaled, same),
-        _spread(scaled, same),
-        _outliers(scaled),
-        _coverage(pairs),
-        _shares(
-            "failures",
-            (sum(old.failures for old, _ in pairs), sum(old.count for old, _ in pairs)),
-            (sum(new.failures for _, new in pairs), sum(new.count for _, new in pairs)),
-        ),
+        *_errors(scaled, same),
+        _share("outliers", beyond, larger_is_worse=True),
+        _share("coverage", covered, larger_is_worse=False),
+        _share("failures", failures, larger_is_worse=True),
     )
 
 
 def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool, ...]:
-    """Which of several tests are significant, with a probability of ``rate`` for any false alarm among them.
+    """Which of several tests are significant, by S. Holm, Scand. J. Stat. 6 (1979) 65–70.
 
     Args:
-        p_values: one per test.
-        rate: probability of at least one false alarm.
+        rate: probability of at least one false alarm among them.
     """
     order = sorted(range(len(p_values)), key=p_values.__getitem__)
     verdicts = [False] * len(p_values)
@@ -278,113 +256,61 @@ def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool
     return tuple(verdicts)
 
 
-def _scaled(old: Trials, new: Trials) -> tuple[Array, Array]:
-    if old.error.size and new.error.size and (old.bound is None) != (new.bound is None):
-        raise ValueError("a bound is known on one side only")
-    return old.scaled, new.scaled
-
-
-def _bias(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
-    # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
-    turned = []
+def _errors(scaled: Sequence[tuple[Array, Array]], same: bool) -> tuple[Change, Change]:
+    """The changes of bias and of spread."""
+    turned, sizes, means = [], [], []
     for old, new in scaled:
         both = np.concatenate((old, new))
+        # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
         direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
         turned.append((direction * old, direction * new))
-    before, now = (_mean_size(scaled, side) for side in (0, 1))
-    least = before + (LEAST_CHANGE * _root_mean_square(scaled, 0) if same else 0.0)
-    return Change("bias", before, now, _larger(turned, same) if now > least else 1.0)
-
-
-def _spread(scaled: Sequence[tuple[Array, Array]], same: bool) -> Change:
-    sizes = [(np.abs(old), np.abs(new)) for old, new in scaled]
-    before, now = (_root_mean_square(scaled, side) for side in (0, 1))
+        sizes.append((np.abs(old), np.abs(new)))
+    for side in (0, 1):
+        cells = [abs(float(pair[side].mean())) for pair in scaled if pair[side].size]
+        means.append(float(np.mean(cells)) if cells else 0.0)
+    every = [np.concatenate([pair[side] for pair in scaled]) if scaled else np.zeros(0) for side in (0, 1)]
+    before, now = (float(np.sqrt(np.mean(errors**2))) if errors.size else 0.0 for errors in every)
+    least = means[0] + (LEAST_CHANGE * before if same else 0.0)
+    bias = Change("bias", means[0], means[1], _larger(turned, same) if means[1] > least else 1.0)
     least = before * (1.0 + LEAST_CHANGE if same else 1.0)
-    return Change("spread", before, now, _larger(sizes, same) if now > least else 1.0)
+    return bias, Change("spread", before, now, _larger(sizes, same) if now > least else 1.0)
 
 
-def _outliers(scaled: Sequence[tuple[Array, Array]]) -> Change:
-    counts = np.zeros((2, 2), dtype=int)
-    for pair in scaled:
-        both = np.abs(np.concatenate(pair))
-        limit = OUTLIER_MEDIANS * float(np.median(both)) if both.size else 0.0
-        for side, values in enumerate(pair):
-            counts[side] += int(np.sum(np.abs(values) > limit)), values.size
-    (old, old_total), (new, new_total) = counts.tolist()
-    return _shares("outliers", (old, old_total), (new, new_total))
-
-
-def _coverage(pairs: Sequence[tuple[Trials, Trials]]) -> Change:
+def _share(aspect: Aspect, counts: NDArray[np.int64], *, larger_is_worse: bool) -> Change:
+    """The change of a share by Fisher's exact test; of the coverage, further from 95 % is worse."""
     from scipy.stats import fisher_exact
 
-    totals = [sum(pair[side].error.size for pair in pairs) for side in (0, 1)]
-    covered = [sum(pair[side].covered for pair in pairs) for side in (0, 1)]
-    if 0 in totals:
-        return Change("coverage", 1.0, 1.0, 1.0)
-    before, now = (count / total for count, total in zip(covered, totals, strict=True))
-    worse = abs(now - NOMINAL_COVERAGE) > abs(before - NOMINAL_COVERAGE)
-    table = np.array([[count, total - count] for count, total in zip(covered, totals, strict=True)])
-    return Change("coverage", before, now, float(fisher_exact(table).pvalue) if worse else 1.0)
-
-
-def _shares(aspect: Aspect, old: tuple[int, int], new: tuple[int, int]) -> Change:
-    """A share for which larger is worse."""
-    from scipy.stats import fisher_exact
-
-    if 0 in (old[1], new[1]):
-        return Change(aspect, 0.0, 0.0, 1.0)
-    before, now = old[0] / old[1], new[0] / new[1]
-    if now <= before:
+    if 0 in counts[:, 1]:
+        nothing = 0.0 if larger_is_worse else 1.0
+        return Change(aspect, nothing, nothing, 1.0)
+    before, now = (count / total for count, total in counts.tolist())
+    worse = now > before if larger_is_worse else abs(now - NOMINAL_COVERAGE) > abs(before - NOMINAL_COVERAGE)
+    if not worse:
         return Change(aspect, before, now, 1.0)
-    table = np.array([[new[0], new[1] - new[0]], [old[0], old[1] - old[0]]])
-    return Change(aspect, before, now, float(fisher_exact(table, alternative="greater").pvalue))
+    table = np.column_stack((counts[:, 0], counts[:, 1] - counts[:, 0]))
+    test = fisher_exact(table[::-1], alternative="greater") if larger_is_worse else fisher_exact(table)
+    return Change(aspect, before, now, float(test.pvalue))
 
 
 def _larger(cells: Sequence[tuple[Array, Array]], same: bool) -> float:
-    """One-sided p-value for larger new values."""
-    return _signed_rank(cells) if same else _rank_sum(cells)
-
-
-def _signed_rank(cells: Sequence[tuple[Array, Array]]) -> float:
-    """Of pairs, ranked within each cell; pairs without a difference do not count."""
-    from scipy.special import ndtr
-    from scipy.stats import rankdata
-
-    excess = variance = 0.0
-    for old, new in cells:
-        difference = (new - old)[new != old]
-        if difference.size:
-            ranks = rankdata(np.abs(difference)) / difference.size
-            excess += float(np.sign(difference) @ ranks)
-            variance += float(ranks @ ranks)
-    return float(ndtr(-excess / np.sqrt(variance))) if variance > 0.0 else 1.0
-
-
-def _rank_sum(cells: Sequence[tuple[Array, Array]]) -> float:
-    """Of independent values, ranked within each cell."""
+    """One-sided p-value for larger new values: of pairs of the same records, or of independent values."""
     from scipy.special import ndtr
     from scipy.stats import rankdata
 
     excess = variance = 0.0
     for old, new in cells:
         n, m = old.size, new.size
-        if n == 0 or m == 0:
-            continue
-        ranks = rankdata(np.concatenate((old, new)))
-        # Weighted by 1/(n + m + 1) after van Elteren; the variance is that of the actual ranks, with ties.
-        weight = 1.0 / (n + m + 1)
-        excess += weight * (float(ranks[n:].sum()) - m * (n + m + 1) / 2.0)
-        variance += weight**2 * n * m / (n + m) * float(ranks.var(ddof=1))
+        if same:  # signed ranks within each cell; pairs without a difference do not count
+            difference = (new - old)[new != old]
+            if difference.size:
+                ranks = rankdata(np.abs(difference)) / difference.size
+                excess += float(np.sign(difference) @ ranks)
+                variance += float(ranks @ ranks)
+        elif n and m:
+            ranks = rankdata(np.concatenate((old, new)))
+            # Weighted by 1/(n + m + 1) after P. van Elteren, Bull. Int. Stat. Inst. 37 (1960) 351–361; the variance
+            # is that of the actual ranks, with ties.
+            weight = 1.0 / (n + m + 1)
+            excess += weight * (float(ranks[n:].sum()) - m * (n + m + 1) / 2.0)
+            variance += weight**2 * n * m / (n + m) * float(ranks.var(ddof=1))
     return float(ndtr(-excess / np.sqrt(variance))) if variance > 0.0 else 1.0
-
-
-def _mean_size(scaled: Sequence[tuple[Array, Array]], side: int) -> float:
-    """Mean over cells of the size of the mean error."""
-    means = [abs(float(pair[side].mean())) for pair in scaled if pair[side].size]
-    return float(np.mean(means)) if means else 0.0
-
-
-def _root_mean_square(scaled: Sequence[tuple[Array, Array]], side: int) -> float:
-    """Of all errors of a side."""
-    every = np.concatenate([pair[side] for pair in scaled]) if scaled else np.zeros(0)
-    return float(np.sqrt(np.mean(every**2))) if every.size else 0.0

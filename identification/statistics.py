@@ -1,14 +1,8 @@
 """Linear algebra and statistics that every estimator shares.
 
-Information matrices are solved, inverted, extended, and rid of unknowns that nobody asks for. Straight lines go
-through points of known variance, with a test of their scatter. A share of trials has a confidence interval.
-
 Where the model explains the data, the covariance is the inverse of Fisher's information. Where it does not, the
-residual is not white: the variances are widened by its power in the band of the oscillation, or to the scatter
-of the runs, whichever is larger. The diagnosis uses the same scatter.
-
-Where the statements of a campaign contradict its frequencies, no estimator can know which of them is wrong: the
-largest change that a correction makes is the half-width of a rectangular distribution (GUM 4.3.7).
+residual is not white: the variances are widened by its power in the band of the oscillation, or to the scatter of
+the runs, whichever is larger. The diagnosis uses the same scatter.
 """
 
 from __future__ import annotations
@@ -29,9 +23,8 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
 _WORST_CONDITION = 1e13
-_SMALLEST = (
-    1e-290  # of a variance or an information: its square root and its inverse still have full precision
-)
+# Of a variance or an information: its square root and its inverse still have full precision.
+_SMALLEST = 1e-290
 
 
 def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
@@ -40,10 +33,6 @@ def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array
     Args:
         information: shape (m, m).
         score: shape (m,).
-        keep: how many unknowns to keep.
-
-    Returns:
-        Shapes (keep, keep) and (keep,).
     """
     cross = information[keep:, :keep]
     solved = scaled_solve(information[keep:, keep:], np.column_stack((cross, score[keep:])))
@@ -57,9 +46,6 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
         matrix: shape (m, m).
         right: shape (m,) or (m, n).
 
-    Returns:
-        The solution, of the shape of ``right``.
-
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
     """
@@ -68,29 +54,19 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
         raise np.linalg.LinAlgError("an unknown does not influence the reading")
     scale = np.sqrt(diagonal)
     unit = scale if right.ndim == 1 else scale[:, None]
-    if scale.size == 2:
-        return _solve_two(float(matrix[0, 1] / (scale[0] * scale[1])), right / unit) / unit
-    solution = np.linalg.solve(matrix / (scale[:, None] * scale), right / unit)
-    return np.asarray(solution / unit)
-
-
-def _solve_two(correlation: float, right: Array) -> Array:
+    if scale.size != 2:
+        return np.asarray(np.linalg.solve(matrix / (scale[:, None] * scale), right / unit) / unit)
     # Systems of two are by far the most common, and calling LAPACK costs ten times their solution.
+    correlation, right = float(matrix[0, 1] / (scale[0] * scale[1])), right / unit
     pivot = 1.0 - correlation**2
     if not pivot > 0.0:
         raise np.linalg.LinAlgError("two unknowns have the same influence")
     second = (right[1] - correlation * right[0]) / pivot
-    return np.array((right[0] - correlation * second, second))
+    return np.array((right[0] - correlation * second, second)) / unit
 
 
 def inverse(information: Array) -> Array:
-    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
-
-    Args:
-        information: shape (m, m).
-
-    Returns:
-        Shape (m, m).
+    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit, shape (m, m).
 
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
@@ -100,17 +76,10 @@ def inverse(information: Array) -> Array:
 
 
 def determined(matrix: Array) -> bool:
-    """Whether a symmetric matrix is positive definite to working precision, whatever the units of its unknowns.
+    """Whether a symmetric matrix, shape (m, m), is positive definite to working precision, whatever its units.
 
-    An information matrix is checked before it is inverted, and a covariance before it is used. If it fails, the
-    data do not separate the unknowns, and a status says so instead of a number.
-
-    Args:
-        matrix: shape (m, m).
-
-    Returns:
-        False where an element is not finite, a diagonal one is not positive, or the matrix scaled to a unit
-        diagonal has a condition number above 1e13: its inverse then holds less than three correct digits.
+    An information matrix is checked before it is inverted, and a covariance before it is used. With a condition
+    number above 1e13, after scaling to a unit diagonal, the inverse holds less than three correct digits.
     """
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix).all() and diagonal.min() > _SMALLEST and diagonal.max() < 1.0 / _SMALLEST):
@@ -121,14 +90,10 @@ def determined(matrix: Array) -> bool:
 
 
 def embed(link: Array, *, with_zero: bool) -> Array:
-    """A run's link extended by the common zero as last parameter.
+    """A run's link extended by the common zero as last parameter, shape (3, p + 1); the link itself without it.
 
     Args:
         link: from the shared parameters to (a, k), shape (2, p).
-        with_zero: whether the zero is among the shared parameters.
-
-    Returns:
-        Shape (3, p + 1); the link itself without the zero.
     """
     if not with_zero:
         return link
@@ -139,28 +104,16 @@ def embed(link: Array, *, with_zero: bool) -> Array:
     return extended
 
 
-@dataclass(frozen=True, eq=False)
-class WeightedFit:
-    """Linear least squares.
-
-    Args:
-        values: of the unknowns, shape (p,).
-        covariance: shape (p, p); widened where the scatter is beyond chance.
-        residual: shape (n,).
-    """
-
-    values: Array
-    covariance: Array
-    residual: Array
-
-
-def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
-    """Least squares with known variances, which are raised where the scatter is beyond chance.
+def weighted_fit(columns: Array, target: Array, variance: Array) -> tuple[Array, Array]:
+    """Linear least squares with known variances, which are raised where the scatter is beyond chance.
 
     Args:
         columns: one per unknown, shape (n, p) with n above p.
         target: shape (n,).
         variance: of the target's points, shape (n,).
+
+    Returns:
+        The unknowns, shape (p,), and their covariance, shape (p, p).
     """
     weights = 1.0 / variance
     normal = columns.T @ (columns * weights[:, None])
@@ -169,35 +122,29 @@ def weighted_fit(columns: Array, target: Array, variance: Array) -> WeightedFit:
     freedom = target.size - values.size
     scatter = float(residual @ (weights * residual))
     beyond = scatter > float(chdtri(freedom, MISFIT_RATE))
-    return WeightedFit(values, inverse(normal) * (scatter / freedom if beyond else 1.0), residual)
+    return values, inverse(normal) * (scatter / freedom if beyond else 1.0)
 
 
 def decay_covariance(rate: float, omega_d: float, rate_variance: float, omega_variance: float) -> Array:
-    """Covariance of (a, k) from independent decay rate and damped frequency: k = ωd² + a².
+    """Covariance of (a, k), shape (2, 2), from independent decay rate and damped frequency: k = ωd² + a².
 
     Args:
         rate: a, 1/s.
         omega_d: damped angular frequency, rad/s.
         rate_variance: of a, (1/s)², square of a standard deviation in 1/s.
         omega_variance: of ωd, square of a standard deviation in rad/s.
-
-    Returns:
-        Shape (2, 2).
     """
     slope = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega_d]])
     return np.asarray(slope @ np.diag([rate_variance, omega_variance]) @ slope.T)
 
 
 def deviations(rate: float, omega_d: float, covariance: Array) -> tuple[float, float]:
-    """Standard deviations of decay rate and damped frequency, the inverse of `decay_covariance`.
+    """Standard deviations of decay rate, 1/s, and damped frequency, rad/s: the inverse of `decay_covariance`.
 
     Args:
         rate: a, 1/s.
         omega_d: damped angular frequency, rad/s, above 0.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
-
-    Returns:
-        Of a in 1/s and of ωd in rad/s.
     """
     slope = np.array([-rate, 0.5]) / omega_d
     return float(np.sqrt(covariance[0, 0])), float(np.sqrt(slope @ covariance @ slope))
@@ -246,39 +193,30 @@ def widened_covariance(covariance: Array, least_std: Array) -> Array:
     Args:
         covariance: shape (p, p).
         least_std: shape (p,).
-
-    Returns:
-        Shape (p, p).
     """
     factor = np.maximum(1.0, least_std / np.sqrt(np.diag(covariance)))
     return np.asarray(covariance * np.outer(factor, factor))
 
 
 def fisher_covariance(normal: Array, noise: NoiseLevel) -> Array:
-    """Inverse information times the noise variance, widened by the slow ratio.
+    """Inverse information times the noise variance, widened by the slow ratio, shape (p, p).
 
     Args:
         normal: JᵀJ, shape (p, p).
-        noise: the level and its slow ratio.
-
-    Returns:
-        Shape (p, p).
     """
     return inverse(normal) * (noise.std**2 * noise.slow_ratio)
 
 
 def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> Array:
-    """Standard deviations of parameters from the scatter of the runs, whatever the spectrum of the residuals.
+    """Standard deviations of parameters, shape (q,), from the scatter of the runs, whatever the spectrum.
 
-    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13,
-    doi 10.1093/biomet/73.1.13), widened by Student's t for the small number of runs that determine a parameter.
+    The sandwich estimator with a run as the cluster (Liang & Zeger, Biometrika 73 (1986) 13, doi
+    10.1093/biomet/73.1.13), widened by Student's t for the small number of runs that determine a parameter: 1.96
+    of them on either side are a 95 % interval.
 
     Args:
         influences: contribution of every run's residual to the parameters, shape (runs, q).
         informative_runs: number of runs that determine each parameter, shape (q,).
-
-    Returns:
-        Standard deviations, shape (q,): 1.96 of them on either side are a 95 % interval.
     """
     free = np.maximum(informative_runs - 2, 1)
     spread = np.sqrt(np.sum(influences**2, axis=0) * informative_runs / free)
@@ -288,14 +226,12 @@ def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> A
 def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: Sequence[Remark]) -> Estimate:
     """Widen the coefficients to what corrections of contradictory statements would make of them.
 
-    Args:
-        estimate: by any method.
-        campaign: gives the conditions of the runs and the sizes.
-        remarks: of the examination; those on a contradiction hold what Izz and Ka over ½ρV² may be.
+    The largest change that a correction makes is the half-width of a rectangular distribution (GUM 4.3.7).
+    Damping is not compared by the examination, so Cr and Cnr are as doubtful, relatively, as the more doubtful of
+    Izz and Cnβ.
 
-    Returns:
-        The same values. Damping is not compared by the examination, so Cr and Cnr are as doubtful, relatively, as
-        the more doubtful of Izz and Cnβ.
+    Args:
+        remarks: of the examination; those on a contradiction hold what Izz and Ka over ½ρV² may be.
     """
     inertias = [value for remark in remarks for value in remark.figures.get("inertias_kg_m2", ())]
     moments = [value for remark in remarks for value in remark.figures.get("air_stiffnesses_m3", ()) if value]
@@ -310,16 +246,12 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
     ]
     damping = [*scales, *(1.0 + abs(a - b) / max(abs(a), abs(b)) for a in moments for b in seen)]
     size = (campaign.rig.frontal_area or 0.0) * (campaign.rig.reference_length or 0.0)
-    runs = tuple(
-        replace(
-            run,
-            aerodynamic_stiffness=_reaching(
-                run.aerodynamic_stiffness, scales, [moment * pressures[run.id] for moment in moments]
-            ),
-            aerodynamic_damping=_reaching(run.aerodynamic_damping, damping),
-        )
-        for run in estimate.runs
-    )
+    runs = []
+    for run in estimate.runs:
+        loads = [moment * pressures[run.id] for moment in moments]
+        stiffness = _reaching(run.aerodynamic_stiffness, scales, loads)
+        air_damping = _reaching(run.aerodynamic_damping, damping)
+        runs.append(replace(run, aerodynamic_stiffness=stiffness, aerodynamic_damping=air_damping))
     wider: dict[str, Any] = {
         "cn_beta": _reaching(estimate.cn_beta, scales, [moment / size for moment in moments if size]),
         "cn_r": _reaching(estimate.cn_r, damping),
@@ -330,7 +262,7 @@ def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: S
     }
     least = np.array([one.std for name in estimate.parameters if (one := wider[name]) is not None])
     covariance = widened_covariance(estimate.covariance_matrix, least)
-    return replace(estimate, runs=runs, covariance=tuple(map(tuple, covariance.tolist())), **wider)
+    return replace(estimate, runs=tuple(runs), covariance=tuple(map(tuple, covariance.tolist())), **wider)
 
 
 def _reaching(

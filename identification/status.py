@@ -87,14 +87,7 @@ _GRAVITY = {status: rank for rank, status in enumerate(Status)}
 
 
 def by_severity(statuses: set[Status]) -> tuple[Status, ...]:
-    """The statuses from the gravest to the least; OK alone where there are none.
-
-    Args:
-        statuses: any of them; OK need not be included.
-
-    Returns:
-        At least one status.
-    """
+    """The statuses from the gravest to the least; OK alone where there are none."""
     return tuple(sorted(statuses - {Status.OK}, key=_GRAVITY.__getitem__)) or (Status.OK,)
 
 
@@ -130,24 +123,19 @@ class Remark:
 
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; the figures where there are any."""
-        document = {
-            "outcome": self.outcome.value,
-            "runs": list(self.runs),
-            "what": self.what,
-            "remedy": self.remedy,
-        }
+        said = {"what": self.what, "remedy": self.remedy}
+        document = {"outcome": self.outcome.value, "runs": list(self.runs), **said}
         return document | ({"figures": dict(self.figures)} if self.figures else {})
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Remark:
         """The inverse of `to_json_dict`."""
-        return cls(
+        outcome, runs, figures = (
             Outcome(data["outcome"]),
             tuple(map(str, data["runs"])),
-            str(data["what"]),
-            str(data["remedy"]),
-            dict(data.get("figures", {})),
+            data.get("figures", {}),
         )
+        return cls(outcome, runs, str(data["what"]), str(data["remedy"]), dict(figures))
 
 
 @dataclass(frozen=True)

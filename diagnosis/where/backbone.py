@@ -17,7 +17,7 @@ from diagnosis.policy import COLOURED_RUN
 from identification.estimate import NoiseLevel
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
-from identification.signal.windows import fit_windows
+from identification.signal.run_fit import fit_windows
 from tunnel_sim.vocabulary.record import Array
 
 

@@ -1,18 +1,9 @@
 """What is known of Cnβ, Cnr, Izz and Cr after each run of a campaign, and what a further run would add.
 
-In the shared parameters φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) every run's decay rate and stiffness are linear
-(see `derivatives`), so a normal prior of φ and the likelihood of the runs give a posterior for any number of
-runs, even if the runs alone do not separate the four. The initial state of every run and the sensor's zero are
-unknown and eliminated. The information of a future run is Fisher's, exact for its sample times, at the current
-estimate of the parameters: Bayesian D-optimal design with the nuisance parameters marginalised. Source: Chaloner
-& Verdinelli, Statist. Sci. 10 (1995) 273–304, doi 10.1214/ss/1177009939, sec. 2.
-
-By linear theory runs are replaced by what estimating them gives to first order. With the initial state
-eliminated, the maximum-likelihood estimate of a run's θ = (a, k, zero) is, to first order in the noise, θ̂ = θ +
-S⁻¹ s: S is the Schur complement of JᵀJ and s that of the score Jᵀ noise, both at the true decay. The posterior
-of φ and the zero is then a linear system. Its weights are Fisher's information at the likeliest φ, as in the
-joint fit of `update_belief`. Source: S. M. Kay, Fundamentals of Statistical Signal Processing: Estimation Theory
-(1993), ch. 7.
+In φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) every run's decay rate and stiffness are linear (see `derivatives`), so a
+normal prior of φ and the likelihood of the runs give a posterior for any number of runs. The initial state of
+every run and the sensor's zero are unknown and eliminated. The information of a future run is Fisher's: Bayesian
+D-optimal design (Chaloner & Verdinelli, Statist. Sci. 10 (1995) 273–304, doi 10.1214/ss/1177009939, sec. 2).
 """
 
 from __future__ import annotations
@@ -35,6 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 
 # All four columns of φ, whatever the runs separate: the prior supplies what they do not.
 _DESIGN = Design((np.zeros((2, 4)),), {"g": 0, "n": 1, "d": 2, "m": 3}, np.zeros(0), np.zeros(0), True)
+_NO_SCORE = np.zeros(5)
 _COEFFICIENTS = [PARAMETERS.index("cn_beta"), PARAMETERS.index("cn_r")]
 
 
@@ -65,36 +57,26 @@ class Belief:
     @cached_property
     def shared_covariance(self) -> Array:
         """Of φ with the zero eliminated, shape (4, 4)."""
-        return inverse(_without_zero(self.information))
+        known = self.information[4, 4] > 0.0
+        return inverse(eliminate(self.information, _NO_SCORE, 4)[0] if known else self.information[:4, :4])
 
     def std(self, name: str) -> float:
-        """Standard deviation of a coefficient, in its unit.
-
-        Args:
-            name: one of `identification.estimate.PARAMETERS`.
-        """
+        """Standard deviation of a coefficient of `identification.estimate.PARAMETERS`, in its unit."""
         place = PARAMETERS.index(name)
         return float(np.sqrt(self.covariance[place, place]))
 
     def relative_std(self, name: str) -> float:
-        """Standard deviation over the value's size (1); infinite at a value of zero.
-
-        Args:
-            name: one of `identification.estimate.PARAMETERS`.
-        """
+        """Standard deviation over the size of the value of a coefficient (1); infinite at a value of zero."""
         value = abs(float(self.values[PARAMETERS.index(name)]))
         return self.std(name) / value if value > 0.0 else inf
 
 
 def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
-    """Independent normal distributions of the four coefficients, carried to φ to first order.
+    """Independent normal distributions of the four coefficients, carried to φ to first order, before any run.
 
     Args:
         mean: by name, in the units of `identification.estimate.UNITS`.
         std: their standard deviations by name, in the same units, above 0.
-
-    Returns:
-        The belief before any run; nothing is known of the sensor's zero.
     """
     shared = shared_parameters(mean)
     jacobian = derivatives(_DESIGN, shared).jacobian
@@ -105,27 +87,13 @@ def prior_belief(mean: Mapping[str, float], std: Mapping[str, float]) -> Belief:
 
 
 def shared_parameters(values: Mapping[str, float]) -> Array:
-    """φ = (1/Izz, Cnβ/Izz, Cr/Izz, Cnr/Izz) of coefficients.
-
-    Args:
-        values: by name, in the units of `identification.estimate.UNITS`.
-
-    Returns:
-        Shape (4,), SI.
-    """
+    """φ, shape (4,), SI, of coefficients by name, in the units of `identification.estimate.UNITS`."""
     scaled = [1.0, values["cn_beta"], values["mechanical_damping"], values["cn_r"]]
     return np.array(scaled) / values["yaw_inertia"]
 
 
 def run_link(run: Run, rig: RigProperties) -> Array:
-    """How a run's decay rate a [1/s] and stiffness k [1/s²] depend on φ.
-
-    Args:
-        run: its conditions; the record is not used.
-        rig: its frontal area and reference length.
-
-    Returns:
-        Shape (2, 4): (a, k) = L φ.
+    """How a run's decay rate a [1/s] and stiffness k [1/s²] depend on φ: (a, k) = L φ, shape (2, 4).
 
     Raises:
         ValueError: when the run states no spring stiffness.
@@ -143,13 +111,8 @@ def update_belief(
     """The posterior after all runs of a campaign: one joint fit with the prior, not run by run.
 
     Args:
-        prior: the belief before the first run.
-        links: one per run, see `run_link`.
         runs: readings and their own fits, which only start the joint one.
         noise_std: of the reading, quantisation included, rad.
-
-    Returns:
-        The belief; ``prior`` itself where there is no run.
 
     Raises:
         ValueError: when the joint fit does not converge.
@@ -158,31 +121,23 @@ def update_belief(
         return prior
     variance = noise_std**2
     known = prior.information[:4, :4] * variance
-    fit = fit_decays(
-        [reading for reading, _ in runs],
-        links,
-        _start(prior.shared, known, links, [own for _, own in runs]),
-        prior=Prior(prior.shared, known),
-    )
+    # It starts from the (a, k) of the runs, weighted by their information, and the prior.
+    normal, right = known.copy(), known @ prior.shared
+    for link, (_, own) in zip(links, runs, strict=True):
+        weight = eliminate(own.information, own.score, 2)[0]
+        normal = normal + link.T @ weight @ link
+        right = right + link.T @ weight @ np.array([own.decay.rate, own.decay.stiffness])
+    readings, start = [reading for reading, _ in runs], scaled_solve(normal, right)
+    fit = fit_decays(readings, links, start, prior=Prior(prior.shared, known))
     if not fit.converged:
         raise ValueError("the joint fit does not converge")
     return Belief(fit.parameters, fit.normal / variance)
 
 
-def _start(mean: Array, known: Array, links: Sequence[Array], fits: Sequence[RunFit]) -> Array:
-    """The (a, k) of the runs, weighted by their information, and the prior."""
-    normal, right = known.copy(), known @ mean
-    for link, fit in zip(links, fits, strict=True):
-        weight = eliminate(fit.information, fit.score, 2)[0]
-        normal = normal + link.T @ weight @ link
-        right = right + link.T @ weight @ np.array([fit.decay.rate, fit.decay.stiffness])
-    return scaled_solve(normal, right)
-
-
 def expected_belief(
     belief: Belief, link: Array, time: Array, angle: float, noise_std: float
 ) -> Belief | None:
-    """The belief after one more run, released at rest.
+    """The belief after one more run, released at rest: the same values with more information.
 
     Args:
         link: of the run, see `run_link`, shape (2, 4).
@@ -191,24 +146,23 @@ def expected_belief(
         noise_std: of the reading, quantisation included, rad.
 
     Returns:
-        The same values with more information; None where the stiffness or the damping of the run might not be
-        positive, within three standard deviations of the belief.
+        None where the stiffness or the damping of the run might not be positive, within three standard
+        deviations.
     """
     rate, stiffness = map(float, link @ belief.shared)
     spread = np.sqrt(np.diag(link @ belief.shared_covariance @ link.T))
     if rate <= SAFE_DEVIATIONS * spread[0] or stiffness <= SAFE_DEVIATIONS * spread[1]:
         return None
     information = information_at(time, Decay(rate, stiffness), angle, 0.0) / noise_std**2
-    reduced, _ = eliminate(information, np.zeros(5), 3)
+    reduced, _ = eliminate(information, _NO_SCORE, 3)
     extended = embed(link, with_zero=True)
     return Belief(belief.shared, belief.information + extended.T @ reduced @ extended)
 
 
 def information_gain(before: Belief, after: Belief) -> float:
-    """Information gained on (Cnβ, Cnr): ½ ln(det Σ before / det Σ after), in nats.
+    """Information gained on (Cnβ, Cnr): ½ ln(det Σ before / det Σ after), in nats, the others marginalised.
 
-    It is the fall of the differential entropy of the two, the other parameters marginalised; negative where
-    ``after`` is wider.
+    It is negative where ``after`` is wider.
     """
     return 0.5 * (_log_volume(before) - _log_volume(after))
 
@@ -219,21 +173,12 @@ def _log_volume(belief: Belief) -> float:
     return float(np.linalg.slogdet(block / np.outer(scale, scale))[1] + 2.0 * np.sum(np.log(scale)))
 
 
-def _without_zero(information: Array) -> Array:
-    if information[4, 4] <= 0.0:
-        return information[:4, :4]
-    return eliminate(information, np.zeros(5), 4)[0]
-
-
-_NO_SCORE = np.zeros(5)
-
-
 @dataclass(frozen=True, eq=False)
 class LinearRun:
     """What a run adds to the estimate, to first order.
 
     Args:
-        link: from φ to (a, k), shape (2, 4); see `belief.run_link`.
+        link: from φ to (a, k), shape (2, 4); see `run_link`.
         time: its sample times since the release, shape (n,), s.
         angle: of the release, rad; the model is released at rest.
         found: the estimate of a [1/s], k [1/s²] and the sensor's zero [rad], shape (3,).
@@ -250,18 +195,18 @@ class LinearRun:
 def linear_run(
     link: Array, time: Array, decay: Decay, angle: float, zero: float, noise: Array
 ) -> LinearRun | None:
-    """The estimate of a run to first order in its noise.
+    """The estimate of a run to first order in its noise; None where the run does not determine its unknowns.
+
+    With the initial state eliminated, it is θ̂ = θ + S⁻¹ s of θ = (a, k, zero): S is the Schur complement of JᵀJ
+    and s that of the score Jᵀ noise, both at the true decay (S. M. Kay, Fundamentals of Statistical Signal
+    Processing: Estimation Theory (1993), ch. 7).
 
     Args:
         link: from φ to (a, k), shape (2, 4).
         time: its sample times since the release, shape (n,), s.
-        decay: the true one.
         angle: of the release, rad.
         zero: the true one, rad.
         noise: of the reading, shape (n,), rad.
-
-    Returns:
-        None where the run does not determine its unknowns.
     """
     information, score = linearised_at(time, decay, angle, 0.0, noise)
     if not determined(information):
@@ -282,25 +227,20 @@ def shows_a_decay(motion: Array, noise_std: float) -> bool:
 
 
 def linear_belief(prior: Belief, runs: Sequence[LinearRun], noise_std: float) -> Belief:
-    """The posterior after runs.
+    """The posterior after runs: its weights are Fisher's information at the likeliest φ, as in `update_belief`.
 
     Args:
-        prior: the belief before the first run.
         noise_std: of the reading, quantisation included, rad.
-
-    Returns:
-        The belief; ``prior`` itself where there is no run.
     """
     if not runs:
         return prior
     near = _posterior(prior, runs, [run.weight for run in runs], noise_std)
-    return _posterior(prior, runs, [_weight(run, near.shared) for run in runs], noise_std)
-
-
-def _weight(run: LinearRun, shared: Array) -> Array:
-    """S at the decay that φ gives the run."""
-    decay = Decay(*map(float, run.link @ shared))
-    return eliminate(information_at(run.time, decay, run.angle, 0.0), _NO_SCORE, 3)[0]
+    weights = []
+    for run in runs:
+        decay = Decay(*map(float, run.link @ near.shared))
+        information = information_at(run.time, decay, run.angle, 0.0)
+        weights.append(eliminate(information, _NO_SCORE, 3)[0])
+    return _posterior(prior, runs, weights, noise_std)
 
 
 def _posterior(

@@ -1,9 +1,11 @@
-"""From runs that a method identified one by one to the campaign's coefficients: generalised least squares."""
+"""From the runs to the campaign's coefficients: runs identified one by one, and driven with free runs together."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from scipy.special import chdtri
@@ -15,16 +17,27 @@ from identification.campaign.derivatives import (
     derivatives,
     design_statuses,
     filled_estimate,
+    loads,
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.driven import gain_remark, is_remarked, joined_runs, run_remark, with_gains
-from identification.estimate import Estimate, RunEstimate, Status, by_severity
+from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
-from identification.signal.driven_fit import Gained
+from identification.printing import with_std
+from identification.signal.decay_fit import Reading, RunFit, project_run
+from identification.signal.driven_fit import DrivenRun, Gained, fit_with_inputs
 from identification.signal.free_decay import Decay
-from identification.statistics import determined, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from identification.signal.noise import noise_level
+from identification.signal.run_fit import (
+    FittedRun,
+    describe_run,
+    noise_and_failure,
+    residual_check,
+    residuals_of,
+)
+from identification.statistics import determined, eliminate, fisher_covariance, inverse
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
@@ -36,8 +49,6 @@ class RunDecay:
     """The result of a method for one run alone.
 
     Args:
-        estimate: the run's result, or the status of its failure.
-        decay: decay rate and stiffness; None where the run could not be identified.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s²; None where decay is.
         gained: of a driven run, (a, k, g) with the gain g of its input per unit inertia, and its information.
     """
@@ -47,27 +58,18 @@ class RunDecay:
     covariance: Array | None = None
     gained: Gained | None = None
 
-    @classmethod
-    def failed(cls, run: Run, status: Status) -> RunDecay:
-        """A run without a result, and the reason."""
-        return cls(RunEstimate(run.id, (status,)))
-
 
 def combined_estimate(
     campaign: Campaign, name: str, found: Sequence[RunDecay], *, together: Combination | None = None
 ) -> Estimate:
     """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k).
 
-    Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio
-    of Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207.
+    Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio of
+    Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207. Runs without a result or a spring stiffness
+    are left out.
 
     Args:
-        found: one per run, in the campaign's order.
         together: a method's own combination of the runs, which starts from that of least squares.
-
-    Returns:
-        The estimate. A run that could not be identified is left out; one without spring stiffness is identified
-        by itself only.
 
     Raises:
         TunnelError: when a wind-on run states no air density.
@@ -98,7 +100,11 @@ def combined_estimate(
     if combined is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     parameters, covariance = combined
-    ratio = _birge_ratio(linked, parameters, decays, informations)
+    ratio, freedom = 1.0, sum(np.count_nonzero(weight.diagonal()) for weight in informations) - linked.size
+    if freedom > 0:
+        away = [decay - link @ parameters for decay, link in zip(decays, linked.links, strict=True)]
+        scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
+        ratio = scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
     if together is not None:
         parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
     size = design.size
@@ -132,10 +138,220 @@ def _own(pairs: Sequence[tuple[int, Run, RunDecay]], *, driven: bool) -> tuple[A
     return np.array(decays), informations
 
 
-def _birge_ratio(design: Design, parameters: Array, decays: Array, informations: Sequence[Array]) -> float:
-    freedom = sum(np.count_nonzero(weight.diagonal()) for weight in informations) - design.size
-    if freedom < 1:
-        return 1.0
-    away = [decay - link @ parameters for decay, link in zip(decays, design.links, strict=True)]
-    scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-    return scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
+Found: TypeAlias = RunDecay | Status
+"""The result for one run, or the status of its failure."""
+
+
+class RunByRun(ABC):
+    """An estimator that identifies each run by itself and then combines the runs."""
+
+    name: ClassVar[str]
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign from those that could be identified.
+
+        Raises:
+            TunnelError: a wind-on run states no air density; raised before any run is analysed.
+        """
+        for run in campaign.runs:
+            loads(run, campaign.rig)
+        pairs = [(run, self._run(run, campaign.sensor)) for run in campaign.runs]
+        found = [
+            RunDecay(RunEstimate(run.id, (one,))) if isinstance(one, Status) else one for run, one in pairs
+        ]
+        return combined_estimate(campaign, self.name, found, together=self._together(found))
+
+    @abstractmethod
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
+        """Identify one run."""
+
+    def _together(self, found: Sequence[RunDecay]) -> Combination | None:
+        """The method's own combination of the runs; None where it has none."""
+        del found
+        return None
+
+
+def run_estimate(
+    run: Run,
+    decay: Decay,
+    covariance: Array | None,
+    noise_std: float,
+    sensor: SensorProperties,
+    windows: tuple[WindowEstimate, ...] = (),
+) -> Found:
+    """The result of a method that does not judge the model: the least-squares residual does.
+
+    Args:
+        covariance: of (a, k) as the method gives it, shape (2, 2), in 1/s and 1/s²; None where it gives none.
+        noise_std: of one sample of the reading, rad.
+    """
+    reading = Reading.from_record(run.record)
+    projected = project_run(reading, decay)
+    if projected is None:
+        return Status.NOT_CONVERGED
+    _, failure = noise_and_failure(reading, *projected, sensor)
+    if failure is not None or covariance is None:
+        return failure or Status.NOT_CONVERGED
+    check = residual_check(run, decay, sensor)
+    noise = None if check is None else check.noise
+    covariance = covariance if check is None else check.widened(covariance)
+    estimate = describe_run(run, reading, *projected, covariance, noise_std**2, noise=noise, windows=windows)
+    return RunDecay(estimate, decay, covariance)
+
+
+_Pairs = Sequence[tuple[Run, FittedRun]]
+
+
+def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[Status]) -> Estimate:
+    """Output error of driven and free runs together: maximum likelihood with the input exact between its samples.
+
+    Per unit inertia a run i has (aᵢ, kᵢ, gᵢ) = Lᵢ φ: with a stated spring, gᵢ is 1/Izz for a known moment, Kr/Izz
+    for the motion of the spring's root, and a parameter common to the campaign for an input of unknown gain. That
+    gain, and what a body without a spring shows, are remarks.
+
+    Args:
+        pairs: every run and its own fit, which starts the joint one.
+    """
+    statuses = statuses | noise_statuses([item.noise for _, item in pairs])
+    fitted = [(run, item) for run, item in pairs if item.fit is not None]
+    joined = joined_runs([run for run, _ in fitted], campaign.rig)
+    linked = [(run, item) for run, item in fitted if run.id in joined]
+    remarks = tuple(
+        run_remark(run, item.gained)
+        for run, item in fitted
+        if isinstance(item, DrivenRun) and is_remarked(run, joined)
+    )
+    estimate = replace(estimate, remarks=remarks)
+    if not linked:
+        return replace(estimate, statuses=by_severity(statuses))
+    return _joint(campaign, estimate, linked, statuses)
+
+
+def _joint(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[Status]) -> Estimate:
+    runs = [run for run, _ in pairs]
+    design = build_design(runs, campaign.rig)
+    linked = with_gains(design, runs)
+    # (a, k, g) of the runs' own fits, and their weights; zeros for the gain of a free run.
+    coefficients, weights = np.zeros((len(pairs), 3)), []
+    for i, (_, item) in enumerate(pairs):
+        if isinstance(item, DrivenRun):
+            coefficients[i] = item.gained.coefficients
+            weights.append(item.gained.weight)
+            continue
+        fit, weight = _fit_of(item), np.zeros((3, 3))
+        assert item.noise is not None
+        coefficients[i, :2] = fit.decay.rate, fit.decay.stiffness
+        weight[:2, :2] = fit.reduced(2)[0] / (item.noise.std**2 * item.noise.slow_ratio)
+        weights.append(weight)
+    start = combine(linked, coefficients, weights)
+    if start is None:
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
+    own_zeros = campaign.sensor.zero == "per_run" or any(run.unrestrained for run in runs)
+    found = fit_with_inputs(runs, linked.links, start[0], own_zeros=own_zeros)
+    if not found.converged:
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_CONVERGED}))
+    information = eliminate(found.normal, np.zeros(len(found.normal)), linked.size)[0]
+    if not determined(information):
+        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
+    residuals = [
+        residuals_of(
+            [item.reading],
+            [replace(_fit_of(item), residual=residual)],
+            float(item.reading.yaw.mean() if run.unrestrained else own[0]),
+            2 + own_zeros,
+        )[0]
+        for (run, item), residual, own in zip(pairs, found.residuals, found.own, strict=True)
+    ]
+    noise = noise_level(residuals, campaign.sensor)
+    covariance = fisher_covariance(information, noise)
+    values = derivatives(design, found.parameters[: design.size])
+    inner = covariance[: design.size, : design.size]
+    statuses = statuses | noise_statuses([noise]) | design_statuses(design, found.parameters[: design.size])
+    filled = filled_estimate(
+        campaign, estimate, runs, design, values, values.jacobian @ inner @ values.jacobian.T, statuses
+    )
+    gained = linked.size > design.size
+    gain = (gain_remark(runs, found.parameters, covariance, values.get("yaw_inertia")),) if gained else ()
+    return replace(filled, noise=noise, remarks=(*gain, *estimate.remarks))
+
+
+def _fit_of(item: FittedRun) -> RunFit:
+    assert item.fit is not None
+    return item.fit
+
+
+def with_gains(design: Design, runs: Sequence[Run]) -> Design:
+    """A design whose links, of shape (3, p), give the gains of the inputs too: gᵢ, 0 in free runs.
+
+    Where the gain of an input is unknown, φ has it, per unit inertia and common to the runs, as last number:
+    shape (3, p + 1).
+    """
+    place = design.columns.get("g")
+    unknown = any(run.drive is not None and (run.input_gain is None or place is None) for run in runs)
+    links = []
+    for link, run in zip(design.links, runs, strict=True):
+        whole = np.zeros((3, design.size + unknown))
+        whole[:2, : design.size] = link
+        if run.drive is not None and run.input_gain is not None and place is not None:
+            whole[2, place] = run.input_gain
+        elif run.drive is not None:
+            whole[2, -1] = 1.0
+        links.append(whole)
+    return replace(design, links=tuple(links))
+
+
+def joined_runs(runs: Sequence[Run], rig: RigProperties) -> set[str]:
+    """Ids of the runs that are fitted together: those of stated stiffness.
+
+    Without a known moment or a spring in any of them, a body without a spring says nothing on the inertia.
+    """
+    stated = [run for run in runs if run.spring_stiffness is not None]
+    if stated and "g" not in build_design(stated, rig).columns:
+        stated = [run for run in stated if run.spring_stiffness]
+    return {run.id for run in stated}
+
+
+def is_remarked(run: Run, joined: set[str]) -> bool:
+    """Whether a note says what a driven run shows by itself: without a spring, or where it gives no coefficient."""
+    apart = run.id not in joined and run.drive is not None and run.drive.on_body
+    return run.unrestrained or apart
+
+
+def run_remark(run: Run, gained: Gained) -> Remark:
+    """What a driven run shows by itself, per unit inertia, and what it does not show."""
+    (rate, _, gain), (rate_std, _, gain_std) = gained.coefficients, gained.deviations
+    said = f"the gain of the input is {with_std(gain, gain_std)} rad/s² per unit"
+    if gained.offset is None:
+        return Remark(Outcome.NOTED, (run.id,), said, "state spring_stiffness for a gain in N m per unit")
+    known, offset = run.input_gain is not None, gained.offset
+    return Remark(
+        Outcome.NOTED,
+        (run.id,),
+        f"without a spring {said}, the damping over the inertia {with_std(2.0 * rate, 2.0 * rate_std)} 1/s and a "
+        f"constant moment beside the input {with_std(offset.value, offset.std)} {offset.unit}; "
+        f"{'' if known else 'the inertia, '}omega_n, zeta and the sensor's zero are not determined",
+        "add a run with a spring if they are needed" if known else "state drive_gain for the inertia",
+        {
+            "damping_over_inertia_per_s": 2.0 * float(rate),
+            "gain_per_inertia": float(gain),
+            "offset_in_units_of_the_input": offset.value,
+        },
+    )
+
+
+def gain_remark(runs: Sequence[Run], parameters: Array, covariance: Array, inertia: float | None) -> Remark:
+    """The gain that is common to the inputs of unknown gain.
+
+    Args:
+        parameters: φ with the gain last, per unit inertia, shape (p + 1,).
+        covariance: of them, shape (p + 1, p + 1).
+        inertia: kg m²; None where it was not found.
+    """
+    value, std = float(parameters[-1]), float(np.sqrt(covariance[-1, -1]))
+    absolute = "" if inertia is None else f", {value * inertia:.5g} N m per unit"
+    return Remark(
+        Outcome.NOTED,
+        tuple(run.id for run in runs if run.drive is not None),
+        f"the gain of the input is {with_std(value, std)} rad/s² per unit{absolute}",
+        "state drive_gain if it is known",
+    )

@@ -1,14 +1,9 @@
 """From decay rates and stiffnesses of the runs to Cnβ, Cnr, Izz and Cr, and to an `Estimate`.
 
 With g = 1/Izz, n = Cnβ/Izz, d = Cr/Izz and m = Cnr/Izz the equation of motion (paper, eqs 2–6, signs as in eqs 7
-and 8) gives for run i
+and 8) gives for run i, linear in (g, n, d, m),
 
-    kᵢ = Krᵢ g − ½ρᵢVᵢ² A l n,    2aᵢ = d − ½ρᵢVᵢ A l² m,
-
-linear in (g, n, d, m). If a campaign does not separate the columns of a block, that block is fitted run by run.
-
-The steps to an `Estimate` are common to all estimators. A method that identifies run
-by run calls `combination.combined_estimate`; a joint method uses the parts here.
+    kᵢ = Krᵢ g − ½ρᵢVᵢ² A l n,    2aᵢ = d − ½ρᵢVᵢ A l² m.
 """
 
 from __future__ import annotations
@@ -40,9 +35,8 @@ from tunnel_sim.vocabulary.record import Array
 # Smallest singular value of two columns of unit length, for two runs whose springs or speeds just count as
 # different.
 _RANK_TOLERANCE = LEAST_SPRING_SPREAD / np.sqrt(8.0)
-_GREATEST = (
-    1e60  # of a stiffness or a moment in SI units; its inverse is the smallest. Fourth powers are formed.
-)
+# Of a stiffness or a moment in SI units; its inverse is the smallest. Fourth powers are formed.
+_GREATEST = 1e60
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +48,6 @@ class Design:
         columns: places of g, n, d, m in φ; only of those that the campaign separates.
         stiffness_loads: ½ρV²·A·l per run, N m, shape (r,); without A·l where the size is unknown.
         damping_loads: ½ρV·A·l² per run, N m s, shape (r,); without A·l² where the size is unknown.
-        has_size: whether the rig states A and l.
     """
 
     links: tuple[Array, ...]
@@ -119,9 +112,7 @@ def loads(run: Run, rig: RigProperties) -> tuple[float, float]:
 def _within_range(name: str, value: float, unit: str, run: Run) -> None:
     if not 1.0 / _GREATEST < abs(value) < _GREATEST:
         raise TunnelError(
-            f"{name} = {value:g} {unit} is out of range",
-            where=f"run {run.id}",
-            remedy="correct its unit",
+            f"{name} = {value:g} {unit} is out of range", where=f"run {run.id}", remedy="correct its unit"
         )
 
 
@@ -131,13 +122,10 @@ def has_size(rig: RigProperties) -> bool:
 
 
 def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
-    """Link runs of stated spring stiffness to the shared parameters.
+    """Link runs of stated spring stiffness to the shared parameters φ.
 
-    Args:
-        runs: at least one, each with its spring_stiffness. A driven run whose moment is known determines g.
-
-    Returns:
-        The design; ``columns`` lacks g and n, or d and m, where the runs do not separate them.
+    A driven run whose moment is known determines g. If the runs do not separate g and n, or d and m, ``columns``
+    lacks them, and their block is fitted run by run.
     """
     springs = np.array([run.spring_stiffness for run in runs], dtype=np.float64)
     pairs = np.array([loads(run, rig) for run in runs])
@@ -152,7 +140,13 @@ def build_design(runs: Sequence[Run], rig: RigProperties) -> Design:
         block = np.column_stack((fixed, -load)) if windy else fixed[:, None]
         offset = sum(other.shape[1] for _, other in blocks)
         by_input = [[np.abs(block).max() or 1.0, 0.0][: block.shape[1]]] if known and row == 1 else []
-        if _full_rank(np.vstack((block, *by_input))):
+        table = np.vstack((block, *by_input))
+        lengths = np.linalg.norm(table, axis=0)
+        if (
+            lengths.min() > 0.0
+            and table.shape[0] >= table.shape[1]
+            and np.linalg.svd(table / lengths, compute_uv=False)[-1] > _RANK_TOLERANCE
+        ):
             columns |= {name: offset + index for index, name in enumerate(names[: block.shape[1]])}
         else:
             block = np.eye(len(runs))
@@ -184,13 +178,10 @@ def combine(design: Design, decays: Array, informations: Sequence[Array]) -> tup
 
 
 def derivatives(design: Design, parameters: Array) -> Derivatives:
-    """Cnβ, Cnr, Izz and Cr from the shared parameters, with the Jacobian for their covariance.
+    """Cnβ, Cnr, Izz and Cr from the shared parameters; none where the design gives no Izz, or not a positive one.
 
     Args:
         parameters: φ, shape (p,).
-
-    Returns:
-        The parameters that the design separates; none where it gives no Izz, or one that is not positive.
     """
     if not positive_inertia(design, parameters):
         return Derivatives((), np.zeros(0), np.zeros((0, design.size)))
@@ -221,17 +212,6 @@ def positive_inertia(design: Design, parameters: Array) -> bool:
     return "g" in design.columns and bool(parameters[design.columns["g"]] > 0.0)
 
 
-def _full_rank(block: Array) -> bool:
-    lengths = np.linalg.norm(block, axis=0)
-    if not lengths.min() > 0.0:
-        return False
-    scaled = block / lengths
-    return (
-        bool(np.linalg.svd(scaled, compute_uv=False)[-1] > _RANK_TOLERANCE)
-        and block.shape[0] >= block.shape[1]
-    )
-
-
 def filled_estimate(
     campaign: Campaign,
     estimate: Estimate,
@@ -243,28 +223,47 @@ def filled_estimate(
 ) -> Estimate:
     """The estimate with coefficients, the air of its runs and the wind-off line.
 
+    Without the sizes of the rig the coefficients still multiply A·l and A·l², and only Ka and Ca per run are
+    given.
+
     Args:
-        runs: those that the design links.
         covariance: of the values found, shape (p, p).
     """
-    air = air_of_runs(design, found, covariance, runs)
+    air: dict[str, dict[str, Any]] = {}  # stiffness and damping of the air in every wind-on run
+    for name, target, load, unit in (
+        ("cn_beta", "aerodynamic_stiffness", design.stiffness_loads, "N m/rad"),
+        ("cn_r", "aerodynamic_damping", design.damping_loads, "N m s/rad"),
+    ):
+        value = found.get(name)
+        if value is None:
+            continue
+        place = found.names.index(name)
+        std = float(np.sqrt(covariance[place, place]))
+        for run, factor in zip(runs, load, strict=True):
+            if run.wind_on:
+                air.setdefault(run.id, {})[target] = Quantity(
+                    float(factor) * value, float(factor) * std, unit
+                )
+    kept = [i for i, name in enumerate(found.names) if design.has_size or name not in ("cn_beta", "cn_r")]
+    stds = np.sqrt(np.diag(covariance))
+    coefficients: dict[str, Any] = {
+        found.names[i]: Quantity(float(found.values[i]), float(stds[i]), UNITS[found.names[i]]) for i in kept
+    }
     return replace(
         estimate,
         statuses=by_severity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         **wind_off(estimate.runs, campaign.runs),
-        **parameter_quantities(found, covariance, has_size=design.has_size),
+        parameters=tuple(found.names[i] for i in kept),
+        covariance=tuple(map(tuple, covariance[np.ix_(kept, kept)].tolist())),
+        **coefficients,
     )
 
 
 def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> set[Status]:
-    """The statuses of a campaign that follow from its runs.
+    """The statuses of a campaign that follow from its runs, one estimate per run, in the campaign's order.
 
-    Args:
-        estimates: one per run, in the campaign's order.
-
-    Returns:
-        The statuses; only NO_RUN_IDENTIFIED where no run was identified.
+    Only NO_RUN_IDENTIFIED where no run was identified.
     """
     identified = [estimate.identified for estimate in estimates]
     if not any(identified):
@@ -280,19 +279,11 @@ def statuses_of_runs(campaign: Campaign, estimates: Sequence[RunEstimate]) -> se
 
 
 def noise_statuses(levels: Sequence[NoiseLevel | None]) -> set[Status]:
-    """The statuses that follow from noise levels.
-
-    Args:
-        levels: of runs or of a joint fit; None where there is none.
-
-    Returns:
-        MODEL_DEPARTS and NOISE_DISAGREES as they apply.
-    """
-    known = [level for level in levels if level is not None]
+    """MODEL_DEPARTS and NOISE_DISAGREES as they follow from noise levels; None where there is none."""
     statuses = set()
-    if any(level.departs for level in known):
+    if any(level.departs for level in levels if level is not None):
         statuses.add(Status.MODEL_DEPARTS)
-    if any(level.disagrees for level in known):
+    if any(level.disagrees for level in levels if level is not None):
         statuses.add(Status.NOISE_DISAGREES)
     return statuses
 
@@ -317,57 +308,6 @@ def design_statuses(design: Design, parameters: Array) -> set[Status]:
     return statuses
 
 
-def parameter_quantities(found: Derivatives, covariance: Array, *, has_size: bool) -> dict[str, Any]:
-    """The coefficients as fields of an `Estimate`, with their covariance.
-
-    Args:
-        covariance: of the values, shape (p, p).
-        has_size: whether the rig states A and l. Without them the coefficients still multiply A·l and A·l²,
-            and only Ka and Ca per run are given.
-
-    Returns:
-        Keyword arguments of `Estimate`.
-    """
-    kept = [i for i, name in enumerate(found.names) if has_size or name not in ("cn_beta", "cn_r")]
-    fields: dict[str, Any] = {
-        found.names[i]: Quantity(
-            float(found.values[i]), float(np.sqrt(covariance[i, i])), UNITS[found.names[i]]
-        )
-        for i in kept
-    }
-    fields["parameters"] = tuple(found.names[i] for i in kept)
-    fields["covariance"] = tuple(tuple(float(covariance[i, j]) for j in kept) for i in kept)
-    return fields
-
-
-def air_of_runs(
-    design: Design, found: Derivatives, covariance: Array, runs: Sequence[Run]
-) -> dict[str, dict[str, Any]]:
-    """The air's stiffness and damping in every wind-on run.
-
-    Args:
-        covariance: of the values, shape (p, p).
-
-    Returns:
-        By run: keyword arguments of `RunEstimate`.
-    """
-    air: dict[str, dict[str, Any]] = {}
-    for name, target, load, unit in (
-        ("cn_beta", "aerodynamic_stiffness", design.stiffness_loads, "N m/rad"),
-        ("cn_r", "aerodynamic_damping", design.damping_loads, "N m s/rad"),
-    ):
-        value = found.get(name)
-        if value is None:
-            continue
-        place = found.names.index(name)
-        std = float(np.sqrt(covariance[place, place]))
-        for run, factor in zip(runs, load, strict=True):
-            if run.wind_on:
-                quantity = Quantity(float(factor) * value, float(factor) * std, unit)
-                air.setdefault(run.id, {})[target] = quantity
-    return air
-
-
 def wind_off(estimates: Sequence[RunEstimate], runs: Sequence[Run]) -> dict[str, Any]:
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
 
@@ -375,14 +315,11 @@ def wind_off(estimates: Sequence[RunEstimate], runs: Sequence[Run]) -> dict[str,
         Keyword arguments of `Estimate`; none without wind-off runs.
     """
     rows = [
-        (run.spring_stiffness, found.omega_n)
+        (run.spring_stiffness, found.omega_n.value, found.omega_n.std)
         for run, found in zip(runs, estimates, strict=True)
         if not run.wind_on and run.spring_stiffness is not None and found.omega_n is not None
     ]
     if not rows:
         return {}
-    stiffness = np.array([spring for spring, _ in rows])
-    inertia, intercept = wind_off_line(
-        stiffness, np.array([omega.value for _, omega in rows]), np.array([omega.std for _, omega in rows])
-    )
+    inertia, intercept = wind_off_line(*map(np.array, zip(*rows, strict=True)))
     return {"wind_off_inertia": inertia, "wind_off_intercept": intercept}

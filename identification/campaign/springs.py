@@ -28,8 +28,7 @@ class SpringFit:
         inertia: its gradient Izz, kg m².
         intercept: N m/rad.
         residual_percent: stated stiffness over the line's, less one, per spring, %.
-        flagged: whether a spring is an outlier.
-        p_value: probability that correct springs deviate at least as much as this set, (1 + k)/(1 + trials).
+        p_value: probability that correct springs deviate at least as much as this set.
     """
 
     inertia: Quantity
@@ -43,26 +42,22 @@ def fit_springs(
     stiffness: Sequence[float],
     frequency_hz: Sequence[float],
     *,
-    false_alarm_rate: float = SPRING_FLAG_RATE,
     rng: np.random.Generator | None = None,
 ) -> SpringFit:
     """Fit the line by least squares and flag outliers.
 
-    The line is the paper's: unweighted, all springs in it. The flags come from the inertia each spring gives
-    by itself, Kr/ωn² (eq. 1), because the error of a spring is relative. Outliers mask one another, so the rule is
-    the generalised extreme studentised deviate (Rosner, Technometrics 25 (1983) 165–172,
-    doi 10.1080/00401706.1983.10487848): the spring furthest from the others is tested by its externally
-    studentised residual (Student's t, Bonferroni over the springs left) and removed, repeatedly up to
-    a third of them; all those up to the *last* one beyond chance are flagged. The nominal level is too
-    lenient for ten springs (8.5 % of correct sets at 5 %), so it is calibrated on simulated sets of correct
-    springs with normal relative errors: one set in ten raises a flag. The line's intercept is zero
-    for springs alone; a stiffness common to all runs (a tilted axis) shows in the intercept and in flags
-    on the softest springs. Of three springs none is flagged: two correct ones cannot outvote a wrong one.
+    The line is the paper's: unweighted, all springs in it. The flags come from the inertia each spring gives by
+    itself, Kr/ωn² (eq. 1), because the error of a spring is relative. Outliers mask one another, so the rule is
+    the generalised extreme studentised deviate (Rosner, Technometrics 25 (1983) 165–172, doi
+    10.1080/00401706.1983.10487848): the spring furthest from the others is tested by its externally studentised
+    residual (Student's t, Bonferroni over the springs left) and removed, repeatedly up to a third of them; all
+    those up to the *last* one beyond chance are flagged. The nominal level is too lenient for ten springs (8.5 %
+    of correct sets at 5 %), so it is calibrated on simulated sets of correct springs with normal relative errors.
+    A stiffness common to all runs (a tilted axis) shows in the intercept and in flags on the softest springs.
 
     Args:
         stiffness: Kr per spring, N m/rad, shape (n,), n ≥ 3.
         frequency_hz: wind-off frequency with it, Hz, shape (n,).
-        false_alarm_rate: probability that a spring of a correct set is flagged.
         rng: draws the calibration; one of a fixed seed where None, so that the result is repeatable.
 
     Raises:
@@ -87,8 +82,15 @@ def fit_springs(
         )
     line, covariance = _least_squares(np.column_stack((omega_squared, np.ones_like(springs))), springs)
     fitted = line[0] * omega_squared + line[1]
-    generator = np.random.default_rng(1) if rng is None else rng
-    flagged, p_value = _leaving(springs / omega_squared, false_alarm_rate, generator)
+    flagged, p_value = np.zeros(springs.size, dtype=bool), 1.0
+    if springs.size > 3:  # of three springs, two correct ones cannot outvote a wrong one
+        rng = np.random.default_rng(1) if rng is None else rng
+        chances, order = _take_out_the_worst((springs / omega_squared)[None, :])
+        least = _take_out_the_worst(rng.standard_normal((_TRIALS, springs.size)))[0].min(axis=1)
+        beyond = np.flatnonzero(chances[0] <= np.quantile(least, SPRING_FLAG_RATE))
+        if beyond.size:
+            flagged[order[0, : beyond[-1] + 1]] = True
+        p_value = (1 + int(np.sum(least <= chances[0].min()))) / (1 + _TRIALS)
     return SpringFit(
         inertia=Quantity(float(line[0]), float(np.sqrt(covariance[0, 0])), "kg m2"),
         intercept=Quantity(float(line[1]), float(np.sqrt(covariance[1, 1])), "N m/rad"),
@@ -101,21 +103,18 @@ def fit_springs(
 def wind_off_line(
     stiffness: Array, omega_n: Array, omega_n_std: Array
 ) -> tuple[Quantity | None, Quantity | None]:
-    """Izz from wind-off runs: the gradient of Kr against ωn², or Kr/ωn² where there is one spring only.
+    """Izz [kg m²] from wind-off runs, the gradient of Kr against ωn², and the intercept [N m/rad].
 
-    The standard deviation is the larger of what the scatter about the line gives and what the frequencies'
-    own standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or whose
-    frequencies cannot be distinguished, count as one: a gradient over them would be dominated by their errors and
-    too small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1).
+    The standard deviation is the larger of what the scatter about the line gives and what the frequencies' own
+    standard deviations propagate to. Springs whose stated stiffnesses lie within 1 %, or whose frequencies cannot
+    be distinguished, count as one, and Izz is Kr/ωn²: a gradient over them would be dominated by their errors and
+    too small (the attenuation of Fuller, Measurement Error Models (1987), doi 10.1002/9780470316665, § 1.1). The
+    intercept is then None; both are None where the frequencies fall as the springs get stiffer.
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).
         omega_n: natural angular frequency per run, rad/s, shape (n,).
         omega_n_std: its standard deviation, rad/s, shape (n,).
-
-    Returns:
-        Izz in kg m², and the intercept in N m/rad. The intercept is None with one spring; both are None where the
-        frequencies fall as the springs get stiffer.
     """
     squared, squared_std = omega_n**2, 2.0 * omega_n * omega_n_std
     away = stiffness - stiffness.mean()
@@ -135,21 +134,17 @@ def wind_off_line(
     influence = np.linalg.pinv(columns) * (line[0] * squared_std)
     own = np.linalg.norm(influence, axis=1)
     std = np.maximum(own, np.sqrt(np.diag(covariance)))
-    return Quantity(float(line[0]), float(std[0]), "kg m2"), Quantity(
-        float(line[1]), float(std[1]), "N m/rad"
-    )
+    inertia, intercept = map(Quantity, line.tolist(), std.tolist(), ("kg m2", "N m/rad"))
+    return inertia, intercept
 
 
 def inertia_of_springs(stiffness: Array, squared: Array, *, with_line: bool) -> float:
-    """Izz alone, as by `wind_off_line`, for other frequencies of the same springs.
+    """Izz alone, kg m², as by `wind_off_line`, for other frequencies of the same springs.
 
     Args:
         stiffness: Kr per run, N m/rad, shape (n,).
         squared: ωn² per run, rad²/s², shape (n,).
         with_line: whether it is the gradient of a line; else the mean of Kr/ωn².
-
-    Returns:
-        Izz, kg m².
     """
     if not with_line:
         return float(np.mean(stiffness / squared))
@@ -161,20 +156,6 @@ def _least_squares(columns: Array, values: Array) -> tuple[Array, Array]:
     degrees = values.size - columns.shape[1]
     variance = float(np.sum((values - columns @ solution) ** 2)) / degrees if degrees > 0 else 0.0
     return solution, np.asarray(variance * np.linalg.inv(columns.T @ columns))
-
-
-def _leaving(inertias: Array, false_alarm_rate: float, rng: np.random.Generator) -> tuple[Array, float]:
-    flagged = np.zeros(inertias.size, dtype=bool)
-    if inertias.size < 4:  # of three springs, two correct ones cannot outvote a wrong one
-        return flagged, 1.0
-    chances, order = _take_out_the_worst(inertias[None, :])
-    null, _ = _take_out_the_worst(rng.standard_normal((_TRIALS, inertias.size)))
-    least = null.min(axis=1)
-    beyond = np.flatnonzero(chances[0] <= np.quantile(least, false_alarm_rate))
-    if beyond.size:
-        flagged[order[0, : beyond[-1] + 1]] = True
-    p_value = (1 + int(np.sum(least <= chances[0].min()))) / (1 + _TRIALS)
-    return flagged, p_value
 
 
 def _take_out_the_worst(sets: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -1,9 +1,8 @@
 """The estimators, one per file, and their registry.
 
-To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a line
-to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
-``output_error.OutputError``. It is imported when the estimator is made, so a heavy import such as torch waits until
-then. The conformance suite runs over all of them.
+To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a
+line to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
+``output_error.OutputError``. It is imported when the estimator is made, so heavy imports wait until then.
 """
 
 from __future__ import annotations
@@ -25,14 +24,7 @@ class Estimator(Protocol):
     name: ClassVar[str]
 
     def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify a campaign; a failure is a status of the estimate, never NaN.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate, its runs in the campaign's order.
-        """
+        """Identify a campaign of at least one run, in its order; a failure is a status, never NaN."""
 
 
 SUMMARIES: Mapping[str, str] = {

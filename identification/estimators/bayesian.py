@@ -1,25 +1,16 @@
 """Bayesian: the posterior of each run's decay, and of the campaign's coefficients under all of them.
 
-The posterior of one run's decay rate and stiffness is computed on an adaptive grid. Initial angle and rate and
-the sensor's zero enter linearly, so they are integrated out in closed form, and so is an unknown noise level,
-which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter Estimation (1988), doi
-10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals have the stated
-coverage and do not depend on the choice of parameters (Jeffreys, Proc. R. Soc. A 186 (1946) 453–461, doi
+Initial angle and rate and the sensor's zero enter linearly, so they are integrated out in closed form, and so is
+an unknown noise level, which leaves Student's form (Bretthorst, Bayesian Spectrum Analysis and Parameter
+Estimation (1988), doi 10.1007/978-1-4684-9399-3). The prior is Jeffreys' rule over all unknowns, whose intervals
+have the stated coverage and do not depend on the choice of parameters (Proc. R. Soc. A 186 (1946) 453–461, doi
 10.1098/rspa.1946.0056): with it
 
     p(a, k | y) ∝ RSS(a, k)^(−ν/2) √|I(a, k)|,   or  exp(−RSS/2S²) √|I|  where the noise S is known,
 
-with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. The two remaining
-unknowns are summed over a grid in units of the posterior's standard deviations, refined until it covers the
-posterior.
-
-So the logarithm of the likelihood need not be a parabola, which it is not in records of one to three cycles or of
-few samples. Values are posterior means, with the posterior's standard deviations, and ωn and ζ carry their 95 %
-intervals.
-
-The campaign's coefficients are drawn from the product of the runs' likelihoods: importance sampling from Student's
-distribution about the normal approximation, drawn in pairs of opposite sign, and repeated where it misses the
-posterior (Kloek & van Dijk, Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
+with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. The two are summed
+over a grid. So the logarithm of the likelihood need not be a parabola, which it is not in records of one to three
+cycles.
 """
 
 from __future__ import annotations
@@ -28,13 +19,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
-from identification.campaign.combination import Combination, RunDecay
+from identification.campaign.combination import Combination, Found, RunByRun, RunDecay
 from identification.campaign.derivatives import Design
-from identification.estimate import NoiseLevel, Quantity, Status
-from identification.estimators.run_by_run import Found, RunByRun
+from identification.estimate import Quantity, Status
 from identification.signal.decay_fit import Reading, block_means, fit_run, project_run
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import starting_decay
@@ -63,7 +52,6 @@ class NoiseKnowledge:
 
     Args:
         variance: S² of one value of the reading, rad²; None where it is unknown and integrated out.
-        samples: number of samples behind one value.
         within: sum of squares within the blocks, rad², which thinning removes from the residual.
         freedom: ν, number of samples less that of linear unknowns.
     """
@@ -103,14 +91,7 @@ class DecayPosterior:
         return self.centre + self.scale @ mean, self.scale @ covariance @ self.scale.T
 
     def log_likelihood_at(self, decays: Array) -> Array:
-        """ℓ(a, k), for combining runs; beyond the grid it falls like a normal distribution.
-
-        Args:
-            decays: shape (n, 2), 1/s and 1/s².
-
-        Returns:
-            Shape (n,).
-        """
+        """ℓ of decays (a, k), shape (n, 2), 1/s and 1/s²; beyond the grid it falls like a normal distribution."""
         z = np.linalg.solve(self.scale, (decays - self.centre).T)
         edge = float(self.axis[-1])
         inside = np.clip(z, -edge, edge)
@@ -126,10 +107,7 @@ class DecayPosterior:
         decays = self.centre[:, None] + self.scale @ _points(fine)
         real = decays[1] > 0.0
         omega = np.sqrt(decays[1][real])
-        return (
-            _summary(omega, weights[real]),
-            _summary(decays[0][real] / omega, weights[real]),
-        )
+        return (_summary(omega, weights[real]), _summary(decays[0][real] / omega, weights[real]))
 
 
 def posterior_of(
@@ -137,13 +115,10 @@ def posterior_of(
 ) -> DecayPosterior | None:
     """Compute the posterior on a grid, and move the grid until it covers the posterior.
 
-    Args:
-        thin: the run, or block means of it.
-        start: of the grid, near the posterior's peak.
-        covariance: a guess at that of (a, k), shape (2, 2).
+    None where the record is too short to bound the decay.
 
-    Returns:
-        The posterior; None where the record is too short to bound the decay.
+    Args:
+        covariance: a guess at that of (a, k), shape (2, 2).
     """
     centre, spread = np.array([start.rate, start.stiffness]), covariance
     width, step = _FIRST
@@ -163,7 +138,15 @@ def posterior_of(
             centre, scale, axis, likelihood.reshape(shape), (likelihood + prior).reshape(shape)
         )
         mean, spread = found.moments()
-        if _holds(found, mean, spread):
+        # It is held where hardly any weight is at the border, in a grid of about the right place and size.
+        weights = np.exp(found.log_posterior - found.log_posterior.max())
+        inner = weights[1:-1, 1:-1].sum()
+        inverse = np.linalg.inv(scale)
+        own = np.sqrt(np.linalg.eigvalsh(inverse @ spread @ inverse.T))
+        off = np.abs(inverse @ (mean - centre)).max()
+        low, high = _SCALE_BAND
+        border = weights.sum() - inner
+        if border <= _BORDER_MASS * weights.sum() and low < own[0] and own[1] < high and off < 1.0:
             return found
         centre = mean
         width, step = _FINER if width == _FIRST[0] else (_WIDENING * width, _FINER[1])
@@ -176,18 +159,6 @@ def _spline(axis: Array, values: Array) -> RectBivariateSpline:
     return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
 
 
-def _holds(found: DecayPosterior, mean: Array, covariance: Array) -> bool:
-    weights = np.exp(found.log_posterior - found.log_posterior.max())
-    inner = weights[1:-1, 1:-1].sum()
-    inverse = np.linalg.inv(found.scale)
-    own = np.sqrt(np.linalg.eigvalsh(inverse @ covariance @ inverse.T))
-    off = np.abs(inverse @ (mean - found.centre)).max()
-    low, high = _SCALE_BAND
-    return bool(
-        weights.sum() - inner <= _BORDER_MASS * weights.sum() and low < own[0] and own[1] < high and off < 1.0
-    )
-
-
 def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple[Array, Array]:
     # Log-likelihood and log-prior at each (a, k), in slices that stay in the cache.
     count = decays.shape[1]
@@ -196,7 +167,9 @@ def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple
     for begin in range(0, count, slice_size):
         part = slice(begin, begin + slice_size)
         squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part])
-        squares = np.where(_possible(thin, decays[:, part]) & np.isfinite(squares), squares, np.inf)
+        # Positive stiffness, and neither decay nor growth within a sample.
+        real = (decays[1, part] > 0.0) & (np.abs(decays[0, part]) * float(thin.time[-1]) < _STEEPEST)
+        squares = np.where(real & np.isfinite(squares), squares, np.inf)
         total = knowledge.samples * squares + knowledge.within
         if knowledge.variance is None:
             likelihood[part] = -0.5 * knowledge.freedom * np.log(total)
@@ -205,16 +178,21 @@ def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple
     return likelihood, np.where(np.isfinite(prior), prior, 0.0)
 
 
-def _possible(thin: Reading, decays: Array) -> NDArray[np.bool_]:
-    # Positive stiffness, and neither decay nor growth within a sample.
-    return np.asarray((decays[1] > 0.0) & (np.abs(decays[0]) * float(thin.time[-1]) < _STEEPEST))
-
-
 def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Array, Array]:
-    limit = _STEEPEST / float(thin.time[-1])
-    rows = _responses(
-        thin.time, np.clip(rate, -limit, limit), np.abs(stiffness)
-    )  # (points, 5, n): u, s, 1, w, t s
+    # As `response_rows`, for many decays; complex, so one formula covers all but exactly critical damping.
+    time, limit = thin.time, _STEEPEST / float(thin.time[-1])
+    damping, spring = np.clip(rate, -limit, limit), np.abs(stiffness)
+    delta = (spring - damping**2).astype(np.complex128)
+    delta[np.abs(delta) < 1e-9 * np.abs(spring)] += 1e-9 * np.abs(spring).max()
+    root = np.sqrt(delta)
+    decaying = np.exp(-np.outer(damping, time))
+    turning = np.exp(1j * np.outer(root, time))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        cosine = decaying * (0.5 * (turning + 1.0 / turning)).real
+        sine = decaying * (0.5 * (turning - 1.0 / turning) / (1j * root[:, None])).real
+    slope = (time * cosine - sine) / (2.0 * delta.real[:, None])
+    start = cosine + damping[:, None] * sine
+    rows = np.stack((start, sine, np.ones_like(start), slope, time * sine), axis=1)  # (points, 5, n)
     linear = rows[:, :3]
     gram = linear @ linear.transpose(0, 2, 1)
     unit = np.sqrt(np.einsum("gii->gi", gram))
@@ -231,21 +209,6 @@ def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Ar
     information = full @ full.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):  # a motion of only a few samples gives no information
         return squares, 0.5 * (np.linalg.slogdet(information)[1] - np.linalg.slogdet(gram)[1])
-
-
-def _responses(time: Array, rate: Array, stiffness: Array) -> Array:
-    # As `response_rows`, for many decays; complex, so one formula covers all but exactly critical damping.
-    delta = (stiffness - rate**2).astype(np.complex128)
-    delta[np.abs(delta) < 1e-9 * np.abs(stiffness)] += 1e-9 * np.abs(stiffness).max()
-    root = np.sqrt(delta)
-    decaying = np.exp(-np.outer(rate, time))
-    turning = np.exp(1j * np.outer(root, time))
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        cosine = decaying * (0.5 * (turning + 1.0 / turning)).real
-        sine = decaying * (0.5 * (turning - 1.0 / turning) / (1j * root[:, None])).real
-    slope = (time * cosine - sine) / (2.0 * delta.real[:, None])
-    unit = cosine + rate[:, None] * sine
-    return np.stack((unit, sine, np.ones_like(unit), slope, time * sine), axis=1)
 
 
 def _points(axis: Array) -> Array:
@@ -275,15 +238,16 @@ def shared_moments(
     covariance: Array,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Mean and covariance of φ, with a flat prior on it.
+    """Mean, shape (p,), and covariance, shape (p, p), of φ, with a flat prior on it.
+
+    They are drawn from the product of the runs' likelihoods: importance sampling from Student's distribution
+    about the normal approximation, drawn in pairs of opposite sign, and repeated where it misses the posterior
+    (Kloek & van Dijk, Econometrica 46 (1978) 1–19, doi 10.2307/1913641).
 
     Args:
         links: one (2, p) matrix per run: (a, k) = L φ.
         centre: of the normal approximation, shape (p,).
         covariance: of the same, shape (p, p).
-
-    Returns:
-        Mean, shape (p,), and covariance, shape (p, p).
     """
     size = centre.size
     half = rng.standard_normal((_PAIRS, size))
@@ -326,7 +290,6 @@ class Bayesian(RunByRun):
 
     Args:
         blocks_per_cycle: block means per period that the posterior is computed from, at least.
-        seed: of the draws that combine the runs.
     """
 
     name = "bayesian"
@@ -356,7 +319,14 @@ class Bayesian(RunByRun):
             return failure
         variance = noise.std**2 * noise.slow_ratio
         guess = decay_covariance_of(fit.runs[0]) * variance
-        found = self._posterior(reading, fit.runs[0].decay, fit.runs[0].residual, guess, noise)
+        decay, residual = fit.runs[0].decay, fit.runs[0].residual
+        frequency = decay.omega_n / (2.0 * np.pi)
+        thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
+        means, _ = block_means(Reading(reading.time, residual), frequency, self.blocks_per_cycle)
+        known = variance if noise.source == "stated" or noise.departs else None
+        within = float(residual @ residual) - factor * float(means.yaw @ means.yaw)
+        knowledge = NoiseKnowledge(known, factor, max(within, 0.0), reading.time.size - _LINEAR)
+        found = posterior_of(thin, decay, guess, knowledge)
         if found is None:
             return Status.NOT_CONVERGED
         mean, covariance = found.moments()
@@ -371,14 +341,3 @@ class Bayesian(RunByRun):
             zeta=Quantity(zeta[0], zeta[1], "1", zeta[2:]),
         )
         return _PosteriorDecay(estimate, projected[0].decay, covariance, posterior=found)
-
-    def _posterior(
-        self, reading: Reading, decay: Decay, residual: Array, guess: Array, noise: NoiseLevel
-    ) -> DecayPosterior | None:
-        frequency = decay.omega_n / (2.0 * np.pi)
-        thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
-        means, _ = block_means(Reading(reading.time, residual), frequency, self.blocks_per_cycle)
-        known = noise.std**2 * noise.slow_ratio if noise.source == "stated" or noise.departs else None
-        within = float(residual @ residual) - factor * float(means.yaw @ means.yaw)
-        knowledge = NoiseKnowledge(known, factor, max(within, 0.0), reading.time.size - _LINEAR)
-        return posterior_of(thin, decay, guess, knowledge)

@@ -1,13 +1,10 @@
 """Filter error: maximum likelihood with a random moment on the model and noise in the sensor.
 
-This is for runs in a turbulent stream. There the motion departs randomly from the decay, so the residual of
-output error is not white and its intervals are too narrow or, after widening, too wide. Here a Kalman filter
-predicts every sample from the previous ones, and decay rate, stiffness and intensity of the moment maximise the
-likelihood of the prediction errors; the initial state and the sensor's zero are fitted by least squares. For a
-run without a random moment the result is that of output error. The input of a driven run is exact between its
-samples; for a body without a spring no random moment is sought. Sources: Maine & Iliff, SIAM J. Appl. Math. 41
-(1981) 558–579, doi 10.1137/0141046; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
-10.2514/4.102790.
+This is for runs in a turbulent stream, where the residual of output error is not white and its intervals are too
+narrow or, after widening, too wide. A Kalman filter predicts every sample from the previous ones, and decay rate,
+stiffness and intensity of the moment maximise the likelihood of the prediction errors
+(`identification.signal.filter`). For a run without a random moment the result is that of output error; for a body
+without a spring no random moment is sought.
 """
 
 from __future__ import annotations
@@ -16,9 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.campaign.combination import RunDecay
+from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import NoiseLevel, Quantity, Status
-from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
 from identification.signal.driven import driven_rows
 from identification.signal.driven_fit import DrivenRun, Gained, driven_run
@@ -115,7 +111,15 @@ def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit
     if projected is None:
         return Status.NOT_CONVERGED
     fitted, zero = projected
-    noise = _judged(before, found, noise_std)
+    # The model is judged by the innovations, which are white if it is right; the residual is not.
+    values, expected = found.innovations.values, found.innovations.variance
+    level = noise_level(
+        [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
+        SensorProperties(noise_std=float(np.sqrt(expected))),
+    )
+    departs = level.departs or level.disagrees
+    ratio = max(level.slow_ratio, float(values @ values) / values.size / expected) if departs else 1.0
+    noise = replace(before, std=noise_std, departs=departs, slow_ratio=ratio)
     covariance = found.covariance * noise.slow_ratio
     # The initial state is that of least squares; the part of it due to the moment is of the power of the residual.
     variance = max(noise_std, noise.residual_std) ** 2
@@ -129,15 +133,3 @@ def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit
     weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
     gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
     return RunDecay(estimate, decay, covariance[:2, :2], gained)
-
-
-def _judged(before: NoiseLevel, found: DrivenFit, noise_std: float) -> NoiseLevel:
-    # The model is judged by the innovations, which are white if it is right; the residual is not.
-    values, variance = found.innovations.values, found.innovations.variance
-    level = noise_level(
-        [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
-        SensorProperties(noise_std=float(np.sqrt(variance))),
-    )
-    departs = level.departs or level.disagrees
-    ratio = max(level.slow_ratio, float(values @ values) / values.size / variance) if departs else 1.0
-    return replace(before, std=noise_std, departs=departs, slow_ratio=ratio)

@@ -1,19 +1,14 @@
 """Hilbert envelope: decay rate from the logarithm of the envelope, frequency from the phase.
 
-The analytic signal of a finite record is wrong near its ends, where the transform sees a discontinuity. So the
-record is first extended past both ends by a few cycles of an approximate decay that fades out; the remaining
-error is as small as that decay is accurate. The envelope is then demodulated with a fixed frequency and averaged
-over half cycles: for an exponential decay the averages are an exponential sequence again, and their errors are
-independent with 2 S²/m in each component for m samples.
+The analytic signal of a finite record is wrong near its ends. So the record is first extended past both ends by a
+few cycles of an approximate decay that fades out. The envelope is demodulated with a fixed frequency and averaged
+over half cycles: the averages of a decay are an exponential sequence again, with independent errors, √2 S/(√m A)
+of logarithm and phase alike for m samples. Where a line does not fit a run, its standard deviations are raised to
+the scatter about it.
 
-Both are weighted lines over half-cycle averages of the analytic signal, whose deviations follow from the noise:
-√2 S/(√m A) for the logarithm and the phase alike. Short parts of the same lines give ζ and ωn against the
-amplitude, the backbone of the rig, as the windows of the run. Where a line does not fit a run, its standard
-deviations are raised to the scatter about it.
-
-Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay
-by the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E.
-Cooper, J. Sound Vib. 348 (2015) 224–238, doi 10.1016/j.jsv.2015.03.025.
+Sources: M. Feldman, Mech. Syst. Signal Process. 25 (2011) 735–802, doi 10.1016/j.ymssp.2010.07.018 (free decay by
+the Hilbert transform, and its end effects); backbone from free decays: J. M. Londoño, S. A. Neild & J. E. Cooper,
+J. Sound Vib. 348 (2015) 224–238, doi 10.1016/j.jsv.2015.03.025.
 """
 
 from __future__ import annotations
@@ -23,15 +18,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len
 
+from identification.campaign.combination import Found, RunByRun, run_estimate
 from identification.estimate import Quantity, Status, WindowEstimate
-from identification.estimators.run_by_run import Found, RunByRun, run_estimate
 from identification.policy import LEAST_ENVELOPE, LEAST_WINDOW_ENERGY
 from identification.signal.decay_fit import Reading, RunFit, even_reading, project_run
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay
 from identification.signal.noise import reading_noise
-from identification.signal.windows import CYCLES, modal_quantities
-from identification.statistics import WeightedFit, decay_covariance, weighted_fit
+from identification.signal.run_fit import CYCLES, modal_quantities
+from identification.statistics import decay_covariance, weighted_fit
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -48,7 +43,6 @@ class Envelope:
         amplitude: shape (n,), rad.
         phase: less that of the carrier, unwrapped, shape (n,), rad.
         carrier: the demodulating angular frequency, rad/s.
-        samples: number of samples in an average.
     """
 
     time: Array
@@ -59,14 +53,11 @@ class Envelope:
 
 
 def envelope(reading: Reading, rough: RunFit, zero: float) -> Envelope:
-    """Envelope and phase of a record.
+    """Envelope and phase of a record: at least one average per half cycle.
 
     Args:
         rough: an approximate decay of the record, with its initial state; it must oscillate.
         zero: the sensor's, rad.
-
-    Returns:
-        At least one average per half cycle of the record.
     """
     from scipy.signal import hilbert  # only here: slow to load
 
@@ -126,8 +117,31 @@ class Hilbert(RunByRun):
             decay, covariance = lines
         if seen is None or decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
-        windows = () if covariance is None else _backbone(seen, noise_std, self.cycles_per_window)
-        return run_estimate(run, decay, covariance, noise_std, sensor, windows)
+        windows: list[WindowEstimate] = []  # lines through consecutive parts of the envelope
+        length = 2 * self.cycles_per_window  # two averages per cycle
+        deviation = noise_std * np.sqrt(2.0 / seen.samples)
+        shown = covariance is not None and length > 0
+        for begin in range(0, seen.time.size - length + 1, length) if shown else ():
+            part = slice(begin, begin + length)
+            amplitude = float(np.exp(np.log(seen.amplitude[part]).mean()))
+            if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
+                break
+            _, own, own_covariance = _fitted(seen, part, np.full(length, deviation / amplitude))
+            if own.stiffness <= 0.0:
+                break
+            step = float(seen.time[1] - seen.time[0])
+            omega_n, zeta = modal_quantities(own, own_covariance)
+            windows.append(
+                WindowEstimate(
+                    start_s=float(seen.time[begin] - 0.5 * step),
+                    duration_s=length * step,
+                    amplitude=Quantity(amplitude, float(deviation / np.sqrt(length)), "rad"),
+                    omega_n=omega_n,
+                    zeta=zeta,
+                    cycles=self.cycles_per_window,
+                )
+            )
+        return run_estimate(run, decay, covariance, noise_std, sensor, tuple(windows))
 
 
 def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array] | None:
@@ -137,54 +151,21 @@ def _lines(seen: Envelope, decay: Decay, noise_std: float) -> tuple[Decay, Array
         return None
     scale = float(np.exp(np.mean(np.log(seen.amplitude[:4]) + decay.rate * seen.time[:4])))
     expected = scale * np.exp(-decay.rate * seen.time)
-    found = None
     for _ in range(2):
         below = np.flatnonzero(expected < LEAST_ENVELOPE * deviation)
         count = int(below[0]) if below.size else expected.size
         if count < _LEAST_POINTS:
             return None
-        found = _two_lines(seen, slice(0, count), deviation / expected[:count])
-        expected = np.exp(found[0].values[0] - found[0].values[1] * seen.time)
-    return None if found is None else _decay(seen, *found)
+        logarithm, decay, covariance = _fitted(seen, slice(0, count), deviation / expected[:count])
+        expected = np.exp(logarithm[0] - logarithm[1] * seen.time)
+    return decay, covariance
 
 
-def _two_lines(seen: Envelope, part: slice, deviation: Array) -> tuple[WeightedFit, WeightedFit]:
+def _fitted(seen: Envelope, part: slice, deviation: Array) -> tuple[Array, Decay, Array]:
+    """The line of the logarithm, and with that of the phase the decay and the covariance of (a, k)."""
     columns = np.column_stack((np.ones(deviation.size), -seen.time[part]))
-    logarithm = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
-    return logarithm, weighted_fit(columns, seen.phase[part], deviation**2)
-
-
-def _decay(seen: Envelope, logarithm: WeightedFit, phase: WeightedFit) -> tuple[Decay, Array]:
-    rate, omega_d = float(logarithm.values[1]), seen.carrier - float(phase.values[1])
-    covariance = decay_covariance(
-        rate, omega_d, float(logarithm.covariance[1, 1]), float(phase.covariance[1, 1])
-    )
-    return Decay(rate, omega_d**2 + rate**2), covariance
-
-
-def _backbone(seen: Envelope, noise_std: float, cycles: int) -> tuple[WindowEstimate, ...]:
-    # Lines through consecutive parts of the envelope; two averages per cycle.
-    windows: list[WindowEstimate] = []
-    length = 2 * cycles
-    deviation = noise_std * np.sqrt(2.0 / seen.samples)
-    step = float(seen.time[1] - seen.time[0])
-    for begin in range(0, seen.time.size - length + 1, length or 1):
-        part = slice(begin, begin + length)
-        amplitude = float(np.exp(np.log(seen.amplitude[part]).mean())) if length else 0.0
-        if 0.5 * length * seen.samples * amplitude**2 < LEAST_WINDOW_ENERGY * noise_std**2:
-            break
-        decay, covariance = _decay(seen, *_two_lines(seen, part, np.full(length, deviation / amplitude)))
-        if decay.stiffness <= 0.0:
-            break
-        omega_n, zeta = modal_quantities(decay, covariance)
-        windows.append(
-            WindowEstimate(
-                start_s=float(seen.time[begin] - 0.5 * step),
-                duration_s=length * step,
-                amplitude=Quantity(amplitude, float(deviation / np.sqrt(length)), "rad"),
-                omega_n=omega_n,
-                zeta=zeta,
-                cycles=cycles,
-            )
-        )
-    return tuple(windows)
+    logarithm, by_envelope = weighted_fit(columns, np.log(seen.amplitude[part]), deviation**2)
+    phase, by_phase = weighted_fit(columns, seen.phase[part], deviation**2)
+    rate, omega_d = float(logarithm[1]), seen.carrier - float(phase[1])
+    covariance = decay_covariance(rate, omega_d, float(by_envelope[1, 1]), float(by_phase[1, 1]))
+    return logarithm, Decay(rate, omega_d**2 + rate**2), covariance

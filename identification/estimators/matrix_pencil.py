@@ -1,9 +1,6 @@
 """Matrix pencil: poles by linear algebra, without starting values and without iteration on the parameters.
 
-Every run is thinned to block means. Its two poles follow from the shift of their Hankel matrix, and a first-order
-perturbation gives their covariance. The campaign's coefficients are a least-squares fit to the poles of the runs.
-Sources: Hua & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027; see
-`identification.signal.pencil`.
+A first-order perturbation gives the covariance of the poles: see `identification.signal.frequency.pencil_decay`.
 """
 
 from __future__ import annotations
@@ -12,12 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.combination import RunDecay
+from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Status
-from identification.estimators.run_by_run import Found, RunByRun
 from identification.signal.decay_fit import Reading, block_means, even_reading, project_run
-from identification.signal.frequency import starting_frequency
-from identification.signal.pencil import PencilDecay, pencil_decay
+from identification.signal.frequency import pencil_decay, starting_frequency
 from identification.signal.run_fit import describe_run, noise_and_failure
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 
@@ -41,28 +36,21 @@ class MatrixPencil(RunByRun):
         if frequency is None:
             return Status.NO_OSCILLATION
         reading = Reading.from_record(run.record)
-        found = self._pencil(reading, frequency)
-        projected = None if found is None else project_run(reading, found[0].decay)
-        if found is None or projected is None or found[0].decay.stiffness <= 0.0:
+        thin, factor = block_means(even_reading(reading), frequency, self.blocks_per_cycle)
+        interval = float(thin.time[-1] - thin.time[0]) / max(thin.time.size - 1, 1)
+        found = pencil_decay(thin.yaw, interval, 2.0 * np.pi * frequency)
+        if found is not None and found.decay.rate * float(thin.time[-1]) > 1.5 * _DECAY_TIMES:
+            # The decay fills a small part of the record: once more over this part.
+            count = int(_DECAY_TIMES / (found.decay.rate * interval))
+            found = pencil_decay(thin.yaw[:count], interval, 2.0 * np.pi * frequency) or found
+        projected = None if found is None else project_run(reading, found.decay)
+        if found is None or projected is None or found.decay.stiffness <= 0.0:
             return Status.NOT_CONVERGED
         fitted, zero = projected
         noise, failure = noise_and_failure(reading, fitted, zero, sensor)
         if failure is not None:
             return failure
         variance = noise.std**2 * noise.slow_ratio
-        covariance = found[0].weights @ found[0].weights.T * (variance / found[1])
+        covariance = found.weights @ found.weights.T * (variance / factor)
         estimate = describe_run(run, reading, fitted, zero, covariance, variance, noise=noise)
         return RunDecay(estimate, fitted.decay, covariance)
-
-    def _pencil(self, reading: Reading, frequency: float) -> tuple[PencilDecay, int] | None:
-        # Over the whole record, and again over the part that holds the decay where that is much shorter.
-        thin, factor = block_means(even_reading(reading), frequency, self.blocks_per_cycle)
-        interval = float(thin.time[-1] - thin.time[0]) / max(thin.time.size - 1, 1)
-        found = pencil_decay(thin.yaw, interval, 2.0 * np.pi * frequency)
-        if found is None:
-            return None
-        rate = found.decay.rate
-        if rate * float(thin.time[-1]) > 1.5 * _DECAY_TIMES:
-            count = int(_DECAY_TIMES / (rate * interval))
-            found = pencil_decay(thin.yaw[:count], interval, 2.0 * np.pi * frequency) or found
-        return found, factor

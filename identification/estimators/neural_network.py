@@ -1,16 +1,10 @@
 """The paper's neural networks: three cycles at a time, ζ by 100-5-5-1 and ωn by 2-2-5-1.
 
-Each run is cut into consecutive windows of three cycles (the paper's Table III), found from zero crossings alone.
-The first network gives ζ from the shape of a window, the second ωn from ζ and the length t3 of the window. The
-run's ζ and ωn are averages over its windows, weighted by their noise; eqs 10, 11, 17 and 18 then give Cnβ and Cnr
-from wind-on and wind-off runs of the same spring (`identification.campaign.pairing`).
-
-A standard deviation includes the noise of the reading, propagated through crossings, shape and networks by the
-delta method; the posterior of the networks' weights; and their largest error on test responses. Where the windows
-scatter by more than that, it is raised to the scatter and the status says that the model does not explain the
-data.
-
-Torch is not needed: the shipped weights are used in NumPy.
+The run's ζ and ωn are averages over its windows (the paper's Table III), weighted by their noise; eqs 10, 11, 17
+and 18 then give Cnβ and Cnr (`identification.campaign.pairing`). A standard deviation includes the noise of the
+reading, by the delta method; the posterior of the networks' weights; and their largest error on test responses.
+Where the windows scatter by more than that, it is raised to the scatter and the status says that the model does
+not explain the data.
 """
 
 from __future__ import annotations
@@ -25,9 +19,8 @@ import numpy as np
 from scipy.special import chdtri
 
 from identification.campaign.derivatives import noise_statuses
-from identification.campaign.pairing import PairedRun
+from identification.campaign.pairing import Paired, PairedRun
 from identification.estimate import Quantity, RunEstimate, Status, WindowEstimate, by_severity
-from identification.estimators.run_by_run import Paired
 from identification.neural.networks import Networks, read_networks, shipped_networks
 from identification.neural.three_cycles import (
     CYCLES,
@@ -41,8 +34,7 @@ from identification.policy import GREATEST_NETWORK_DISTANCE, LEAST_FOR_SCATTER, 
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import holds_motion
 from identification.signal.noise import reading_noise
-from identification.signal.run_fit import residual_check
-from identification.signal.windows import modal_quantities
+from identification.signal.run_fit import modal_quantities, residual_check
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
@@ -68,7 +60,51 @@ class NeuralNetwork(Paired):
         return shipped_networks() if self.weights is None else read_networks(self.weights)
 
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:
-        return _identified(run, sensor, self.networks)
+        networks, readings, cycles = self.networks, [], 0.0
+        if holds_motion(run.record):
+            windows, cycles = find_windows(run.record, reading_noise(run.record, sensor))
+            for window in windows:
+                if (reading := read_window(window, networks)) is None:
+                    break
+                readings.append(reading)
+        if not readings:
+            short = 0.0 < cycles < CYCLES
+            return RunEstimate(run.id, (Status.TOO_FEW_CYCLES if short else Status.NO_OSCILLATION,)), None
+        zeta, zeta_std, departs = _average(readings, 0)
+        omega, omega_std, drifts = _average(readings, 1)
+        if not networks.trained_for(zeta, omega):
+            return RunEstimate(run.id, (Status.OUTSIDE_TRAINING,)), None
+        own_zeta, own_omega = networks.own_stds(zeta, readings[0].window.t3)
+        zeta_std = float(np.hypot(zeta_std, own_zeta))
+        omega_std = float(np.hypot(omega_std, own_omega * omega))
+        check = residual_check(run, Decay.from_modal(omega, zeta), sensor)
+        statuses = {Status.MODEL_DEPARTS} if departs or drifts else set()
+        if check is not None:
+            statuses |= noise_statuses([check.noise])
+        if check is not None and check.noise.departs:
+            least_omega, least_zeta = modal_quantities(Decay.from_modal(omega, zeta), check.covariance)
+            zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
+        if run.spring_stiffness is None:
+            statuses.add(Status.NO_STIFFNESS)
+        trained = [one for one in readings if networks.trained_for(one.zeta, one.omega_n)]
+        estimate = RunEstimate(
+            id=run.id,
+            statuses=by_severity(statuses),
+            omega_n=Quantity(omega, omega_std, "rad/s"),
+            zeta=Quantity(zeta, zeta_std, "1"),
+            noise=None if check is None else check.noise,
+            windows=tuple(_shown(one, networks) for one in trained),
+        )
+        root = float(np.sqrt(1.0 - zeta**2))
+        damped_std = float(np.hypot(root * omega_std, zeta / root * omega * zeta_std))
+        paired = PairedRun(
+            run=run,
+            frequency=omega * root / (2.0 * np.pi),
+            frequency_std=damped_std / (2.0 * np.pi),
+            rate=zeta * omega,
+            rate_std=float(np.hypot(omega * zeta_std, zeta * omega_std)),
+        )
+        return estimate, paired
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +112,6 @@ class WindowReading:
     """The result of the networks for one window.
 
     Args:
-        window: where it lies.
         zeta: damping ratio.
         omega_n: natural frequency, rad/s.
         noise: how the samples' noise, in standard deviations, makes errors of ζ and ωn, shape (2, n).
@@ -94,11 +129,7 @@ class WindowReading:
 
 
 def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None:
-    """Put a window through both networks.
-
-    Returns:
-        The result; None where the window is not similar to a damped oscillation.
-    """
+    """Put a window through both networks; None where it is not similar to a damped oscillation."""
     inputs = window.shape.inputs
     zeta = float(networks.zeta(inputs[None])[0])
     clean = network_inputs(np.clip([zeta], *networks.spec.zeta_range))[0]
@@ -110,84 +141,16 @@ def read_window(window: ThreeCycles, networks: Networks) -> WindowReading | None
     return WindowReading(window, zeta, omega_n, slopes @ weights)
 
 
-def read_windows(run: Run, sensor: SensorProperties, networks: Networks) -> tuple[list[WindowReading], float]:
-    """Put a run's windows through both networks, one after the other.
-
-    Returns:
-        The readings, and how many cycles the record holds from its first crossing on; 0 where nothing oscillates.
-    """
-    if not holds_motion(run.record):
-        return [], 0.0
-    windows, cycles = find_windows(run.record, reading_noise(run.record, sensor))
-    readings = []
-    for window in windows:
-        reading = read_window(window, networks)
-        if reading is None:
-            break
-        readings.append(reading)
-    return readings, cycles
-
-
-def _identified(
-    run: Run, sensor: SensorProperties, networks: Networks
-) -> tuple[RunEstimate, PairedRun | None]:
-    readings, cycles = read_windows(run, sensor, networks)
-    if not readings:
-        short = 0.0 < cycles < CYCLES
-        return RunEstimate(run.id, (Status.TOO_FEW_CYCLES if short else Status.NO_OSCILLATION,)), None
-    zeta, zeta_std, departs = _average(np.array([one.zeta for one in readings]), _covariance(readings, 0))
-    omega, omega_std, drifts = _average(np.array([one.omega_n for one in readings]), _covariance(readings, 1))
-    if not networks.trained_for(zeta, omega):
-        return RunEstimate(run.id, (Status.OUTSIDE_TRAINING,)), None
-    own_zeta, own_omega = networks.own_stds(zeta, readings[0].window.t3)
-    zeta_std, omega_std = float(np.hypot(zeta_std, own_zeta)), float(np.hypot(omega_std, own_omega * omega))
-    check = residual_check(run, Decay.from_modal(omega, zeta), sensor)
-    statuses = {Status.MODEL_DEPARTS} if departs or drifts else set()
-    if check is not None:
-        statuses |= noise_statuses([check.noise])
-    if check is not None and check.noise.departs:
-        least_omega, least_zeta = modal_quantities(Decay.from_modal(omega, zeta), check.covariance)
-        zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
-    if run.spring_stiffness is None:
-        statuses.add(Status.NO_STIFFNESS)
-    omega_n = Quantity(omega, omega_std, "rad/s")
-    estimate = RunEstimate(
-        id=run.id,
-        statuses=by_severity(statuses),
-        omega_n=omega_n,
-        zeta=Quantity(zeta, zeta_std, "1"),
-        noise=None if check is None else check.noise,
-        windows=tuple(
-            _shown(one, networks) for one in readings if networks.trained_for(one.zeta, one.omega_n)
-        ),
-    )
-    root = float(np.sqrt(1.0 - zeta**2))
-    damped_std = float(np.hypot(root * omega_std, zeta / root * omega * zeta_std))
-    paired = PairedRun(
-        run=run,
-        frequency=omega * root / (2.0 * np.pi),
-        frequency_std=damped_std / (2.0 * np.pi),
-        rate=zeta * omega,
-        rate_std=float(np.hypot(omega * zeta_std, zeta * omega_std)),
-        omega_n=omega_n,
-    )
-    return estimate, paired
-
-
-def _covariance(readings: Sequence[WindowReading], row: int) -> Array:
-    # Of one quantity over the windows: neighbours share a crossing and its noise.
+def _average(readings: Sequence[WindowReading], row: int) -> tuple[float, float, bool]:
+    """Weighted mean; its standard deviation, widened if the windows scatter beyond chance; and whether they do."""
+    values = np.array([(one.zeta, one.omega_n)[row] for one in readings])
     covariance = np.diag([one.variances[row] for one in readings])
-    for place, (one, other) in enumerate(pairwise(readings)):
+    for place, (one, other) in enumerate(pairwise(readings)):  # neighbours share a crossing and its noise
         offset = other.window.noise.first - one.window.noise.first
         shared = one.noise.shape[1] - offset
         if shared > 0:
             common = float(one.noise[row, offset:] @ other.noise[row, :shared])
             covariance[place, place + 1] = covariance[place + 1, place] = common
-    return covariance
-
-
-def _average(values: Array, covariance: Array) -> tuple[float, float, bool]:
-    # Weighted mean; its standard deviation, widened if the windows scatter beyond chance; and whether they do.
     weights = 1.0 / np.diag(covariance)
     weights = weights / weights.sum()
     mean = float(weights @ values)
@@ -197,8 +160,7 @@ def _average(values: Array, covariance: Array) -> tuple[float, float, bool]:
     inverse = np.linalg.inv(covariance)
     away = values - float(inverse.sum(axis=0) @ values) / float(inverse.sum())
     scatter = float(away @ inverse @ away)
-    chance = SCATTER_TOLERANCE * float(chdtri(values.size - 1, 0.5 * MISFIT_RATE))
-    departs = scatter > chance
+    departs = scatter > SCATTER_TOLERANCE * float(chdtri(values.size - 1, 0.5 * MISFIT_RATE))
     return mean, std * float(np.sqrt(scatter / (values.size - 1))) if departs else std, departs
 
 
@@ -210,15 +172,13 @@ def _shown(reading: WindowReading, networks: Networks) -> WindowEstimate:
     middle = float(np.exp(-np.pi * CYCLES * zeta / np.sqrt(1.0 - zeta**2)))
     amplitude = window.shape.scale / unit * middle
     level = window.noise.std * float(np.linalg.norm(window.shape.peak_weights @ window.noise.points))
+    of_zeta, of_omega = np.sqrt(reading.variances)
+    omega_std = float(np.hypot(of_omega, own_omega * reading.omega_n))
     return WindowEstimate(
         start_s=window.start_s,
         duration_s=window.t3,
         amplitude=Quantity(amplitude, level / unit * middle, "rad"),
-        omega_n=Quantity(
-            reading.omega_n,
-            float(np.hypot(np.sqrt(reading.variances[1]), own_omega * reading.omega_n)),
-            "rad/s",
-        ),
-        zeta=Quantity(zeta, float(np.hypot(np.sqrt(reading.variances[0]), own_zeta)), "1"),
+        omega_n=Quantity(reading.omega_n, omega_std, "rad/s"),
+        zeta=Quantity(zeta, float(np.hypot(of_zeta, own_zeta)), "1"),
         cycles=CYCLES,
     )

@@ -1,12 +1,9 @@
 """Neural posterior: rival models of every record and of the campaign, weighed by a trained network.
 
-A record is reduced to windows of envelope and phase, in which the nominal model and each of many rivals is a linear
-fit (`identification.neural.posterior`). A network trained on simulated campaigns with effects in many forms gives
-every rival a weight and a width. Values are medians of the mixture that follows, with its 95 % intervals, and the
-standard deviation is the interval's width over 3.92. What is unlike anything trained on is refused.
-
-ζ and ωn are those at small amplitude, Cnβ, Cnr, Izz and Cr the linear coefficients, whatever else acts. Torch is
-not needed.
+In windows of envelope and phase, the nominal model and each of many rivals is a linear fit
+(`identification.neural.rivals`). Values are medians of the mixture that the network's weights give, with its 95 %
+intervals, and the standard deviation is the interval's width over 3.92. ζ and ωn are those at small amplitude,
+Cnβ, Cnr, Izz and Cr the linear coefficients, whatever else acts. What is unlike anything trained on is refused.
 """
 
 from __future__ import annotations
@@ -21,6 +18,7 @@ from scipy.special import chdtri
 
 from identification.campaign.derivatives import (
     Derivatives,
+    Design,
     build_design,
     combine,
     design_statuses,
@@ -30,25 +28,19 @@ from identification.campaign.derivatives import (
     statuses_of_runs,
 )
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
-from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import (
-    CAMPAIGN_NAMES,
-    Features,
-    campaign_features,
-    record_features,
-)
-from identification.neural.posterior.network import (
+from identification.neural.demodulated import Demodulated, demodulate
+from identification.neural.posterior import (
     Posterior,
     TrainedPosterior,
     posteriors,
     read_trained,
     shipped_posteriors,
 )
-from identification.neural.posterior.rivals import Rivals
+from identification.neural.rivals import CAMPAIGN_NAMES, Features, Rivals, campaign_features, record_features
 from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
+from identification.signal.noise import stated_noise
 from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +75,7 @@ class NeuralPosterior:
         return shipped_posteriors() if self.weights is None else read_trained(self.weights)
 
     def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified, or that is unlike anything trained on, is left out.
+        """Identify every run, then the campaign; runs without a result, or unlike the training, are left out.
 
         Raises:
             TunnelError: a wind-on run states no air density; raised before any run is analysed.
@@ -98,61 +84,69 @@ class NeuralPosterior:
             loads(run, campaign.rig)
         found = _runs(campaign.runs, self.networks["record"])
         runs = tuple(
-            _described(one, campaign.sensor)
-            if isinstance(one, _DemodulatedRun)
-            else RunEstimate(run.id, (one,))
+            RunEstimate(run.id, (one,)) if isinstance(one, Status) else _described(one, campaign.sensor)
             for run, one in zip(campaign.runs, found, strict=True)
         )
         estimate = Estimate(campaign.name, self.name, runs)
         statuses = statuses_of_runs(campaign, runs) | noise_statuses([run.noise for run in runs])
-        linked = [
-            one for one in found if isinstance(one, _DemodulatedRun) and one.run.spring_stiffness is not None
-        ]
+        linked = _linked(found)
         if not linked or Status.NO_RUN_IDENTIFIED in statuses:
             return replace(estimate, statuses=by_severity(statuses))
         return _of_campaign(campaign, estimate, linked, statuses, self.networks["campaign"])
 
     def effects(self, campaign: Campaign) -> dict[str, float]:
-        """Probability of every effect of the vocabulary in a campaign, by name.
+        """Probability of every effect of the vocabulary in a campaign, by name; none where it has no coefficients.
 
         They come from simulated campaigns in which any effect is as likely as another. They can order what a
         diagnosis tries; they are not its answer.
-
-        Returns:
-            The probabilities; none where the campaign has no coefficients.
         """
-        found = _runs(campaign.runs, self.networks["record"])
-        linked = [
-            one for one in found if isinstance(one, _DemodulatedRun) and one.run.spring_stiffness is not None
-        ]
-        features = _campaign_features(campaign, linked) if linked else None
+        linked = _linked(_runs(campaign.runs, self.networks["record"]))
+        runs = [one.run for one in linked]
+        features = _campaign_features(linked, build_design(runs, campaign.rig)) if linked else None
         return {} if features is None else posteriors([features], self.networks["campaign"])[0].effects
 
 
 def _runs(runs: Sequence[Run], network: TrainedPosterior) -> list[_DemodulatedRun | Status]:
     windows = [demodulate(run.record) for run in runs]
-    places = [place for place, one in enumerate(windows) if isinstance(one, Demodulated)]
     shown = [one for one in windows if isinstance(one, Demodulated)]
-    features = record_features(shown) if shown else []
-    pairs = [(place, one) for place, one in zip(places, features, strict=True) if one is not None]
-    found: list[_DemodulatedRun | Status] = [
-        one if isinstance(one, Status) else Status.NOT_DETERMINED for one in windows
-    ]
-    for (place, (_, alone)), posterior in zip(
-        pairs, posteriors([one for _, (one, _) in pairs], network), strict=True
-    ):
-        seen = windows[place]
-        assert isinstance(seen, Demodulated)
-        found[place] = (
-            Status.UNLIKE_TRAINING
-            if posterior.unlike
-            else _DemodulatedRun(runs[place], seen, alone, posterior)
-        )
+    features = iter(record_features(shown) if shown else [])
+    pairs = [None if isinstance(one, Status) else next(features) for one in windows]
+    weighed = iter(posteriors([pair[0] for pair in pairs if pair is not None], network))
+    found: list[_DemodulatedRun | Status] = []
+    for run, one, pair in zip(runs, windows, pairs, strict=True):
+        if isinstance(one, Status):
+            found.append(one)
+        elif pair is None:
+            found.append(Status.NOT_DETERMINED)
+        else:
+            posterior = next(weighed)
+            seen = _DemodulatedRun(run, one, pair[1], posterior)
+            found.append(Status.UNLIKE_TRAINING if posterior.unlike else seen)
     return found
 
 
+def _linked(found: Sequence[_DemodulatedRun | Status]) -> list[_DemodulatedRun]:
+    """The runs that were identified and state their spring."""
+    identified = [one for one in found if isinstance(one, _DemodulatedRun)]
+    return [one for one in identified if one.run.spring_stiffness is not None]
+
+
 def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
-    noise = _noise(seen, sensor)
+    # The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model.
+    total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
+    std = seen.windows.noise * float(np.sqrt(seen.windows.block))
+    harmonics = np.concatenate((seen.windows.second, seen.windows.third))
+    distorted = float(np.max(np.tile(seen.windows.information, 2) * np.abs(harmonics) ** 2))
+    limit = 0.5 * MISFIT_RATE
+    departs = bool(total > chdtri(freedom, limit) or distorted > chdtri(2, limit / harmonics.size))
+    stated = stated_noise(sensor)
+    disagrees = False
+    if stated is not None:
+        own = 1.0 / np.sqrt(2.0 * seen.windows.samples.sum())
+        tolerance = MISFIT_DEVIATIONS * float(np.hypot(NOISE_TOLERANCE, own))
+        disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
+    slow = max(total / freedom, 1.0) if departs else 1.0
+    noise = NoiseLevel(std, "residual", std, slow, departs, disagrees)
     zeta, omega_n = (seen.posterior.quantity(place, unit) for place, unit in enumerate(("1", "rad/s")))
     weight = seen.windows.samples
     zero = float(weight @ seen.windows.zero / weight.sum())
@@ -169,29 +163,9 @@ def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
     )
 
 
-def _noise(seen: _DemodulatedRun, sensor: SensorProperties) -> NoiseLevel:
-    """The noise within the windows; the χ² of envelope and phase and the largest harmonic judge the model."""
-    total, freedom = float(seen.alone.remaining[0]), seen.alone.freedom
-    std = seen.windows.noise * float(np.sqrt(seen.windows.block))
-    harmonics = np.concatenate((seen.windows.second, seen.windows.third))
-    distorted = float(np.max(np.tile(seen.windows.information, 2) * np.abs(harmonics) ** 2))
-    limit = 0.5 * MISFIT_RATE
-    departs = total > chdtri(freedom, limit) or distorted > chdtri(2, limit / harmonics.size)
-    disagrees = False
-    if sensor.noise_std is not None:
-        stated = float(np.hypot(sensor.noise_std, (sensor.resolution or 0.0) / np.sqrt(12.0)))
-        tolerance = MISFIT_DEVIATIONS * float(
-            np.hypot(NOISE_TOLERANCE, 1.0 / np.sqrt(2.0 * seen.windows.samples.sum()))
-        )
-        disagrees = stated > 0.0 and abs(std / stated - 1.0) > tolerance
-    slow = max(total / freedom, 1.0) if departs else 1.0
-    return NoiseLevel(std, "residual", std, slow, bool(departs), disagrees)
-
-
-def _campaign_features(campaign: Campaign, linked: Sequence[_DemodulatedRun]) -> Features | None:
-    runs = [one.run for one in linked]
-    design = build_design(runs, campaign.rig)
-    return campaign_features(runs, [one.windows for one in linked], design, [one.alone for one in linked])
+def _campaign_features(linked: Sequence[_DemodulatedRun], design: Design) -> Features | None:
+    runs, windows = [one.run for one in linked], [one.windows for one in linked]
+    return campaign_features(runs, windows, design, [one.alone for one in linked])
 
 
 def _of_campaign(
@@ -203,11 +177,17 @@ def _of_campaign(
 ) -> Estimate:
     runs = [one.run for one in linked]
     design = build_design(runs, campaign.rig)
-    combined = combine(design, *_decays(linked))
+    decays, informations = [], []  # (a, k) of the runs by their nominal fits
+    for one in linked:
+        rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
+        decays.append([rate, omega**2 + rate**2])
+        slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
+        informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
+    combined = combine(design, np.array(decays), informations)
     if combined is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     statuses = statuses | design_statuses(design, combined[0])
-    features = _campaign_features(campaign, linked)
+    features = _campaign_features(linked, design)
     if features is None:
         nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
         return filled_estimate(campaign, estimate, runs, design, nothing, np.zeros((0, 0)), statuses)
@@ -225,14 +205,3 @@ def _of_campaign(
         if (quantity := getattr(result, name)) is not None
     }
     return replace(result, **intervals)
-
-
-def _decays(linked: Sequence[_DemodulatedRun]) -> tuple[Array, list[Array]]:
-    """The runs' (a, k) by their nominal fits, and the information on them."""
-    decays, informations = [], []
-    for one in linked:
-        rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
-        decays.append([rate, omega**2 + rate**2])
-        slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
-        informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
-    return np.array(decays), informations

@@ -1,10 +1,8 @@
 """Output error: maximum likelihood of the motion, for each run and jointly for the campaign.
 
-The measurement is the model's output plus white Gaussian noise. Every run is fitted separately (ωn, ζ, initial
-state, zero). These fits start the joint fit, in which Izz, Cr, Cnβ, Cnr and the sensor's zero are common and
-the initial state is each run's own. No nominal values are needed, only the spring stiffnesses. Sources: the
-equation of motion (2)–(6) of the paper; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015),
-ch. 4, doi 10.2514/4.102790.
+The fits of the runs (ωn, ζ, initial state, zero) start the joint fit, in which Izz, Cr, Cnβ, Cnr and the sensor's
+zero are common. Sources: the equation of motion (2)–(6) of the paper; Jategaonkar, Flight Vehicle System
+Identification, 2nd ed. (2015), ch. 4, doi 10.2514/4.102790.
 """
 
 from __future__ import annotations
@@ -15,8 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.campaign.combination import driven_estimate
 from identification.campaign.derivatives import (
-    Design,
     build_design,
     combine,
     derivatives,
@@ -26,15 +24,13 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.driven import driven_estimate
 from identification.estimate import Estimate, Quantity, Status, by_severity
-from identification.signal.decay_fit import DecayFit, RunFit, fit_decays
+from identification.signal.decay_fit import fit_decays
 from identification.signal.driven_fit import driven_run
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import FittedRun, identify_run, residuals_of
 from identification.statistics import (
     determined,
-    eliminate,
     embed,
     fisher_covariance,
     scaled_solve,
@@ -42,7 +38,6 @@ from identification.statistics import (
     widened_covariance,
 )
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.record import Array
 
 _JOINT_UNKNOWNS = 2  # of each run in the joint fit: its initial angle and rate; its zero comes on top
 
@@ -60,14 +55,7 @@ class OutputError:
     cycles_per_window: int | None = None
 
     def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify every run, then the campaign.
-
-        Args:
-            campaign: at least one run.
-
-        Returns:
-            The estimate. A run that could not be identified is left out; a run without spring stiffness
-            is identified by itself only.
+        """Identify every run, then the campaign; runs without a result or a spring stiffness are left out of it.
 
         Raises:
             TunnelError: when a wind-on run states no air density.
@@ -105,12 +93,16 @@ def _joint_estimate(
     runs = [run for run, _ in pairs]
     design = build_design(runs, campaign.rig)
     own_zeros = campaign.sensor.zero == "per_run"
-    fit = _joint_fit(design, [item for _, item in pairs], own_zeros)
+    # The runs' own (a, k), weighted by their information, are within a few standard deviations of the optimum.
+    fits = [item.fit for _, item in pairs if item.fit is not None]
+    decays = np.array([[fit.decay.rate, fit.decay.stiffness] for fit in fits])
+    start = combine(design, decays, [fit.reduced(2)[0] for fit in fits])
+    readings = [item.reading for _, item in pairs]
+    fit = None if start is None else fit_decays(readings, design.links, start[0], own_zeros=own_zeros)
     if fit is not None and not fit.converged:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_CONVERGED}))
     if fit is None or not determined(fit.normal):
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-    readings = [item.reading for _, item in pairs]
     unknowns = _JOINT_UNKNOWNS + own_zeros
     noise = noise_level(residuals_of(readings, fit.runs, fit.zero, unknowns), campaign.sensor)
     covariance = fisher_covariance(fit.normal, noise)
@@ -125,40 +117,16 @@ def _joint_estimate(
     if Status.MODEL_DEPARTS in statuses and found.names:
         windy = sum(run.wind_speed > 0.0 for run in runs)
         informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in found.names])
-        influences = _influences(fit.runs, design.links, found.jacobian, own_zeros)
+        # The contribution of each run's residual to the parameters, shape (runs, q).
+        total, scores = np.zeros((size + (not own_zeros),) * 2), []
+        for run_fit, link in zip(fit.runs, design.links, strict=True):
+            information, score = run_fit.reduced(2 if own_zeros else 3)
+            extended = embed(link, with_zero=not own_zeros)
+            total += extended.T @ information @ extended
+            scores.append(extended.T @ score)
+        influences = (found.jacobian @ scaled_solve(total, np.array(scores).T)[:size]).T
         own = widened_covariance(own, scatter_of_runs(influences, informative_runs))
     zero = None if own_zeros else Quantity(fit.zero, float(np.sqrt(covariance[-1, -1])), "rad")
     return replace(
         filled_estimate(campaign, estimate, runs, design, found, own, statuses), sensor_zero=zero, noise=noise
     )
-
-
-def _joint_fit(design: Design, items: Sequence[FittedRun], own_zeros: bool) -> DecayFit | None:
-    # The runs' own (a, k), weighted by their information, are within a few standard deviations of the optimum.
-    own = [item.fit for item in items if item.fit is not None]
-    decays = np.array([[fit.decay.rate, fit.decay.stiffness] for fit in own])
-    informations = [eliminate(fit.information, fit.score, 2)[0] for fit in own]
-    start = combine(design, decays, informations)
-    readings = [item.reading for item in items]
-    return None if start is None else fit_decays(readings, design.links, start[0], own_zeros=own_zeros)
-
-
-def _influences(runs: Sequence[RunFit], links: Sequence[Array], jacobian: Array, own_zeros: bool) -> Array:
-    """The contribution of each run's residual to parameters fitted to all runs.
-
-    Args:
-        links: one (2, p) matrix per run.
-        jacobian: of the wanted parameters to φ, shape (q, p).
-        own_zeros: whether each run has its own zero, or all one.
-
-    Returns:
-        Shape (runs, q).
-    """
-    count = links[0].shape[1]
-    total, scores = np.zeros((count + (not own_zeros),) * 2), []
-    for run, link in zip(runs, links, strict=True):
-        information, score = run.reduced(2 if own_zeros else 3)
-        extended = embed(link, with_zero=not own_zeros)
-        total += extended.T @ information @ extended
-        scores.append(extended.T @ score)
-    return np.asarray((jacobian @ scaled_solve(total, np.array(scores).T)[:count]).T)

@@ -1,147 +1,112 @@
 """The examination of a campaign before anything is estimated from it, the same for every command.
 
-The same record under several ids is counted once. Angles beyond half a turn may be degrees. The sensor may measure
-the yaw rate or acceleration instead of the angle: every derivative of a linear decay has
+The sensor may measure the yaw rate or acceleration instead of the angle: every derivative of a linear decay has
 its ωn and ζ, so that the estimators take it as they take an angle.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.campaign.derivatives import loads
-from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
-from identification.examination.clock import with_clocks
+from identification.estimate import Estimate, Quantity
 from identification.examination.free_motion import find_release, with_zeros, without_rest
 from identification.examination.labels import exchanged_labels, inertia_off_the_springs, springs_off_the_line
 from identification.examination.self_excited import growing_runs, self_excited_runs, swing_of
 from identification.status import Examined, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.record import Record
+from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
+
+_FINEST = 9  # decimals: no logger rounds to less than a nanosecond
+_ON_LATTICE = 1e-3  # of the lattice's step: rounding errors of the decimals themselves
+_TIMER_DECIMALS = 10  # steps of the decimals that a timer's must exceed, or any stamps would lie on it
+_SWEEPS = 8
+_NO_GAP = 1.75  # usual steps: a longer one may be a gap
+_MOST_MISSING = 1e3  # ticks per sample: beyond it the stamps are not those of one clock
 
 
 def without_repeats(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Leave out runs that hold the samples of an earlier one.
+    """Leave out runs that hold the samples of an earlier one, with a remark for each.
 
-    Returns:
-        The campaign with every record once, and a remark for every id that was left out. The same samples under
-        different conditions are refused: one of the two statements is wrong.
+    The same samples under different conditions are refused: one of the two statements is wrong.
     """
     first: dict[bytes, Run] = {}
     remarks = []
     for run in campaign.runs:
         earlier = first.setdefault(run.record.yaw_rad.tobytes(), run)
-        if earlier is not run:
-            remarks.append(_remark(earlier, run))
+        if earlier is run:
+            continue
+        if _conditions(earlier) == _conditions(run):
+            what = f"the same samples as run {earlier.id}, so counted once"
+            remedy = "remove the run, or correct its file name"
+            remarks.append(Remark(Outcome.LEFT_OUT, (run.id,), what, remedy))
+        else:
+            what = "the same samples with different springs or wind speeds"
+            remedy = "correct the file names, or remove one of the runs"
+            remarks.append(Remark(Outcome.REFUSED, (earlier.id, run.id), what, remedy))
     if not remarks:
         return campaign, ()
     return replace(campaign, runs=tuple(first.values())), tuple(remarks)
-
-
-def _remark(earlier: Run, run: Run) -> Remark:
-    if _conditions(earlier) == _conditions(run):
-        return Remark(
-            Outcome.LEFT_OUT,
-            (run.id,),
-            f"the same samples as run {earlier.id}, so counted once",
-            "remove the run, or correct its file name",
-        )
-    return Remark(
-        Outcome.REFUSED,
-        (earlier.id, run.id),
-        "the same samples with different springs or wind speeds",
-        "correct the file names, or remove one of the runs",
-    )
 
 
 def _conditions(run: Run) -> tuple[float | None, ...]:
     return run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None
 
 
-def wide_swings(campaign: Campaign) -> tuple[Remark, ...]:
-    """Note runs that swing by more than half a turn to either side.
+def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
+    """Note readings that are not angles, and runs that swing by more than half a turn to either side.
 
-    Returns:
-        One remark on these runs; none where there are none, where the sensor does not measure an angle, or where
-        the campaign states ``plausible = false``.
-    """
-    if campaign.sensor.derivative > 0 or campaign.sensor.plausible is False:
-        return ()
-    swings = {run.id: 0.5 * float(np.ptp(run.record.yaw_rad)) for run in campaign.runs}
-    wide = tuple(name for name, swing in swings.items() if swing > np.pi)
-    if not wide:
-        return ()
-    largest = max(swings.values())
-    return (
-        Remark(
-            Outcome.NOTED,
-            wide,
-            f"the angle swings by up to ±{largest:.3g} rad, more than half a turn",
-            "if these are degrees, name the column yaw_deg",
-        ),
-    )
-
-
-def noted_quantity(campaign: Campaign) -> tuple[Remark, ...]:
-    """Note that the readings are not angles.
-
-    Returns:
-        One remark on all runs; none where the readings are angles.
+    Nothing is said of wide swings where the campaign states ``plausible = false``.
     """
     sensor = campaign.sensor
-    if sensor.derivative == 0:
-        return ()
-    return (
-        Remark(
-            Outcome.NOTED,
-            tuple(run.id for run in campaign.runs),
+    if sensor.derivative:
+        what = (
             f"the readings are {sensor.quantity}s: omega_n and zeta are those of the angle, and its amplitude "
-            f"follows from them; zero and noise are in {sensor.unit}",
-            "state quantity = 'angle' under [sensor] if the readings are angles",
-        ),
-    )
+            f"follows from them; zero and noise are in {sensor.unit}"
+        )
+        remedy = "state quantity = 'angle' under [sensor] if the readings are angles"
+        return (Remark(Outcome.NOTED, tuple(run.id for run in campaign.runs), what, remedy),)
+    swings = {run.id: 0.5 * float(np.ptp(run.record.yaw_rad)) for run in campaign.runs}
+    wide = tuple(name for name, swing in swings.items() if swing > np.pi)
+    if not wide or sensor.plausible is False:
+        return ()
+    what = f"the angle swings by up to ±{max(swings.values()):.3g} rad, more than half a turn"
+    return (Remark(Outcome.NOTED, wide, what, "if these are degrees, name the column yaw_deg"),)
 
 
 def as_angles(estimate: Estimate, sensor: SensorProperties) -> Estimate:
-    """The estimate of readings that are not angles, in terms of the angle.
+    """The estimate of readings that were taken for angles, in terms of the angle; the estimate itself for angles.
 
-    Args:
-        estimate: in which the reading was taken for an angle.
-
-    Returns:
-        The estimate with amplitudes of the angle and zeros in the unit of the reading. The initial state and the
-        intensity of a random moment are those of the reading and are left out. The estimate itself for angles.
+    Amplitudes are then of the angle, and zeros in the unit of the reading. The initial state and the intensity of
+    a random moment are those of the reading and are left out.
     """
     if sensor.derivative == 0:
         return estimate
-    return replace(
-        estimate,
-        runs=tuple(_run(run, sensor) for run in estimate.runs),
-        sensor_zero=_in_unit(estimate.sensor_zero, sensor.unit),
-    )
-
-
-def _run(run: RunEstimate, sensor: SensorProperties) -> RunEstimate:
-    return replace(
-        run,
-        initial_angle=None,
-        initial_rate=None,
-        process_noise=None,
-        sensor_zero=_in_unit(run.sensor_zero, sensor.unit),
-        windows=tuple(_window(window, sensor.derivative) for window in run.windows),
-    )
+    runs = []
+    for run in estimate.runs:
+        windows = []
+        for window in run.windows:
+            factor = window.omega_n.value**-sensor.derivative
+            amplitude = Quantity(factor * window.amplitude.value, factor * window.amplitude.std, "rad")
+            windows.append(replace(window, amplitude=amplitude))
+        runs.append(
+            replace(
+                run,
+                initial_angle=None,
+                initial_rate=None,
+                process_noise=None,
+                sensor_zero=_in_unit(run.sensor_zero, sensor.unit),
+                windows=tuple(windows),
+            )
+        )
+    return replace(estimate, runs=tuple(runs), sensor_zero=_in_unit(estimate.sensor_zero, sensor.unit))
 
 
 def _in_unit(quantity: Quantity | None, unit: str) -> Quantity | None:
     return None if quantity is None else replace(quantity, unit=unit)
-
-
-def _window(window: WindowEstimate, derivative: int) -> WindowEstimate:
-    factor = window.omega_n.value**-derivative
-    amplitude = Quantity(factor * window.amplitude.value, factor * window.amplitude.std, "rad")
-    return replace(window, amplitude=amplitude)
 
 
 def examine(campaign: Campaign) -> Examined:
@@ -153,9 +118,6 @@ def examine(campaign: Campaign) -> Examined:
     and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies,
     and an inertia that does not fit the springs, are noted.
 
-    Returns:
-        The campaign to identify and the remarks; the given campaign itself if nothing is wrong.
-
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.
     """
@@ -164,23 +126,14 @@ def examine(campaign: Campaign) -> Examined:
     kept, repeats = without_repeats(campaign)
     if any(remark.outcome is Outcome.REFUSED for remark in repeats):
         return Examined(campaign, repeats)
-    noted = (*noted_quantity(kept), *wide_swings(kept))
+    noted = noted_readings(kept)
     kept, clocks = with_clocks(kept)
-    driven = tuple(run for run in kept.runs if run.drive is not None)
-    if driven:  # they neither begin with a release nor end at rest, and what sustains them is known
-        free = replace(kept, runs=tuple(run for run in kept.runs if run.drive is None))
-        if not free.runs:
-            return Examined(kept, (*repeats, *noted, *clocks))
-        examined = _free_runs(free)
-        found = {run.id: run for run in (*examined.campaign.runs, *driven)}
-        runs = tuple(found[run.id] for run in kept.runs if run.id in found)
-        kept = replace(examined.campaign, runs=runs)
-        return Examined(kept, (*repeats, *noted, *clocks, *examined.remarks))
-    examined = _free_runs(kept)
-    return Examined(examined.campaign, (*repeats, *noted, *clocks, *examined.remarks))
-
-
-def _free_runs(kept: Campaign) -> Examined:
+    # Driven runs neither begin with a release nor end at rest, and what sustains them is known.
+    driven, order = [run for run in kept.runs if run.drive is not None], [run.id for run in kept.runs]
+    if driven and len(driven) == len(order):
+        return Examined(kept, (*repeats, *noted, *clocks))
+    if driven:
+        kept = replace(kept, runs=tuple(run for run in kept.runs if run.drive is None))
     kept, releases = from_releases(kept)
     kept, rests = without_rest(kept)
     kept, excited = self_excited_runs(kept)
@@ -188,29 +141,131 @@ def _free_runs(kept: Campaign) -> Examined:
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
     faults = growing_runs(swings) or exchanged_labels(swings)
     faults = faults or (*springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
-    return Examined(kept, (*releases, *rests, *excited, *zeros, *faults))
+    if driven:
+        found = {run.id: run for run in (*kept.runs, *driven)}
+        kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
+    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *excited, *zeros, *faults))
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Cut every record to begin at its release.
+    """Cut every record to begin at its release, with a remark for each run that was cut."""
+    runs, remarks = [], []
+    for run in campaign.runs:
+        record, first = run.record, find_release(run.record, campaign.sensor)
+        if first:
+            what = f"release found at {record.time_s[first]:.3f} s; the samples before it are left out"
+            remarks.append(Remark(Outcome.CUT, (run.id,), what, "cut the record by hand if that is wrong"))
+            run = replace(run, record=Record(record.time_s[first:], record.yaw_rad[first:]))
+        runs.append(run)
+    return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
 
-    Returns:
-        The campaign, itself if every record begins at its release already, and a remark for each run that was cut.
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """A uniform clock that a record's samples were taken by.
+
+    Args:
+        interval: s.
+        place: of every sample on the clock, shape (n,); increasing, with jumps where samples are missing.
+        time: of every sample by the clock, shape (n,), s.
+        away: largest distance of a time stamp from it, s.
     """
-    found = [_from_release(run, campaign.sensor) for run in campaign.runs]
-    remarks = tuple(remark for _, remark in found if remark is not None)
-    return (replace(campaign, runs=tuple(run for run, _ in found)) if remarks else campaign), remarks
+
+    interval: float
+    place: NDArray[np.int64]
+    time: Array
+    away: float
+
+    @property
+    def missing(self) -> int:
+        """Number of samples missing between the first and the last."""
+        return int(self.place[-1]) + 1 - self.place.size
 
 
-def _from_release(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | None]:
-    first = find_release(run.record, sensor)
-    if first == 0:
-        return run, None
-    record = run.record
-    remark = Remark(
-        Outcome.CUT,
-        (run.id,),
-        f"release found at {record.time_s[first]:.3f} s; the samples before it are left out",
-        "cut the record by hand if that is wrong",
-    )
-    return replace(run, record=Record(record.time_s[first:], record.yaw_rad[first:])), remark
+def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """Replace rounded time stamps by the uniform clock behind them, and note uneven ones and missing samples."""
+    found = [(run, None if run.record.uniform else find_clock(run.record.time_s)) for run in campaign.runs]
+    rounded = [
+        (run, clock)
+        for run, clock in found
+        if clock is not None and clock.away > CLOCK_TOLERANCE * clock.interval
+    ]
+    uneven = [run for run, clock in found if clock is None and not run.record.uniform]
+    gappy = [(run, clock) for run, clock in found if clock is not None and clock.missing]
+    remarks = []
+    if rounded:
+        interval = _range([1e3 * clock.interval for _, clock in rounded])
+        away = max(clock.away / clock.interval for _, clock in rounded)
+        what = (
+            f"the time stamps are rounded, by up to {100.0 * away:.0f} % of a step; a uniform clock of "
+            f"{interval} ms is used"
+        )
+        ids = tuple(run.id for run, _ in rounded)
+        remarks.append(Remark(Outcome.NOTED, ids, what, "write time_s with more digits"))
+    if uneven:
+        steps = [1e3 * np.diff(run.record.time_s) for run in uneven]
+        between = _range([float(end) for step in steps for end in (step.min(), step.max())])
+        what = f"the samples are not evenly spaced (steps of {between} ms); they are used at the times given"
+        remedy = "check that time_s is when the samples were taken"
+        remarks.append(Remark(Outcome.NOTED, tuple(run.id for run in uneven), what, remedy))
+    if gappy:
+        count = sum(clock.missing for _, clock in gappy)
+        longest = max(float(clock.interval * (np.diff(clock.place).max() - 1)) for _, clock in gappy)
+        what = f"{count} samples are missing, up to {longest:.4g} s at a time; the others are used at their times"
+        remarks.append(Remark(Outcome.NOTED, tuple(run.id for run, _ in gappy), what, "check the logger"))
+    if not rounded:
+        return campaign, tuple(remarks)
+    even = {run.id: replace(run, record=Record(clock.time, run.record.yaw_rad)) for run, clock in rounded}
+    return replace(campaign, runs=tuple(even.get(run.id, run) for run in campaign.runs)), tuple(remarks)
+
+
+def find_clock(time_s: Array) -> Clock | None:
+    """The uniform clock that explains time stamps; samples may be missing. None if there is none.
+
+    Its ticks, rounded to the last decimal of the stamps or to the ticks of a logger's timer, are the stamps. They
+    may be off by a whole step: rounded or cut off, by a logger that is itself a little late.
+
+    Args:
+        time_s: stamps, increasing, shape (n,), s.
+    """
+    steps = np.diff(time_s)
+    usual = steps[steps < _NO_GAP * np.median(steps)]
+    allowed = 0.0  # step of the coarsest decimal lattice on which all stamps lie
+    for decimals in range(_FINEST + 1):
+        scaled = time_s * 10.0**decimals
+        if np.abs(scaled - np.round(scaled)).max() < _ON_LATTICE:
+            allowed = float(10.0**-decimals)
+            break
+    changes = np.diff(np.sort(steps))
+    changes = changes[changes > max(_TIMER_DECIMALS * allowed, CLOCK_TOLERANCE * float(steps.max()))]
+    if changes.size:  # step of a timer that all steps between stamps may be multiples of
+        whole = np.round(steps / changes.min())
+        step = float(steps @ whole / (whole @ whole))
+        if np.abs(steps - step * whole).max() < allowed + _ON_LATTICE * step:
+            allowed = max(allowed, step)
+    for interval in (float(np.mean(steps)), float(np.mean(usual))):
+        found = _counted(time_s, interval)
+        if found is not None and found.away <= max(allowed, CLOCK_TOLERANCE * found.interval):
+            return found
+    return None
+
+
+def _counted(time_s: Array, interval: float) -> Clock | None:
+    """The clock of about an interval, s, that fits the stamps best; None if gaps are most of them."""
+    for _ in range(_SWEEPS):
+        ticks = np.maximum(np.round(np.diff(time_s) / interval), 1.0)
+        place = np.concatenate([[0.0], np.cumsum(ticks)])
+        if place[-1] > _MOST_MISSING * time_s.size:
+            return None
+        slope, start = np.polyfit(place - place.mean(), time_s, 1)
+        settled = abs(slope / interval - 1.0) * place[-1] < CLOCK_TOLERANCE
+        interval = float(slope)
+        if settled:
+            break
+    clock = start + interval * (place - place.mean())
+    return Clock(interval, place.astype(np.int64), clock, float(np.abs(time_s - clock).max()))
+
+
+def _range(values: list[float]) -> str:
+    low, high = f"{min(values):.6g}", f"{max(values):.6g}"
+    return low if low == high else f"{low} to {high}"

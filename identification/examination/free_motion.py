@@ -1,31 +1,23 @@
 """Where the free motion of a record begins and ends, and about which zero it swings.
 
-It begins after a hand, a latch or a sensor at rest. Free motion crosses its centre every half cycle, whatever
-its initial phase. In a longer interval between two crossings (or between the start of the record and the first
-one) the body was held, moved by hand, or at rest. The release is then the turning point of the motion that
-follows, extrapolated backwards. A hold in mid-record that is shorter than about three quarters of a cycle leaves
-no such interval and is not detected. At the start of a record a hand that pulls the body aside is also known by
-its slowness: a free swing takes no longer out than back.
-
-The runs have a common zero, or one each where the sensor is set to zero before every run. At the end of a record
-the body may rest beside its centre, held by dry friction. A model without friction takes the place of rest for
-the sensor's zero if the rest is longer than the motion.
+It begins after a hand, a latch or a sensor at rest. Free motion crosses its centre every half cycle: in a longer
+interval between two crossings the body was held, moved by hand, or at rest. A hold in mid-record that is shorter
+than about three quarters of a cycle leaves no such interval and is not detected. At the start of a record a hand
+that pulls the body aside is also known by its slowness: a free swing takes no longer out than back.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
 
 from identification.policy import CLEAR_SWING, EQUAL_SWINGS, LEAST_SAMPLES, MISFIT_DEVIATIONS, MISFIT_RATE
-from identification.signal.decay_fit import Reading, RunFit, fit_run
-from identification.signal.frequency import starting_decay, starting_frequency
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.frequency import follow_peaks, starting_decay, starting_frequency
 from identification.signal.noise import reading_noise, white_noise
-from identification.signal.peaks import follow_peaks
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
@@ -41,19 +33,14 @@ _WIDEST_BAND = 0.3
 _LONGER = 2.0
 _SLOWER = 1.25  # a pull takes this many times as long as the swing back, and a free swing out no longer
 _GROWTH = 0.02  # e-folds of growth over the fitted half cycles: a motion that builds up has no release
-_CARRIED_BACK = (
-    0.75  # of a half cycle: the release lies a quarter cycle back, the previous turning point three quarters
-)
+# Of a half cycle: the release lies a quarter cycle back, the previous turning point three quarters.
+_CARRIED_BACK = 0.75
 _FITTED_HALVES = 4.0  # half cycles after the release that are fitted and extrapolated backwards
 _REGULAR = 2  # half cycles of about the usual length before a release; more are an earlier free motion
 
 
 def find_release(record: Record, sensor: SensorProperties) -> int:
-    """The sample at which the body is released.
-
-    Returns:
-        Index of the first sample of the free motion; 0 if the record starts in it, or if no oscillation is found.
-    """
+    """The sample at which the body is released; 0 if the record starts in free motion, or nothing oscillates."""
     if not record.uniform:
         even = evenly_spaced(record)
         return int(np.searchsorted(record.time_s, even.time_s[find_release(even, sensor)]))
@@ -68,15 +55,18 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     if frequency is None:
         return 0
     crossings, largest, out = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
-    held = _last_long_stretch(crossings, largest)
-    if (
-        held is None
-        and largest == 1
-        and crossings.size > 2
-        and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5
-    ):
-        held = 0
-    return 0 if held is None else _standstill(record, crossings, held)
+    # The last interval before the largest excursion that is too long for free motion.
+    lengths = np.diff(crossings)
+    for place in range(min(largest, lengths.size - 1) - 1, -1, -1):
+        usual = float(lengths[place + 1 : place + 3].max())
+        if lengths[place] > _LONGER * usual:
+            before = lengths[:place]
+            regular = int(np.sum((before > usual / _LONGER) & (before < usual * _LONGER)))
+            if regular <= _REGULAR:
+                return _standstill(record, crossings, place)
+            break
+    pulled = largest == 1 and crossings.size > 2 and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5
+    return _standstill(record, crossings, 0) if pulled else 0
 
 
 def _crossings(
@@ -103,18 +93,6 @@ def _crossings(
     return crossings, int(np.searchsorted(crossings, turn)), (steps, turn)
 
 
-def _last_long_stretch(crossings: Array, largest: int) -> int | None:
-    """The last interval before the largest excursion that is too long for free motion; None if there is none."""
-    lengths = np.diff(crossings)
-    for place in range(min(largest, lengths.size - 1) - 1, -1, -1):
-        usual = float(lengths[place + 1 : place + 3].max())
-        if lengths[place] > _LONGER * usual:
-            before = lengths[:place]
-            regular = int(np.sum((before > usual / _LONGER) & (before < usual * _LONGER)))
-            return place if regular <= _REGULAR else None
-    return None
-
-
 def _standstill(record: Record, crossings: Array, held: int) -> int:
     """The turning point of the motion after a hold, extrapolated backwards, in samples."""
     usual = float(np.diff(crossings)[held + 1 : held + 3].max())
@@ -131,19 +109,15 @@ def _standstill(record: Record, crossings: Array, held: int) -> int:
         return int(end)
     if fit.runs[0].decay.rate * part.duration < -_GROWTH:
         return 0
-    back = _turning_points(fit.runs[0], record.sample_rate)
+    # β = e^{-at}(C cos ωt + S sin ωt) has its turning points where (Sω - aC) cos ωt = (Cω + aS) sin ωt: those from
+    # two cycles before the first sample of the fit to one after, in samples.
+    run, decay = fit.runs[0], fit.runs[0].decay
+    cosine, sine = run.angle, (run.rate + decay.rate * run.angle) / decay.omega_d
+    phase = np.arctan2(sine * decay.omega_d - decay.rate * cosine, cosine * decay.omega_d + decay.rate * sine)
+    back = (phase + np.pi * np.arange(-4, 3)) / decay.omega_d * record.sample_rate
     earliest = end - _CARRIED_BACK * usual
     after = back[back + first > earliest - 0.5]
     return int(min(max(round(float(after[0]) + first), 0), first)) if after.size else int(end)
-
-
-def _turning_points(run: RunFit, sample_rate: float) -> Array:
-    """Turning points of a fitted decay from two cycles before its first sample to one after, in samples."""
-    decay = run.decay
-    # β = e^{-at}(C cos ωt + S sin ωt) has its turning points where (Sω - aC) cos ωt = (Cω + aS) sin ωt.
-    cosine, sine = run.angle, (run.rate + decay.rate * run.angle) / decay.omega_d
-    phase = np.arctan2(sine * decay.omega_d - decay.rate * cosine, cosine * decay.omega_d + decay.rate * sine)
-    return np.asarray((phase + np.pi * np.arange(-4, 3)) / decay.omega_d * sample_rate)
 
 
 _LEAST_CENTRES = 3
@@ -168,20 +142,29 @@ class Centre:
 def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Give every run its own zero where the records show that they have one, unless the campaign states it.
 
-    Args:
-        campaign: the runs, from their releases on.
-
-    Returns:
-        The campaign, itself if the runs may have a common zero, and one remark if they have not. Only runs of
-        equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the amplitude,
-        and in a stream at an angle on the wind.
+    Only runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
+    amplitude, and in a stream at an angle on the wind.
     """
     if campaign.sensor.zero not in (None, "auto"):
         return campaign, ()
-    found = [centre_of(run, campaign.sensor.resolution or 0.0) for run in campaign.runs]
-    groups = list(_alike([centre for centre in found if centre is not None]))
+    by_condition: dict[tuple[float | None, ...], list[Centre]] = defaultdict(list)
+    for run in campaign.runs:
+        centre = centre_of(run, campaign.sensor.resolution or 0.0)
+        if centre is not None:
+            by_condition[run.spring_stiffness, run.wind_speed, run.air_density].append(centre)
+    groups, scatter = [], 0.0  # of two runs or more; weighted sum of squared distances from their means
+    for one in by_condition.values():
+        left = sorted(one, key=lambda centre: -centre.swing)
+        while left:
+            alike = [centre for centre in left if centre.swing >= EQUAL_SWINGS * left[0].swing]
+            left = left[len(alike) :]
+            if len(alike) > 1:
+                zero = np.array([centre.zero for centre in alike])
+                weight = 1.0 / np.maximum([centre.std for centre in alike], 1e-300) ** 2
+                scatter += float(weight @ (zero - weight @ zero / weight.sum()) ** 2)
+                groups.append(alike)
     freedom = sum(len(group) - 1 for group in groups)
-    if freedom == 0 or sum(map(_scatter, groups)) <= float(chdtri(freedom, MISFIT_RATE)):
+    if freedom == 0 or scatter <= float(chdtri(freedom, MISFIT_RATE)):
         return campaign, ()
     largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
     compared = {centre.run.id for group in groups for centre in group}
@@ -196,17 +179,13 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
 
 
 def centre_of(run: Run, resolution: float) -> Centre | None:
-    """The centre that a run oscillates about, from its peaks.
+    """The centre that a run oscillates about, from its peaks; None where there are too few clear ones.
 
     Peaks on both sides are equally far from the centre under any symmetric spring and any damping, dry friction
     included, which may hold the body at another place in the end.
 
     Args:
-        run: from its release on.
         resolution: step of the reading, in its unit; 0 where it is not stated.
-
-    Returns:
-        The centre; None where there are too few clear peaks.
     """
     frequency = starting_frequency(run.record)
     if frequency is None:
@@ -227,28 +206,6 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
     return Centre(run, float(clear.mean()), std, float(swings.max()))
 
 
-def _alike(centres: Sequence[Centre]) -> Iterable[list[Centre]]:
-    """Groups of two runs or more with equal spring, wind and swing."""
-    by_condition: dict[tuple[float | None, ...], list[Centre]] = defaultdict(list)
-    for centre in centres:
-        run = centre.run
-        by_condition[run.spring_stiffness, run.wind_speed, run.air_density].append(centre)
-    for group in by_condition.values():
-        left = sorted(group, key=lambda centre: -centre.swing)
-        while left:
-            alike = [centre for centre in left if centre.swing >= EQUAL_SWINGS * left[0].swing]
-            left = left[len(alike) :]
-            if len(alike) > 1:
-                yield alike
-
-
-def _scatter(group: Sequence[Centre]) -> float:
-    """Weighted sum of squared distances from the group's mean."""
-    zero = np.array([centre.zero for centre in group])
-    weight = 1.0 / np.maximum([centre.std for centre in group], 1e-300) ** 2
-    return float(weight @ (zero - weight @ zero / weight.sum()) ** 2)
-
-
 _SQUARABLE = 1e100  # of the reading's unit: squares of larger readings overflow
 _RESTING = 0.01  # of the largest excursion: the body rests while the reading stays as near its last place
 _KEPT = 3.0  # cycles of rest: they show that the motion ended, and where
@@ -256,47 +213,45 @@ _SETTLED = 0.25  # of the distance from the centre: a reading that moves more at
 
 
 def without_rest(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Shorten records that end with a long rest beside the centre.
+    """Shorten records that end with a long rest beside the centre, with a remark for each.
 
-    Args:
-        campaign: the runs, from their releases on.
-
-    Returns:
-        The campaign, itself if no record is shortened, and a remark for each run that was. A rest is left where it
-        is unless it is longer than the motion and off the centre beyond chance.
+    A model without friction takes the place of rest, where dry friction holds the body, for the sensor's zero if
+    the rest is longer than the motion. A rest is left where it is unless that is so and it is off the centre
+    beyond chance.
     """
-    found = [_without_rest(run, campaign.sensor) for run in campaign.runs]
-    remarks = tuple(remark for _, remark in found if remark is not None)
-    return (replace(campaign, runs=tuple(run for run, _ in found)) if remarks else campaign), remarks
-
-
-def _without_rest(run: Run, sensor: SensorProperties) -> tuple[Run, Remark | None]:
-    record, resolution = run.record, sensor.resolution or 0.0
-    time, yaw = record.time_s, record.yaw_rad
-    if not float(np.abs(yaw).max()) < _SQUARABLE:
-        return run, None  # refused later, for what it is
-    last = float(np.median(yaw[-max(yaw.size // 20, 1) :]))
-    near = max(_RESTING * float(np.abs(yaw - last).max()), resolution, 5.0 * reading_noise(record, sensor))
-    moving = np.flatnonzero(np.abs(yaw - last) > near)
-    if moving.size < LEAST_SAMPLES or 2 * int(moving[-1]) >= yaw.size:
-        return run, None
-    end = int(moving[-1]) + 1
-    centre = centre_of(replace(run, record=Record(time[:end], yaw[:end])), resolution)
-    frequency = starting_frequency(Record(time[:end], yaw[:end]))
-    if centre is None or frequency is None:
-        return run, None
-    early, late = (float(half.mean()) for half in np.array_split(yaw[end:], 2))
-    off = abs(0.5 * (early + late) - centre.zero)
-    if off < MISFIT_DEVIATIONS * centre.std or abs(late - early) > _SETTLED * off:
-        return run, None
-    kept = int(np.searchsorted(time, time[end] + _KEPT / frequency))
-    if kept >= yaw.size:
-        return run, None
-    remark = Remark(
-        Outcome.CUT,
-        (run.id,),
-        f"at rest from {time[end]:.3f} s on, {off:.2g} {sensor.unit} beside the centre of the motion; the record "
-        f"is used up to {time[kept]:.3f} s",
-        "cut the record by hand if that is wrong",
-    )
-    return replace(run, record=Record(time[:kept], yaw[:kept])), remark
+    shorter: dict[str, Run] = {}
+    remarks = []
+    for run in campaign.runs:
+        record, resolution = run.record, campaign.sensor.resolution or 0.0
+        time, yaw = record.time_s, record.yaw_rad
+        if not float(np.abs(yaw).max()) < _SQUARABLE:
+            continue  # refused later, for what it is
+        last = float(np.median(yaw[-max(yaw.size // 20, 1) :]))
+        near = max(
+            _RESTING * float(np.abs(yaw - last).max()),
+            resolution,
+            5.0 * reading_noise(record, campaign.sensor),
+        )
+        moving = np.flatnonzero(np.abs(yaw - last) > near)
+        if moving.size < LEAST_SAMPLES or 2 * int(moving[-1]) >= yaw.size:
+            continue
+        end = int(moving[-1]) + 1
+        centre = centre_of(replace(run, record=Record(time[:end], yaw[:end])), resolution)
+        frequency = starting_frequency(Record(time[:end], yaw[:end]))
+        if centre is None or frequency is None:
+            continue
+        early, late = (float(half.mean()) for half in np.array_split(yaw[end:], 2))
+        off = abs(0.5 * (early + late) - centre.zero)
+        if off < MISFIT_DEVIATIONS * centre.std or abs(late - early) > _SETTLED * off:
+            continue
+        kept = int(np.searchsorted(time, time[end] + _KEPT / frequency))
+        if kept >= yaw.size:
+            continue
+        what = (
+            f"at rest from {time[end]:.3f} s on, {off:.2g} {campaign.sensor.unit} beside the centre of the motion; "
+            f"the record is used up to {time[kept]:.3f} s"
+        )
+        remarks.append(Remark(Outcome.CUT, (run.id,), what, "cut the record by hand if that is wrong"))
+        shorter[run.id] = replace(run, record=Record(time[:kept], yaw[:kept]))
+    runs = tuple(shorter.get(run.id, run) for run in campaign.runs)
+    return (replace(campaign, runs=runs) if remarks else campaign), tuple(remarks)

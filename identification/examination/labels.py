@@ -10,7 +10,7 @@ The stated springs agree where, with the wind off, Kr/ωn² is the same inertia 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,32 +73,13 @@ class _Misfit:
     freedom: int
 
     @property
-    def contradicts(self) -> bool:
-        """Whether the residuals are beyond chance."""
-        return self.freedom > 0 and self.squares > float(chdtri(self.freedom, REFUSAL_RATE))
-
-    @property
     def agrees(self) -> bool:
         """Whether the residuals are within chance."""
         return self.squares <= float(chdtri(self.freedom, MISFIT_RATE))
 
-    def mends(self, before: _Misfit, trials: int) -> bool:
-        """Whether the statements now agree, or agree better than before by more than chance."""
-        if self.agrees:
-            return True
-        ratio = before.squares / max(self.squares, 1e-300)
-        return ratio > float(fdtri(self.freedom, self.freedom, 1.0 - REFUSAL_RATE / max(trials, 1)))
-
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
-    """Refuse springs or wind speeds that are assigned to the wrong runs.
-
-    Args:
-        swings: of the runs; those without a stated spring are ignored.
-
-    Returns:
-        One remark that refuses the campaign and names the runs; none if the statements may be right.
-    """
+    """Refuse stated springs or wind speeds that are assigned to the wrong runs; none if they may be right."""
     known = [swing for swing in swings if swing.run.spring_stiffness is not None]
     if len(known) < _LEAST_RUNS:
         return ()
@@ -107,22 +88,34 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         ("spring_stiffness", _of_springs, _springs_exchanged),
         ("wind_speed", _of_winds, _winds_exchanged),
     ):
-        found = _best_exchanges(labels, misfit, exchange)
-        if found:
-            return (_remark(what, [tuple(known[i].run.id for i in places) for places in found]),)
+        stated, away = misfit(labels)
+        if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, REFUSAL_RATE))):
+            continue
+        trials = [(places, misfit(other)[0]) for places, other in exchange(labels, away)]
+        mended = []  # that agree, or agree better than what is stated by more than chance
+        for places, found in trials:
+            ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
+            if found.agrees or ratio > float(fdtri(freedom, freedom, 1.0 - REFUSAL_RATE / len(trials))):
+                mended.append((places, found))
+        if not mended:
+            continue
+        # Exchanges that fit as well as the best one cannot be distinguished.
+        limit = min(found.squares for _, found in mended) + float(chdtri(1, MISFIT_RATE))
+        names = [[known[i].run.id for i in places] for places, found in mended if found.squares <= limit]
+        ids = tuple(dict.fromkeys(itertools.chain.from_iterable(names)))
+        pairs = ", or ".join(" and ".join(pair) for pair in names)
+        said = f"the stated {what} contradicts the frequencies, but agrees if {pairs} are exchanged"
+        return (Remark(Outcome.REFUSED, ids, said, f"correct {what} or the file names of these runs"),)
     return ()
 
 
 def other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
-    """What the springs of the runs may be worth, where their statements contradict the frequencies.
-
-    Args:
-        swings: of the runs; those without a stated spring are ignored.
+    """What the stated springs of the runs may be worth, where their statements contradict the frequencies.
 
     Returns:
-        Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn, with
-        a stiffness common to all runs, as a tilted axis has, and with the wind speeds of two settings exchanged
-        where the statements then agree.
+        Izz in kg m² and Ka over ½ρV² in m³/rad (None where it is not determined): without each spring in turn,
+        with a stiffness common to all runs, as a tilted axis has, and with the wind speeds of two settings
+        exchanged where the statements then agree.
     """
     labels = Labels.of([swing for swing in swings if swing.run.spring_stiffness is not None])
     found = [_fitted(labels, labels.spring != spring) for spring in np.unique(labels.spring)]
@@ -149,35 +142,6 @@ def _fitted(
         return None
     solution = np.linalg.lstsq(scaled / lengths, np.ones_like(spring), rcond=None)[0] / lengths
     return float(solution[0]), float(solution[1]) if windy else None
-
-
-def _remark(what: str, places: Sequence[tuple[str, ...]]) -> Remark:
-    ids = tuple(dict.fromkeys(itertools.chain.from_iterable(places)))
-    pairs = ", or ".join(" and ".join(pair) for pair in places)
-    return Remark(
-        Outcome.REFUSED,
-        ids,
-        f"the stated {what} contradicts the frequencies, but agrees if {pairs} are exchanged",
-        f"correct {what} or the file names of these runs",
-    )
-
-
-def _best_exchanges(
-    labels: Labels,
-    misfit: Callable[[Labels], tuple[_Misfit, Array]],
-    exchange: Callable[[Labels, Array], Iterator[tuple[tuple[int, ...], Labels]]],
-) -> list[tuple[int, ...]]:
-    stated, away = misfit(labels)
-    if not stated.contradicts:
-        return []
-    trials = [(places, misfit(other)[0]) for places, other in exchange(labels, away)]
-    mended = [(places, found) for places, found in trials if found.mends(stated, len(trials))]
-    if not mended:
-        return []
-    least = min(found.squares for _, found in mended)
-    # Exchanges that fit as well as the best one cannot be distinguished.
-    limit = least + float(chdtri(1, MISFIT_RATE))
-    return [places for places, found in mended if found.squares <= limit]
 
 
 def _of_springs(labels: Labels) -> tuple[_Misfit, Array]:
@@ -274,8 +238,6 @@ _SLIPS = {
     1e-7: "yaw_inertia in g cm2",
 }
 
-_REMEDY = "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
-
 
 @dataclass(frozen=True, eq=False)
 class _Springs:
@@ -321,14 +283,9 @@ class _Springs:
 
 
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
-    """Note springs whose stated stiffness does not fit the wind-off frequencies.
+    """Note springs whose stated stiffness does not fit the wind-off frequencies within their tolerance.
 
-    Args:
-        swings: of the runs; only those with the wind off and a stated spring count.
-
-    Returns:
-        One remark: on the spring that is wrong if three or more show which one it is, else on all of them. None
-        if the springs agree within their tolerance.
+    One remark: on the spring that is wrong if three or more show which one it is, else on all of them.
     """
     still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     if len({s.run.spring_stiffness for s in still}) < 2:
@@ -336,23 +293,42 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     springs = _Springs.of(still)
     if not springs.disagree():
         return ()
-    place = _the_one(springs) if springs.stiffness.size >= _LEAST else None
-    remark = _several(springs) if place is None else _one(springs, place)
     fits = other_fits(swings)
     figures = {"inertias_kg_m2": [one for one, _ in fits], "air_stiffnesses_m3": [air for _, air in fits]}
-    return (replace(remark, figures=figures),)
+    # The spring that differs beyond chance while the others agree.
+    count, scores = springs.stiffness.size, []
+    for place in range(count if count >= _LEAST else 0):
+        rest = springs.without(place)
+        mean, std = rest.mean()
+        score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
+        scores.append(-1.0 if rest.disagree() else score)
+    if scores and max(scores) > float(-ndtri(0.5 * MISFIT_RATE / count)):
+        place = int(np.argmax(scores))
+        percent = 100.0 * np.expm1(springs.without(place).mean()[0] - springs.inertia[place])
+        how = f"{abs(percent):.0f} % {'stiffer' if percent > 0.0 else 'softer'}"
+        what = (
+            f"their spring appears {how} than the stated {springs.stiffness[place]:g} N m/rad, judged by the "
+            f"frequencies of the other springs"
+        )
+        remedy = (
+            "calibrate that spring again; a tilted axis or a flexible rod looks similar, run the diagnosis"
+        )
+        return (Remark(Outcome.NOTED, springs.runs[place], what, remedy, figures),)
+    spread = 100.0 * np.expm1(float(np.ptp(springs.inertia)))
+    ids = tuple(name for group in springs.runs for name in group)
+    what = (
+        f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs; which one is wrong "
+        f"cannot be determined"
+    )
+    remedy = "calibrate the springs again; a tilted axis or a flexible rod looks similar, run the diagnosis"
+    return (Remark(Outcome.NOTED, ids, what, remedy, figures),)
 
 
 def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tuple[Remark, ...]:
-    """Note a stated inertia that the springs contradict by more than a nominal inertia is off.
+    """Note a stated inertia that the springs, with the wind off, contradict by more than a nominal one is off.
 
-    Args:
-        swings: of the runs; only those with the wind off and a stated spring count.
-        campaign: states the inertia.
-
-    Returns:
-        One remark, which names the slip of units that it looks like; none where the campaign states no inertia, or
-        ``plausible = false``.
+    The remark names the slip of units that it looks like; there is none where the campaign states ``plausible =
+    false``.
     """
     still = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness is not None]
     stated = campaign.rig.yaw_inertia
@@ -364,49 +340,10 @@ def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tupl
         return ()
     nearest = min(_SLIPS, key=off.__getitem__)
     slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(INERTIA_FACTOR) else ""
-    return (
-        Remark(
-            Outcome.NOTED,
-            tuple(s.run.id for s in still),
-            f"with the wind off Kr/omega_n^2 is {found:.4g} kg m2, {found / stated:.4g} times the stated "
-            f"yaw_inertia of {stated:.4g} kg m2{slip}",
-            "correct the stiffness, the inertia or the times, or state plausible = false under [sensor]",
-            {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]},
-        ),
+    what = (
+        f"with the wind off Kr/omega_n^2 is {found:.4g} kg m2, {found / stated:.4g} times the stated "
+        f"yaw_inertia of {stated:.4g} kg m2{slip}"
     )
-
-
-def _the_one(springs: _Springs) -> int | None:
-    """The spring that differs beyond chance while the others agree; None if there is no single one."""
-    scores = []
-    for place in range(springs.stiffness.size):
-        rest = springs.without(place)
-        mean, std = rest.mean()
-        score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
-        scores.append(-1.0 if rest.disagree() else score)
-    best = int(np.argmax(scores))
-    beyond = float(-ndtri(0.5 * MISFIT_RATE / springs.stiffness.size))
-    return best if scores[best] > beyond else None
-
-
-def _one(springs: _Springs, place: int) -> Remark:
-    percent = 100.0 * np.expm1(springs.without(place).mean()[0] - springs.inertia[place])
-    said = f"{abs(percent):.0f} % {'stiffer' if percent > 0.0 else 'softer'}"
-    return Remark(
-        Outcome.NOTED,
-        springs.runs[place],
-        f"their spring appears {said} than the stated {springs.stiffness[place]:g} N m/rad, judged by the "
-        f"frequencies of the other springs",
-        _REMEDY,
-    )
-
-
-def _several(springs: _Springs) -> Remark:
-    spread = 100.0 * np.expm1(float(np.ptp(springs.inertia)))
-    return Remark(
-        Outcome.NOTED,
-        tuple(name for group in springs.runs for name in group),
-        f"with the wind off Kr/omega_n^2 differs by {spread:.0f} % between the stated springs; which one is wrong "
-        f"cannot be determined",
-        "calibrate the springs again; a tilted axis or a flexible rod looks similar, run the diagnosis",
-    )
+    remedy = "correct the stiffness, the inertia or the times, or state plausible = false under [sensor]"
+    figures = {"inertias_kg_m2": [stated], "air_stiffnesses_m3": [None]}
+    return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy, figures),)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from identification.policy import (
@@ -26,9 +25,8 @@ from identification.policy import (
 )
 from identification.printing import significant
 from identification.signal.decay_fit import Reading, project_run
-from identification.signal.free_decay import Decay, envelope_amplitude
-from identification.signal.frequency import starting_frequency, thinned_reading
-from identification.signal.pencil import PencilDecay, pencil_decay
+from identification.signal.free_decay import envelope_amplitude
+from identification.signal.frequency import PencilDecay, pencil_decay, starting_frequency, thinned_reading
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
@@ -60,16 +58,10 @@ class Swing:
 
 
 def swing_of(run: Run) -> Swing | None:
-    """Measure a run's oscillation by its poles, which need no starting values and no iteration.
+    """Measure a run's oscillation by its poles, which need no starting values; None if there is none.
 
     The residual is taken to be correlated over half a cycle, so a decay that does not explain the record has
-    larger standard deviations.
-
-    Args:
-        run: the run; its spring and wind are not used.
-
-    Returns:
-        The oscillation; None if there is none.
+    larger standard deviations. Spring and wind of the run are not used.
     """
     frequency = starting_frequency(run.record)
     if frequency is None:
@@ -84,10 +76,23 @@ def swing_of(run: Run) -> Swing | None:
     half_cycle = np.pi / found.decay.omega_d * residual.size / float(reading.time[-1])
     variance = float(residual @ residual) / max(residual.size - _UNKNOWNS, 1) * max(half_cycle, 1.0)
     rate_std, stiffness_std = np.sqrt(variance) * np.linalg.norm(found.weights, axis=1)
+    # Change of k between the run's first part and the rest.
+    half, change = 0.5 * float(reading.time[-1]), 0.0
+    split = half if found.decay.rate <= 0.0 else min(half, _E_FOLDING / found.decay.rate)
+    at = int(np.searchsorted(reading.time, max(split, 2.0 * np.pi / found.decay.omega_d)))
+    if min(at, reading.time.size - at) >= _LEAST_SAMPLES:
+        first, rest = (
+            _poles(
+                Reading(reading.time[part] - reading.time[part][0], reading.yaw[part]), found.decay.omega_d
+            )
+            for part in (slice(None, at), slice(at, None))
+        )
+        if first is not None and rest is not None:
+            change = abs(first.decay.stiffness - rest.decay.stiffness)
     return Swing(
         run,
         stiffness=found.decay.stiffness,
-        stiffness_std=float(np.hypot(stiffness_std, _change_along(reading, found.decay))),
+        stiffness_std=float(np.hypot(stiffness_std, change)),
         rate=found.decay.rate,
         rate_std=float(rate_std),
         motion=reading.yaw - zero,
@@ -100,45 +105,21 @@ def _poles(reading: Reading, omega: float) -> PencilDecay | None:
     return found if found is not None and found.decay.omega_d > 0.0 else None
 
 
-def _change_along(reading: Reading, decay: Decay) -> float:
-    """Change of k between the run's first part and the rest, 1/s²; 0 if the record is too short."""
-    length = float(reading.time[-1])
-    split = 0.5 * length if decay.rate <= 0.0 else min(0.5 * length, _E_FOLDING / decay.rate)
-    at = int(np.searchsorted(reading.time, max(split, 2.0 * np.pi / decay.omega_d)))
-    if min(at, reading.time.size - at) < _LEAST_SAMPLES:
-        return 0.0
-    first, rest = (
-        _poles(Reading(reading.time[part] - reading.time[part][0], reading.yaw[part]), decay.omega_d)
-        for part in (slice(None, at), slice(at, None))
-    )
-    return 0.0 if first is None or rest is None else abs(first.decay.stiffness - rest.decay.stiffness)
-
-
 def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
-    """Refuse wind-off runs whose oscillation grows.
+    """Refuse wind-off runs that grow: their decay rate is negative beyond chance, and their swings become larger.
 
-    Returns:
-        One remark for all such runs, if any. A run grows if its decay rate is negative beyond chance and its swings
-        become larger with time; a blow in mid-record does not look like that.
+    A blow in mid-record does not look like that.
     """
-    ids = tuple(s.run.id for s in swings if not s.run.wind_on and _gains_energy(s))
-    if not ids:
-        return ()
-    return (
-        Remark(
-            Outcome.REFUSED,
-            ids,
-            "the motion grows with the wind off, which is impossible on a passive rig",
-            "check whether time runs backwards in the file, state the wind speed, or remove the run",
-        ),
-    )
-
-
-def _gains_energy(swing: Swing) -> bool:
-    if swing.rate + REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
-        return False
-    quarters = [float(part @ part) / max(part.size, 1) for part in np.array_split(swing.motion, 4)]
-    return quarters[3] > quarters[2] > max(quarters[0], quarters[1])
+    ids = []
+    for swing in swings:
+        if swing.run.wind_on or swing.rate + REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
+            continue
+        quarters = [float(part @ part) / max(part.size, 1) for part in np.array_split(swing.motion, 4)]
+        if quarters[3] > quarters[2] > max(quarters[0], quarters[1]):
+            ids.append(swing.run.id)
+    what = "the motion grows with the wind off, which is impossible on a passive rig"
+    remedy = "check whether time runs backwards in the file, state the wind speed, or remove the run"
+    return (Remark(Outcome.REFUSED, tuple(ids), what, remedy),) if ids else ()
 
 
 _CYCLES = 3.0  # of the strongest oscillation, in a window
@@ -171,14 +152,10 @@ class AmplitudeWindows:
 
 
 def self_excited_runs(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Find wind-on runs whose motion grows, or neither grows nor decays.
+    """Find wind-on runs whose motion grows, or neither grows nor decays, with a remark and figures for each.
 
-    Args:
-        campaign: the runs, each from its release on.
-
-    Returns:
-        The campaign and a remark for each such run, with its figures. A run that settles in a limit cycle is cut to
-        the part where its growth is linear. A run without such a part is left out.
+    A run that settles in a limit cycle is cut to the part where its growth is linear, or left out where there is
+    none.
     """
     kept, remarks = [], []
     for run in campaign.runs:
@@ -198,10 +175,31 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     cycles = length * float(np.median(windows.frequency))
     changes = (abs(slope) + MISFIT_DEVIATIONS * std) * length
     if cycles >= LEAST_STEADY_CYCLES and max(changes, np.log(windows.amplitude).std()) < STEADY_CHANGE:
-        return None, _steady_remark(run, windows)
-    if not _grows(windows.amplitude):
+        amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
+        what = (
+            f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
+            f"{significant(frequency, 3)} Hz for {length * frequency:.0f} cycles (its amplitude changes by "
+            f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
+            "which has no damping ratio"
+        )
+        remedy = "record its growth from rest, or a decay at a lower wind speed"
+        figures = {"kind": "steady", "settled_rad": amplitude, **windows.figures()}
+        return None, Remark(Outcome.LEFT_OUT, (run.id,), what, remedy, figures)
+    # Whether the last quarter's power exceeds the first one's beyond what the envelope of a buffeted rig does. A
+    # window's power is then exponentially distributed: χ² of two degrees of freedom.
+    quarter = windows.amplitude.size // 4
+    first, last = (
+        float(np.mean(part**2)) for part in (windows.amplitude[:quarter], windows.amplitude[-quarter:])
+    )
+    if not fdtrc(2 * quarter, 2 * quarter, last / first) < REFUSAL_RATE:
         return run, None
-    settled = _settled_from(windows)
+    # First window of the limit cycle; None where the amplitude still grows at the end.
+    below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
+    start, settled = int(below[-1]) + 1 if below.size else 0, None
+    if windows.time.size - start >= LEAST_GROWTH_WINDOWS:
+        slope, std = _slope(windows.time[start:], windows.amplitude[start:])
+        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:start].max(initial=0.0)):
+            settled = start
     limit = np.inf if settled is None else LINEAR_SHARE * _last(windows.amplitude)
     # From the smallest amplitude to the last window below the limit, rad.
     above = np.flatnonzero(windows.amplitude > limit)
@@ -211,15 +209,16 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     remark = _growth_remark(run, windows, part if enough else None, settled)
     if settled is None:
         return run, remark
-    return (_cut(run, windows, part) if enough else None), remark
+    if not enough:
+        return None, remark
+    half = 0.5 * float(windows.time[1] - windows.time[0])
+    time = run.record.time_s - run.record.time_s[0]
+    inside = (time >= windows.time[part][0] - half) & (time <= windows.time[part][-1] + half)
+    return replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside])), remark
 
 
 def windows_of(record: Record) -> AmplitudeWindows | None:
-    """Amplitude and frequency in windows of about three cycles.
-
-    Returns:
-        The windows; None where there are fewer than twice the least number of a growth.
-    """
+    """Amplitude and frequency in windows of about three cycles; None where they are too few for a growth."""
     frequency = starting_frequency(record)
     if frequency is None:
         return None
@@ -227,27 +226,22 @@ def windows_of(record: Record) -> AmplitudeWindows | None:
     count = int(float(reading.time[-1]) * frequency / _CYCLES)
     if count < 2 * LEAST_GROWTH_WINDOWS:
         return None
-    parts = np.array_split(np.arange(reading.time.size), count)
-    found = [values for part in parts if (values := _window(reading, part, frequency)) is not None]
-    if len(found) < max(2 * LEAST_GROWTH_WINDOWS, count // 2):
+    rows = []
+    for part in np.array_split(np.arange(reading.time.size), count):
+        time, yaw = reading.time[part], reading.yaw[part]
+        window = Reading(time - time[0], yaw)
+        found = _poles(window, 2.0 * np.pi * frequency)
+        fitted = None if found is None else project_run(window, found.decay)
+        if found is None or fitted is None:
+            continue
+        decay, run = found.decay, fitted[0]
+        length = float(time[-1] - time[0])
+        amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * length)
+        if np.isfinite(amplitude) and amplitude > 0.0:
+            rows.append((float(time.mean()), float(amplitude), decay.omega_d / (2.0 * np.pi)))
+    if len(rows) < max(2 * LEAST_GROWTH_WINDOWS, count // 2):
         return None
-    return AmplitudeWindows(*np.array(found).T)
-
-
-def _window(reading: Reading, part: NDArray[np.intp], frequency: float) -> tuple[float, float, float] | None:
-    time, yaw = reading.time[part], reading.yaw[part]
-    length = float(time[-1] - time[0])
-    found = pencil_decay(yaw, length / (time.size - 1), 2.0 * np.pi * frequency)
-    if found is None or not found.decay.omega_d > 0.0:
-        return None
-    fitted = project_run(Reading(time - time[0], yaw), found.decay)
-    if fitted is None:
-        return None
-    decay, run = found.decay, fitted[0]
-    amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * length)
-    if not (np.isfinite(amplitude) and amplitude > 0.0):
-        return None
-    return float(time.mean()), float(amplitude), decay.omega_d / (2.0 * np.pi)
+    return AmplitudeWindows(*np.array(rows).T)
 
 
 def _last(amplitude: Array) -> float:
@@ -258,53 +252,6 @@ def _slope(time: Array, amplitude: Array) -> tuple[float, float]:
     """Rate of the amplitude's logarithm and its standard deviation by the scatter, 1/s."""
     (slope, _), covariance = np.polyfit(time, np.log(amplitude), 1, cov=True)
     return float(slope), float(np.sqrt(covariance[0, 0]))
-
-
-def _grows(amplitude: Array) -> bool:
-    """Whether the last quarter's power exceeds the first one's beyond what the envelope of a buffeted rig does.
-
-    A window's power is then exponentially distributed: χ² of two degrees of freedom.
-    """
-    quarter = amplitude.size // 4
-    first, last = (float(np.mean(part**2)) for part in (amplitude[:quarter], amplitude[-quarter:]))
-    return bool(fdtrc(2 * quarter, 2 * quarter, last / first) < REFUSAL_RATE)
-
-
-def _settled_from(windows: AmplitudeWindows) -> int | None:
-    """First window of the limit cycle; None where the amplitude still grows at the end."""
-    below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
-    first = int(below[-1]) + 1 if below.size else 0
-    if windows.time.size - first < LEAST_GROWTH_WINDOWS:
-        return None
-    slope, std = _slope(windows.time[first:], windows.amplitude[first:])
-    return (
-        first
-        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:first].max(initial=0.0))
-        else None
-    )
-
-
-def _cut(run: Run, windows: AmplitudeWindows, part: slice) -> Run:
-    half = 0.5 * float(windows.time[1] - windows.time[0])
-    time = run.record.time_s - run.record.time_s[0]
-    inside = (time >= windows.time[part][0] - half) & (time <= windows.time[part][-1] + half)
-    return replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
-
-
-def _steady_remark(run: Run, windows: AmplitudeWindows) -> Remark:
-    slope, std = _slope(windows.time, windows.amplitude)
-    amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
-    cycles = np.ptp(windows.time) * frequency
-    return Remark(
-        Outcome.LEFT_OUT,
-        (run.id,),
-        f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
-        f"{significant(frequency, 3)} Hz for {cycles:.0f} cycles (its amplitude changes by "
-        f"{100.0 * slope / frequency:+.1g} ± {100.0 * std / frequency:.1g} % per cycle), "
-        "which has no damping ratio",
-        "record its growth from rest, or a decay at a lower wind speed",
-        {"kind": "steady", "settled_rad": amplitude, **windows.figures()},
-    )
 
 
 def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, settled: int | None) -> Remark:
@@ -320,14 +267,21 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
     )
     if rate is not None and grown > rate + MISFIT_DEVIATIONS * (std or 0.0):
         said += f" (at most {grown:.2g} 1/s, at {significant(at, 2)} rad)"
-    outcome, consequence = _consequence(settled, part)
+    if settled is None:
+        outcome, remedy = Outcome.NOTED, "its damping is negative as long as the growth is linear"
+    elif part is None:
+        outcome, remedy = Outcome.LEFT_OUT, "start from a smaller motion to record its linear growth"
+    else:
+        share = f"{100.0 * LINEAR_SHARE:.0f} %"
+        outcome = Outcome.CUT
+        remedy = f"frequency and damping are those of its growth up to {share} of the limit cycle"
     return Remark(
         outcome,
         (run.id,),
         f"self-excited: grows {said} from {significant(float(amplitude[shown.start]), 2)} rad, {end}; "
         f"frequency {significant(float(np.median(frequency[shown][:3])), 3)} → "
         f"{significant(float(np.median(frequency[-3:])), 3)} Hz",
-        consequence,
+        remedy,
         {
             "kind": "growth",
             "growth_rate_per_s": rate,
@@ -338,22 +292,6 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
     )
 
 
-def _consequence(settled: int | None, part: slice | None) -> tuple[Outcome, str]:
-    if settled is None:
-        return Outcome.NOTED, "its damping is negative as long as the growth is linear"
-    if part is None:
-        return Outcome.LEFT_OUT, "start from a smaller motion to record its linear growth"
-    share = f"{100.0 * LINEAR_SHARE:.0f} %"
-    return Outcome.CUT, f"frequency and damping are those of its growth up to {share} of the limit cycle"
-
-
 def in_limit_cycle(figures: Mapping[str, Any]) -> bool:
-    """Whether a remark's figures are those of a run with a limit cycle.
-
-    Args:
-        figures: of a remark, amplitudes in rad.
-
-    Returns:
-        True where the run settles, or is steady.
-    """
+    """Whether a remark's figures are those of a run that settles in a limit cycle, or is steady."""
     return figures.get("settled_rad") is not None

@@ -1,40 +1,100 @@
-"""The paper's networks: one network in NumPy, the trained pair, and its files.
+"""The paper's networks in NumPy: their training sets, value, gradients and posterior, and the files of weights.
 
-A feed-forward network of tanh layers with a linear output, in NumPy: value, input gradient, weight Jacobian.
-Source of the architecture: the paper, section II.B (100-5-5-1 and 2-2-5-1); inputs and output are scaled to zero
-mean, the second network's inputs to unit deviation as well.
-
-The trained pair of networks: from a shape and t3 to ζ and ωn, with errors and training range. Weights as
-safetensors, with the training record beside them as JSON, without pickle. The packaged ones are
-``paper.safetensors`` and ``paper.json`` in ``identification/neural/weights``.
+Source of the architecture: the paper, section II.B (100-5-5-1 and 2-2-5-1); tanh layers with a linear output.
+Weights are kept as safetensors, with the training record beside them as JSON, without pickle.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 from itertools import pairwise
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors.numpy import save
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from identification.neural.three_cycles import cycles_time, network_inputs
-from identification.neural.training_set import (
-    DAMPING,
-    FREQUENCY,
-    SIZES,
-    DataSpec,
-    held_out_points,
-    open_stored,
-    read_packaged,
-    read_stored,
-)
+from tunnel_sim.files.reading import as_described, parse_json, read_regular
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
+
+DAMPING, FREQUENCY = "damping", "frequency"
+SIZES = {DAMPING: (100, 5, 5, 1), FREQUENCY: (2, 2, 5, 1)}
+LOGARITHMIC, LINEAR = "logarithmic", "linear"
+
+
+@dataclass(frozen=True)
+class DataSpec:
+    """Range and number of the impulse responses.
+
+    Args:
+        zeta_range: damping ratios, the paper's 0.001 to 0.35 (1).
+        omega_range: natural frequencies, the paper's 0.4 to 26 rad/s.
+        zeta_count: number of damping ratios of the first network's set, evenly spaced.
+        grid: numbers of damping ratios and of natural frequencies of the second network's set.
+        frequency_scale: how t3 and ωn enter the second network before their mean is removed.
+        test_count: number of responses of the test set, drawn at random over the range.
+    """
+
+    zeta_range: tuple[float, float] = (0.001, 0.35)
+    omega_range: tuple[float, float] = (0.4, 26.0)
+    zeta_count: int = 300
+    grid: tuple[int, int] = (12, 40)
+    frequency_scale: str = LOGARITHMIC
+    test_count: int = 4000
+
+    @classmethod
+    def from_json_dict(cls, data: dict[str, Any]) -> DataSpec:
+        """From the fields by name; raises ValueError, TypeError or KeyError for a malformed document."""
+        pairs = {name: tuple(data[name]) for name in ("zeta_range", "omega_range", "grid")}
+        for low, high in (pairs["zeta_range"], pairs["omega_range"], pairs["grid"]):
+            if not (0.0 < float(low) < inf and 0.0 < float(high) < inf):
+                raise ValueError("an empty range")
+        if data["frequency_scale"] not in (LOGARITHMIC, LINEAR):
+            raise ValueError("an unknown scale")
+        return cls(**{**data, **pairs})
+
+    def to_network(self, values: Array) -> Array:
+        """t3 [s] or ωn [rad/s] as the second network takes it, any shape."""
+        return np.log(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
+
+    def from_network(self, values: Array) -> Array:
+        """ωn in rad/s from the second network's output, any shape."""
+        return np.exp(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
+
+
+def training_pairs(spec: DataSpec, which: str) -> tuple[Array, Array]:
+    """Inputs, shape (N, inputs), and targets, shape (N,), of the training set of ``damping`` or ``frequency``."""
+    if which == DAMPING:
+        zeta = np.linspace(*spec.zeta_range, spec.zeta_count)
+        return network_inputs(zeta), zeta
+    space = np.geomspace if spec.frequency_scale == LOGARITHMIC else np.linspace
+    axes = np.linspace(*spec.zeta_range, spec.grid[0]), space(*spec.omega_range, spec.grid[1])
+    zeta, omega = (axis.ravel() for axis in np.meshgrid(*axes))
+    return np.column_stack((zeta, spec.to_network(cycles_time(zeta, omega)))), spec.to_network(omega)
+
+
+def held_out_points(spec: DataSpec, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Damping ratios and frequencies [rad/s] that no training set holds, shapes (test_count,).
+
+    Half of them are uniform in the logarithm, so that the low ends of the range are tested too.
+    """
+    found = []
+    for low, high in (spec.zeta_range, spec.omega_range):
+        even = rng.uniform(low, high, spec.test_count)
+        logarithmic = np.exp(rng.uniform(np.log(low), np.log(high), spec.test_count))
+        found.append(np.where(rng.random(spec.test_count) < 0.5, even, logarithmic))
+    return found[0], found[1]
 
 
 @dataclass(frozen=True)
@@ -64,7 +124,6 @@ class Network:
     """A trained network with the posterior of its weights.
 
     Args:
-        sizes: units per layer, inputs first, one output.
         weights: matrix (row by row) and bias of each layer in turn, shape (n,).
         directions: eigenvectors of the data's information that stand out of the prior, shape (k, n).
         precision: posterior precision along each of them, shape (k,).
@@ -94,14 +153,7 @@ class Network:
         return self._backward(inputs)[0]
 
     def posterior_std(self, inputs: Array) -> float:
-        """Standard deviation of the output from the weights' posterior at one point, in the output's unit.
-
-        Args:
-            inputs: shape (inputs,).
-
-        Returns:
-            √(gᵀ A⁻¹ g) with g the output's derivative by the weights and A = 2βJᵀJ + 2α (MacKay 1992).
-        """
+        """√(gᵀ A⁻¹ g) at one point of shape (inputs,), in the output's unit; A = 2βJᵀJ + 2α (MacKay 1992)."""
         jacobian = self._backward(inputs)[1]
         along = self.directions @ jacobian
         rest = jacobian - self.directions.T @ along
@@ -126,23 +178,15 @@ class Network:
 
 
 def parameter_count(sizes: Sequence[int]) -> int:
-    """Number of weights and biases.
-
-    Args:
-        sizes: units per layer.
-    """
+    """Number of weights and biases of the units per layer."""
     return sum((before + 1) * after for before, after in pairwise(sizes))
 
 
 def split_weights(weights: Array, sizes: Sequence[int]) -> list[tuple[Array, Array]]:
-    """The vector of weights as matrices and biases.
+    """Matrix (after, before) and bias (after,) of each layer, as views.
 
     Args:
         weights: shape (n,).
-        sizes: units per layer.
-
-    Returns:
-        Matrix (after, before) and bias (after,) of each layer; views.
     """
     layers, place = [], 0
     for before, after in pairwise(sizes):
@@ -181,12 +225,7 @@ class NetworkErrors:
 
 @dataclass(frozen=True, eq=False)
 class Networks:
-    """Both networks.
-
-    Args:
-        damping: 100-5-5-1, shape to ζ.
-        frequency: 2-2-5-1, ζ and t3 to ωn.
-    """
+    """Both networks: 100-5-5-1 from shape to ζ, and 2-2-5-1 from ζ and t3 to ωn."""
 
     damping: Network
     frequency: Network
@@ -237,8 +276,8 @@ class Networks:
         of_omega = self.frequency.posterior_std(point)
         if self.spec.frequency_scale == "linear":
             of_omega /= float(self.omega_n(np.array([zeta]), np.array([t3]))[0])
-        floors = self.errors.zeta / np.sqrt(3.0), self.errors.omega_relative / np.sqrt(3.0)
-        return float(np.hypot(of_zeta, floors[0])), float(np.hypot(of_omega, floors[1]))
+        floor, omega_floor = self.errors.zeta / np.sqrt(3.0), self.errors.omega_relative / np.sqrt(3.0)
+        return float(np.hypot(of_zeta, floor)), float(np.hypot(of_omega, omega_floor))
 
     def trained_for(self, zeta: float, omega_n: float) -> bool:
         """Whether ζ and ωn lie in the training range.
@@ -252,11 +291,7 @@ class Networks:
 
 
 def held_out_errors(networks: Networks, rng: np.random.Generator) -> NetworkErrors:
-    """Errors on responses outside the training set.
-
-    Args:
-        networks: both; the second uses the ζ of the first.
-    """
+    """Errors on responses outside the training set; the second network uses the ζ of the first."""
     zeta, omega = held_out_points(networks.spec, rng)
     found = networks.zeta(network_inputs(zeta))
     error = found - zeta
@@ -270,16 +305,53 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> NetworkErro
     )
 
 
+def read_stored(weights: Path) -> tuple[bytes, bytes]:
+    """Weights and record that ``tunnel train`` wrote: a safetensors file, and the ``.json`` of its name beside it.
+
+    Raises:
+        TunnelError: when a file is missing, cannot be read or is too large.
+    """
+    remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
+    content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
+    beside = weights.with_suffix(".json")
+    return content, read_regular(beside, limits.JSON_BYTES, missing=remedy, readable=remedy)
+
+
+def read_packaged(name: str) -> tuple[bytes, bytes]:
+    """Weights and record that come with the package."""
+    folder = resources.files("identification") / "neural" / "weights"
+    return (folder / f"{name}.safetensors").read_bytes(), (folder / f"{name}.json").read_bytes()
+
+
+@contextmanager
+def open_stored(
+    weights: bytes, record: bytes | str, where: str, *, estimator: str
+) -> Iterator[tuple[Mapping[str, Array], dict[str, Any]]]:
+    """The tensors and the record of two files; what they hold is checked inside the block.
+
+    Raises:
+        TunnelError: when they are malformed, or do not belong together.
+    """
+    remedy = f"train them again with tunnel train --estimator {estimator}"
+    document = parse_json(record, where, remedy)
+    with as_described(f"not the weights and training record of {estimator}", where, remedy):
+        if document["weights_sha256"] != hashlib.sha256(weights).hexdigest():
+            raise TunnelError(
+                "weights and training record do not belong together", where=where, remedy=remedy
+            )
+        try:
+            tensors = load(weights)
+        except SafetensorError as error:  # which has no base class but Exception
+            raise ValueError(error) from None
+        yield tensors, document
+
+
 SHIPPED = "paper"
 _FIELDS = ("weights", "directions", "precision", "prior_precision", "inputs", "output")
 
 
 def weights_bytes(damping: Network, frequency: Network) -> bytes:
-    """Both networks with their posteriors and scalings as safetensors.
-
-    Args:
-        damping: the first.
-    """
+    """Both networks with their posteriors and scalings as safetensors."""
     tensors: dict[str, Array] = {}
     for name, network in ((DAMPING, damping), (FREQUENCY, frequency)):
         values = {
@@ -295,14 +367,7 @@ def weights_bytes(damping: Network, frequency: Network) -> bytes:
 
 
 def read_networks(weights: Path) -> Networks:
-    """Read networks written by ``tunnel train``.
-
-    Args:
-        weights: the safetensors file; its record is the ``.json`` of the same name beside it.
-
-    Raises:
-        TunnelError: when a file is missing or malformed, or the two do not belong together.
-    """
+    """Read networks written by ``tunnel train``: arguments and errors as in `read_stored` and `networks_of`."""
     return networks_of(*read_stored(weights), str(weights))
 
 
@@ -319,20 +384,14 @@ def shipped_record() -> dict[str, Any]:
 
 
 def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
-    """Networks from the contents of their two files.
-
-    Args:
-        weights: safetensors.
-        record: JSON.
+    """Networks from safetensors and the JSON of their training record.
 
     Raises:
         TunnelError: when they are malformed, or do not belong together.
     """
     with open_stored(weights, record, where, estimator="neural_network") as (tensors, document):
-        spec, errors = (
-            DataSpec.from_json_dict(document["data"]),
-            NetworkErrors.from_json_dict(document["errors"]),
-        )
+        spec = DataSpec.from_json_dict(document["data"])
+        errors = NetworkErrors.from_json_dict(document["errors"])
         return Networks(_network(tensors, DAMPING), _network(tensors, FREQUENCY), spec, errors)
 
 

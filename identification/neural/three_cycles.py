@@ -1,21 +1,4 @@
-"""The networks' input: windows of three cycles in a record, each as 100 numbers that depend on ζ alone.
-
-The input of the first network: three cycles of a free decay, as 100 numbers that depend on ζ alone. From a zero
-crossing on, every free decay is an impulse response (paper, eq. 12): e^{−ζωn t} sin ωd t. With time in units of
-t3, the time of three damped cycles, it no longer depends on ωn:
-
-    y(τ) = e^{−6πκτ} sin 6πτ,   κ = ζ/√(1 − ζ²),   τ = t/t3 from 0 to 1.
-
-Each of the 100 numbers is the mean over a hundredth of that axis. Their mean is removed, and they are divided by
-the largest value of the first half cycle, so that they depend neither on the amplitude nor on the sensor's zero.
-The largest value is that of a quartic through the points of the half cycle, which is less sensitive to noise than
-their maximum.
-
-Consecutive windows of three cycles in a record, from its zero crossings alone. A window begins at a zero crossing
-and lasts t3, the time of three damped cycles: six half cycles. The seven crossings are t_k = t0 + k t3/6, fitted
-by least squares with weights from their slopes, so that the late ones, which are lost in noise where ζ is large,
-count little. The half cycles' means are z + m (−r)^k for any linear decay; their regression on one another gives
-the sensor's zero z and the decay per half cycle r, at any ζ.
+"""Windows of three cycles in a record, from its zero crossings alone, each as 100 numbers that depend on ζ alone.
 
 Every step is linear in the reading once the crossings are known. So each result has the weights of the samples in
 it, and white noise is propagated through all steps by the delta method.
@@ -55,21 +38,12 @@ class Shape:
     scale: float
     peak_weights: Array
 
-    def pull_back(self, gradient: Array) -> Array:
-        """The gradient by the points, from that by the inputs; both of shape (100,)."""
-        pulled = (gradient - self.peak_weights * float(gradient @ self.inputs)) / self.scale
-        return np.asarray(pulled - pulled.mean())
-
 
 def normalise(points: Array) -> Shape:
-    """Remove the mean and scale the first half cycle's largest value to 1.
+    """Remove the mean of 100 points, shape (100,), and scale the largest value of the first half cycle to 1.
 
-    Args:
-        points: means over the hundredths of three cycles from a zero crossing on, the first half cycle positive,
-            shape (100,).
-
-    Returns:
-        The shape; its scale is 0 or less where the first half cycle does not rise above the mean.
+    That is the value of a quartic through the points of the half cycle, which is less sensitive to noise. The
+    scale is 0 or less where the half cycle does not rise above the mean.
     """
     centred = points - points.mean()
     place = int(np.argmax(_FINE @ centred[:_FIRST_HALF]))
@@ -80,14 +54,7 @@ def normalise(points: Array) -> Shape:
 
 
 def response_points(zeta: Array) -> Array:
-    """The 100 points of impulse responses in closed form.
-
-    Args:
-        zeta: damping ratios, below 1, shape (n,).
-
-    Returns:
-        Points before normalisation, shape (n, 100).
-    """
+    """The 100 points of e^{−6πκτ} sin 6πτ (paper, eq. 12) with κ = ζ/√(1 − ζ²), shape (n, 100), of ratios (n,)."""
     ratio = np.asarray(zeta, dtype=np.float64)[:, None]
     pole = 2.0 * np.pi * CYCLES * (1j - ratio / np.sqrt(1.0 - ratio**2))
     integral = (np.exp(pole * np.linspace(0.0, 1.0, POINTS + 1)) / pole).imag
@@ -95,26 +62,16 @@ def response_points(zeta: Array) -> Array:
 
 
 def network_inputs(zeta: Array) -> Array:
-    """The first network's inputs for impulse responses.
-
-    Args:
-        zeta: damping ratios, below 1, shape (n,).
-
-    Returns:
-        Shape (n, 100).
-    """
+    """The first network's inputs for impulse responses, shape (n, 100), of damping ratios below 1, shape (n,)."""
     return np.array([normalise(points).inputs for points in response_points(zeta)])
 
 
 def cycles_time(zeta: Array, omega_n: Array) -> Array:
-    """t3, the time of three damped cycles.
+    """t3, the time of three damped cycles, shape (n,), s.
 
     Args:
         zeta: damping ratios, below 1, shape (n,).
         omega_n: natural frequencies, rad/s, shape (n,).
-
-    Returns:
-        Shape (n,), s.
     """
     return np.asarray(2.0 * np.pi * CYCLES / (omega_n * np.sqrt(1.0 - zeta**2)))
 
@@ -140,15 +97,10 @@ class ThreeCycles:
     Args:
         start_s: of the first crossing since the record's first sample, s.
         t3: time of three damped cycles, s.
-        zero: of the sensor, rad.
-        decay: envelope's ratio over half a cycle, (1).
-        shape: the first network's inputs.
     """
 
     start_s: float
     t3: float
-    zero: float
-    decay: float
     shape: Shape
     noise: Propagation
 
@@ -172,15 +124,13 @@ class Propagation:
     first: int
 
     def weights(self, shape: Shape, gradient: Array) -> Array:
-        """Errors of ζ and t3 per standard deviation of each sample's noise.
+        """Errors of ζ and t3 per standard deviation of each sample's noise, shape (2, n), in 1 and s.
 
         Args:
             gradient: of ζ by the network's inputs, shape (100,).
-
-        Returns:
-            Shape (2, n), in 1 and s.
         """
-        pulled = shape.pull_back(gradient)
+        pulled = (gradient - shape.peak_weights * float(gradient @ shape.inputs)) / shape.scale
+        pulled = pulled - pulled.mean()
         zeta = pulled @ self.points + (pulled @ self.by_timing) @ self.timing
         return np.stack((zeta, self.timing[1])) * self.std
 
@@ -206,7 +156,6 @@ class _Place:
 
     start: float
     half: float
-    zero: float = 0.0
     decay: float = 1.0
     slope: float = 0.0
 
@@ -224,10 +173,33 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
     rough = starting_decay(record)
     if rough is None or rough.omega_d == 0.0:
         return (), 0.0
-    trace = _thinned(record, 2.0 * np.pi / rough.omega_d, noise_std)
-    crossings = _rough_crossings(trace, 2.0 * np.pi / rough.omega_d)
-    if crossings.size < 2:
+    period = 2.0 * np.pi / rough.omega_d
+    samples = record.time_s.size
+    block = max(1, int(min(period / record.sample_interval / _SAMPLES_PER_CYCLE, samples / LEAST_SAMPLES)))
+    time = mean_of_blocks(record.time_s - record.time_s[0], block)
+    yaw = mean_of_blocks(record.yaw_rad, block)
+    spline = CubicSpline(time, yaw)
+    trace = _Trace(time, yaw, spline, spline.antiderivative(), noise_std / np.sqrt(block))
+    # First crossings: of the smoothed reading through the mean level of its later half, with hysteresis.
+    width = max(1, round(period / trace.step / 10.0))
+    if yaw.size < 2 * width or period / trace.step < _LEAST_PER_CYCLE:
         return (), 0.0
+    smooth = np.convolve(yaw, np.full(width, 1.0 / width), mode="valid")
+    middles = time[: smooth.size] + 0.5 * (width - 1) * trace.step
+    # The mean over the last whole cycles: the zero to within a small share of the remaining amplitude.
+    cycles = max(1, int(0.5 * yaw.size * trace.step / period))
+    count = min(yaw.size, round(cycles * period / trace.step))
+    away = smooth - float(yaw[-count:].mean())
+    largest = float(np.abs(away).max())
+    band = max(_BAND * trace.noise / np.sqrt(width), _SHARE * largest)
+    outside = np.flatnonzero(np.abs(away) > band)
+    change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
+    if change.size < 2:
+        return (), 0.0
+    before, after = outside[change], outside[change + 1]
+    # Linear interpolation from the last clear sample on one side to the first on the other.
+    share = away[before] / (away[before] - away[after])
+    crossings = np.asarray(middles[before] + share * (middles[after] - middles[before]))
     first = _Place(float(crossings[0]), float(np.diff(crossings[:3]).mean()))
     windows: list[ThreeCycles] = []
     place = first
@@ -244,42 +216,17 @@ def find_windows(record: Record, noise_std: float) -> tuple[tuple[ThreeCycles, .
     return tuple(windows), (end - first.start) / (2.0 * first.half)
 
 
-def _thinned(record: Record, period: float, noise_std: float) -> _Trace:
-    samples = record.time_s.size
-    block = max(1, int(min(period / record.sample_interval / _SAMPLES_PER_CYCLE, samples / LEAST_SAMPLES)))
-    time = mean_of_blocks(record.time_s - record.time_s[0], block)
-    yaw = mean_of_blocks(record.yaw_rad, block)
-    spline = CubicSpline(time, yaw)
-    return _Trace(time, yaw, spline, spline.antiderivative(), noise_std / np.sqrt(block))
-
-
-def _rough_crossings(trace: _Trace, period: float) -> Array:
-    # Of the smoothed reading through the mean level of its later half, with hysteresis.
-    width = max(1, round(period / trace.step / 10.0))
-    if trace.yaw.size < 2 * width or period / trace.step < _LEAST_PER_CYCLE:
-        return np.zeros(0)
-    smooth = np.convolve(trace.yaw, np.full(width, 1.0 / width), mode="valid")
-    time = trace.time[: smooth.size] + 0.5 * (width - 1) * trace.step
-    # The mean over the last whole cycles: the zero to within a small share of the remaining amplitude.
-    cycles = max(1, int(0.5 * trace.yaw.size * trace.step / period))
-    count = min(trace.yaw.size, round(cycles * period / trace.step))
-    away = smooth - float(trace.yaw[-count:].mean())
-    largest = float(np.abs(away).max())
-    band = max(_BAND * trace.noise / np.sqrt(width), _SHARE * largest)
-    outside = np.flatnonzero(np.abs(away) > band)
-    change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
-    before, after = outside[change], outside[change + 1]
-    # Linear interpolation from the last clear sample on one side to the first on the other.
-    share = away[before] / (away[before] - away[after])
-    return np.asarray(time[before] + share * (time[after] - time[before]))
-
-
 def _refined(trace: _Trace, place: _Place) -> _Place | None:
-    # Crossings, zero and decay in turn; None where the decay is lost in noise.
+    # Seven crossings t0 + k t3/6, zero and decay in turn; None where the decay is lost in noise.
     number = np.arange(HALVES + 1)
     for _ in range(_ROUNDS):
         instants = np.asarray(place.start + place.half * number, dtype=np.float64)
-        zero, decay = _zero_and_decay(trace, instants)
+        # The half cycles' means are z + m (−r)^k for any linear decay: their regression on one another.
+        means = np.diff(trace.integral(np.clip(instants, trace.time[0], trace.time[-1]))) / np.diff(instants)
+        columns = np.column_stack((means[:-1], np.ones(means.size - 1)))
+        ratio, offset = np.linalg.lstsq(columns, means[1:], rcond=None)[0]
+        decay = -float(ratio)
+        zero = float(offset) / (1.0 + decay) if decay > -1.0 else 0.0
         if not 0.0 < decay < 1.5:
             return None
         # Level and slope at each instant.
@@ -295,20 +242,12 @@ def _refined(trace: _Trace, place: _Place) -> _Place | None:
         moves = np.clip((zero - levels) / (slope * model), -0.25 * place.half, 0.25 * place.half)
         line = _line_weights(decay) @ (instants + moves)
         moved = abs(float(line[0]) - place.start)
-        place = _Place(float(line[0]), float(line[1]), zero, decay, slope)
+        place = _Place(float(line[0]), float(line[1]), decay, slope)
         if not place.half > 0.0 or place.start < 0.0:
             return None
         if moved < _SETTLED * place.half:
             break
     return place
-
-
-def _zero_and_decay(trace: _Trace, instants: Array) -> tuple[float, float]:
-    means = np.diff(trace.integral(np.clip(instants, trace.time[0], trace.time[-1]))) / np.diff(instants)
-    columns = np.column_stack((means[:-1], np.ones(means.size - 1)))
-    ratio, offset = np.linalg.lstsq(columns, means[1:], rcond=None)[0]
-    decay = -float(ratio)
-    return (float(offset) / (1.0 + decay) if decay > -1.0 else 0.0), decay
 
 
 def _line_weights(decay: float) -> Array:
@@ -331,15 +270,6 @@ def _fit_rows(trace: _Trace, instant: float, half: float) -> tuple[slice, Array]
     return part, rows
 
 
-def _level_weights(trace: _Trace, instants: Array, half: float, part: slice) -> Array:
-    # The samples' weights in the level at each instant, shape (7, samples of the part).
-    weights = np.zeros((instants.size, trace.time.size))
-    for place, instant in enumerate(instants):
-        where, rows = _fit_rows(trace, float(instant), half)
-        weights[place, where] = rows[0]
-    return weights[:, part]
-
-
 def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
     instants = np.asarray(place.start + place.half * np.arange(HALVES + 1), dtype=np.float64)
     t3 = HALVES * place.half
@@ -349,7 +279,11 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
     shape = normalise(points)
     first, last = np.searchsorted(trace.time, (instants[0] - place.half, instants[-1] + place.half))
     part = slice(int(first), int(last))
-    level_weights = _level_weights(trace, instants, place.half, part)
+    level_weights = np.zeros((instants.size, trace.time.size))  # of the samples, in the level at each instant
+    for number, instant in enumerate(instants):
+        where, rows = _fit_rows(trace, float(instant), place.half)
+        level_weights[number, where] = rows[0]
+    level_weights = level_weights[:, part]
     level_noise = trace.noise * float(np.linalg.norm(level_weights[0]))
     if shape.scale < _CLEAR * level_noise:
         return None
@@ -359,14 +293,20 @@ def _window(trace: _Trace, place: _Place) -> ThreeCycles | None:
     slopes = place.slope * (-place.decay) ** np.arange(HALVES + 1)
     crossings = (pairs.mean(axis=0) - level_weights) / slopes[:, None]
     start, half = _line_weights(place.decay) @ crossings
+    # Derivatives of the points by t0 and t3, from the curve at their edges; averaged to reduce noise.
+    upright = sign * points
+    ends = trace.spline(edges[[0, -1]])
+    values = np.concatenate(([float(ends[0])], 0.5 * (upright[1:] + upright[:-1]), [float(ends[1])]))
+    by_start = np.diff(values) * POINTS / t3
+    by_length = np.diff(np.linspace(0.0, 1.0, POINTS + 1) * values) * POINTS / t3 - upright / t3
     noise = Propagation(
         trace.noise,
         sign * _shares(trace, edges, part),
         np.stack((start, HALVES * half)),
-        sign * _by_timing(trace, edges, sign * points, t3),
+        sign * np.column_stack((by_start, by_length)),
         int(first),
     )
-    return ThreeCycles(place.start, t3, place.zero, place.decay, shape, noise)
+    return ThreeCycles(place.start, t3, shape, noise)
 
 
 def _shares(trace: _Trace, edges: Array, part: slice) -> Array:
@@ -374,14 +314,3 @@ def _shares(trace: _Trace, edges: Array, part: slice) -> Array:
     left = trace.time[part] - 0.5 * trace.step
     covered = np.clip(edges[:, None] - left, 0.0, trace.step)
     return np.asarray(np.diff(covered, axis=0) / np.diff(edges)[:, None])
-
-
-def _by_timing(trace: _Trace, edges: Array, points: Array, t3: float) -> Array:
-    # Derivatives of the points by t0 and t3, from the curve at their edges; averaged to reduce noise.
-    inner = 0.5 * (points[1:] + points[:-1])
-    ends = trace.spline(edges[[0, -1]])
-    values = np.concatenate(([float(ends[0])], inner, [float(ends[1])]))
-    share = np.linspace(0.0, 1.0, POINTS + 1)
-    by_start = np.diff(values) * POINTS / t3
-    by_length = np.diff(share * values) * POINTS / t3 - points / t3
-    return np.column_stack((by_start, by_length))

@@ -1,18 +1,15 @@
 """Least squares of free decays: variable projection, one run or many with shared parameters.
 
-Every run i decays with (aᵢ, kᵢ) = Lᵢ φ, linear in the shared parameters φ; its initial angle and rate and the
-sensor's zero enter linearly, so they are eliminated in closed form and only φ is iterated. With white
-Gaussian noise this is maximum likelihood. Sources: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432,
-doi 10.1137/0710036; the Jacobian is Kaufman's, BIT 15 (1975) 49–57, doi 10.1007/BF01932995.
-
-Long readings are thinned to block means, which keep the rate and frequency of a decay and reduce its amplitude a
-little.
+Every run i decays with (aᵢ, kᵢ) = Lᵢ φ; its initial angle and rate and the sensor's zero enter linearly, so they
+are eliminated in closed form and only φ is iterated. With white Gaussian noise this is maximum likelihood.
+Sources: Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413–432, doi 10.1137/0710036; Kaufman, BIT 15 (1975)
+49–57, doi 10.1007/BF01932995 (Jacobian).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,9 +77,7 @@ class DecayFit:
     Args:
         parameters: φ, shape (p,).
         zero: the sensor's zero, rad; the mean where every run has its own.
-        runs: one per reading.
         normal: information of φ, and of the zero last where it was estimated, shape (p, p) or (p + 1, p + 1).
-        converged: whether the step fell below the tolerance.
     """
 
     parameters: Array
@@ -98,8 +93,8 @@ class Prior:
 
     Args:
         mean: of φ, shape (p,).
-        information: inverse covariance of φ times the noise variance of the readings, shape (p, p): the weight
-            of the prior against one squared residual.
+        information: inverse covariance of φ times the noise variance of the readings, shape (p, p): the weight of
+            the prior against one squared residual.
     """
 
     mean: Array
@@ -128,8 +123,7 @@ def fit_decays(
         start: φ to start from, shape (p,).
         zero: the sensor's zero where it is known, rad; estimated where None.
         own_zeros: whether an estimated zero is each run's own; otherwise it is common to the runs.
-        prior: what is known of φ beforehand. The fit is then the maximum of the posterior, and ``normal`` includes
-            the information of the prior.
+        prior: the fit is then the maximum of the posterior, and ``normal`` includes the information of the prior.
         tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
 
     Returns:
@@ -146,7 +140,11 @@ def fit_decays(
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:  # no motion in a run: nothing to identify there
             break
-        size = _relative_size(step[: best.parameters.size], links, best.runs)
+        size = 0.0
+        for link, run in zip(links, best.runs, strict=True):
+            rate, stiffness = np.abs(link @ step[: best.parameters.size])
+            scale = max(abs(run.decay.stiffness), run.decay.rate**2)
+            size = max(size, float(rate / np.sqrt(scale)), float(stiffness / scale))
         trial = _project(
             readings, links, best.parameters + step[: best.parameters.size], zero, prior, own_zeros
         )
@@ -155,7 +153,12 @@ def fit_decays(
         converged = size <= tolerance or (size <= _ROUNDING and trial.cost >= best.cost)
         if iteration == _MAX_ITERATIONS:
             converged = converged or expected_gain <= _SETTLED * best.cost / samples
-        damping = _next_damping(damping, gain)
+        # Marquardt's damping, set by the ratio of the actual to the predicted fall of the cost: Gauss–Newton where
+        # the residual is small, shorter steps where it is large and Gauss–Newton overshoots.
+        if gain < 0.25:
+            damping = max(4.0 * damping, 0.01)
+        elif not gain < 0.75:
+            damping = damping / 8.0 if damping > 1e-4 else 0.0
         if trial.runs and trial.cost <= best.cost:
             best = trial
     nothing = DecayFit(best.parameters, best.zero, (), np.zeros((0, 0)), False)
@@ -171,12 +174,7 @@ def fit_decays(
 def fit_run(
     reading: Reading, start: Decay, *, zero: float | None = None, tolerance: float = _TOLERANCE
 ) -> DecayFit:
-    """Fit one run by itself: φ = (a, k).
-
-    Args:
-        zero: the sensor's zero where it is known, rad.
-        tolerance: step of k as a ratio, and of a in units of ωn, at which the iteration ends.
-    """
+    """Fit one run by itself, φ = (a, k): arguments as in `fit_decays`."""
     decay = np.array([start.rate, start.stiffness])
     return fit_decays([reading], [np.eye(2)], decay, zero=zero, tolerance=tolerance)
 
@@ -192,46 +190,27 @@ def project_run(reading: Reading, decay: Decay) -> tuple[RunFit, float] | None:
 
 
 def projected_cost(reading: Reading, decay: Decay) -> float:
-    """Sum of squared residuals of a reading for a given decay, at the best initial state and zero.
-
-    Args:
-        reading: angles in rad against s.
-
-    Returns:
-        Sum of squares, rad²; infinite where the decay overflows.
-    """
+    """Sum of squared residuals, rad², of a decay at the best initial state and zero; infinite out of range."""
     return _project([reading], [np.eye(2)], np.array([decay.rate, decay.stiffness]), None).cost
 
 
 def information_at(time: Array, decay: Decay, angle: float, rate: float) -> Array:
-    """JᵀJ of one run's reading in the local order (a, k, zero, angle, rate).
-
-    Args:
-        time: since the initial state, shape (n,), s.
-        angle: initial angle, rad.
-        rate: initial rate, rad/s.
-
-    Returns:
-        Shape (5, 5); divided by the noise variance it is Fisher's information.
-    """
+    """JᵀJ of one run's reading in the local order (a, k, zero, angle, rate): arguments as in `linearised_at`."""
     return linearised_at(time, decay, angle, rate, np.zeros(time.size))[0]
 
 
 def linearised_at(
     time: Array, decay: Decay, angle: float, rate: float, residual: Array
 ) -> tuple[Array, Array]:
-    """JᵀJ as in `information_at`, and the score Jᵀ residual.
+    """JᵀJ in the local order, shape (5, 5), and the score Jᵀ residual, shape (5,).
 
     Args:
         time: since the initial state, shape (n,), s.
         angle: initial angle, rad.
         rate: initial rate, rad/s.
         residual: reading less model, shape (n,), rad.
-
-    Returns:
-        Shapes (5, 5) and (5,).
     """
-    rows = _rows(time, decay)
+    rows = response_rows(time, decay, constant=True)
     weights = _local_weights(decay, angle, rate)
     return weights @ (rows @ rows.T) @ weights.T, weights @ (rows @ residual)
 
@@ -243,7 +222,7 @@ class _Point:
     parameters: Array
     zero: float
     runs: tuple[RunFit, ...]
-    cost: float = field(default=np.inf)
+    cost: float = np.inf
 
 
 def _project(
@@ -256,7 +235,9 @@ def _project(
 ) -> _Point:
     decays = [Decay(*map(float, link @ parameters)) for link in links]
     with np.errstate(over="ignore", invalid="ignore"):  # a trial far off may overflow; it is rejected then
-        rows = [_rows(reading.time, decay) for reading, decay in zip(readings, decays, strict=True)]
+        rows = [
+            response_rows(r.time, decay, constant=True) for r, decay in zip(readings, decays, strict=True)
+        ]
         grams = [block @ block.T for block in rows]
     if not all(np.isfinite(gram).all() for gram in grams):
         return _Point(parameters, 0.0, ())
@@ -283,10 +264,6 @@ def _project(
         cost += float(residual @ residual)
     mean = zeros[0] if len(set(zeros)) == 1 else float(np.mean(zeros))
     return _Point(parameters, mean, tuple(runs), cost)
-
-
-def _rows(time: Array, decay: Decay) -> Array:
-    return response_rows(time, decay, constant=True)
 
 
 def _local_weights(decay: Decay, angle: float, rate: float) -> Array:
@@ -317,11 +294,7 @@ def _shared_system(
     normal: Array | float = 0.0
     gradient: Array | float = 0.0
     for run, link in zip(point.runs, links, strict=True):
-        order = (
-            [RATE, STIFFNESS, ZERO, ANGLE, ANGULAR_RATE]
-            if with_zero
-            else [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
-        )
+        order = [RATE, STIFFNESS, *([ZERO] if with_zero else []), ANGLE, ANGULAR_RATE]
         information, score = eliminate(run.information[np.ix_(order, order)], run.score[order], keep)
         extended = embed(link, with_zero=shared)
         normal = normal + extended.T @ information @ extended
@@ -334,44 +307,20 @@ def _shared_system(
     return normal, gradient
 
 
-def _next_damping(damping: float, gain: float) -> float:
-    # Marquardt's damping, set by the ratio of the actual to the predicted fall of the cost: Gauss–Newton where the
-    # residual is small, shorter steps where it is large and Gauss–Newton overshoots.
-    if gain < 0.25:
-        return max(4.0 * damping, 0.01)
-    if gain < 0.75:
-        return damping
-    return damping / 8.0 if damping > 1e-4 else 0.0
-
-
-def _relative_size(step: Array, links: Sequence[Array], runs: Sequence[RunFit]) -> float:
-    largest = 0.0
-    for link, run in zip(links, runs, strict=True):
-        rate, stiffness = np.abs(link @ step)
-        scale = max(abs(run.decay.stiffness), run.decay.rate**2)
-        largest = max(largest, rate / np.sqrt(scale), stiffness / scale)
-    return float(largest)
-
-
 def even_reading(reading: Reading) -> Reading:
-    """A reading on a uniform raster, for methods that work by the place of a sample and not by its time.
-
-    Returns:
-        As `tunnel_sim.vocabulary.record.evenly_spaced`; the reading itself where its times are uniform.
-    """
+    """A reading on a uniform raster, as by `evenly_spaced`; the reading itself where its times are uniform."""
     record = Record(reading.time, reading.yaw)
     return reading if record.uniform else Reading.from_record(evenly_spaced(record))
 
 
 def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[Reading, int]:
-    """Thin a reading to means of equal blocks.
+    """Thin a reading to means of equal blocks, with their middle times, and the number of samples per block.
+
+    The means keep the rate and frequency of a decay and reduce its amplitude a little.
 
     Args:
         frequency: of its oscillation, Hz.
         per_cycle: least number of blocks per period; the record itself gives at least eight.
-
-    Returns:
-        The thinned reading, with the times of the middles of the blocks, and the number of samples per block.
     """
     rate = (reading.time.size - 1) / float(reading.time[-1])
     factor = max(1, int(min(rate / (per_cycle * frequency), reading.time.size / LEAST_SAMPLES)))
@@ -379,14 +328,10 @@ def block_means(reading: Reading, frequency: float, per_cycle: float) -> tuple[R
 
 
 def mean_of_blocks(values: Array, factor: int) -> Array:
-    """Means of consecutive values; those left over at the end are dropped.
+    """Means of consecutive values, shape (n // factor,); those left over at the end are dropped.
 
     Args:
         values: shape (n,).
-        factor: number of values in a block.
-
-    Returns:
-        Shape (n // factor,).
     """
     if factor == 1:
         return values

@@ -35,7 +35,13 @@ def driven_rows(time: Array, values: Array, rate: float, stiffness: float, *, he
     steps = np.diff(time)
     if np.ptp(steps) <= 1e-6 * steps.mean():
         steps = steps[:1]
-    whole = expm(_dynamics(rate, stiffness) * steps[:, None, None])
+    dynamics = np.zeros((_STATE + 2, _STATE + 2))
+    for first in (0, 2, 4):
+        dynamics[first, first + 1] = 1.0
+        dynamics[first + 1, first], dynamics[first + 1, first + 1] = -stiffness, -2.0 * rate
+    dynamics[3, 1], dynamics[5, 0] = -2.0, -1.0
+    dynamics[1, 6], dynamics[6, 7] = 1.0, 1.0  # the input, and its slope
+    whole = expm(dynamics * steps[:, None, None])
     transition, constant, ramp = whole[:, :_STATE, :_STATE], whole[:, :_STATE, 6], whole[:, :_STATE, 7]
     slope = np.zeros(time.size - 1) if held else np.diff(values) / np.diff(time)
     pushed = constant * values[:-1, None] + ramp * slope[:, None]
@@ -52,16 +58,6 @@ def driven_rows(time: Array, values: Array, rate: float, stiffness: float, *, he
     return np.asarray(state[:, ::2].T, np.float64)
 
 
-def _dynamics(rate: float, stiffness: float) -> Array:
-    matrix = np.zeros((_STATE + 2, _STATE + 2))
-    for first in (0, 2, 4):
-        matrix[first, first + 1] = 1.0
-        matrix[first + 1, first], matrix[first + 1, first + 1] = -stiffness, -2.0 * rate
-    matrix[3, 1], matrix[5, 0] = -2.0, -1.0
-    matrix[1, 6], matrix[6, 7] = 1.0, 1.0  # the input, and its slope
-    return matrix
-
-
 def driven_start(
     time: Array, reading: Array, values: Array, *, sprung: bool = True
 ) -> tuple[float, float, float] | None:
@@ -75,7 +71,6 @@ def driven_start(
         time: of the samples, shape (n,), s.
         reading: of the response, shape (n,), rad.
         values: of the input, shape (n,).
-        sprung: whether there is a stiffness to be found; else k is 0.
 
     Returns:
         a (1/s), k (1/s²) and g (rad/s² per unit); None where the response holds no motion.

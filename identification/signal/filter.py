@@ -3,20 +3,14 @@
 State (β, β̇) with β̈ + 2aβ̇ + kβ = w(t); w is white with ⟨w(t)w(t′)⟩ = q δ(t − t′), or of corner frequency fb, ẇ
 = −2πfb (w − white), with the same q at low frequency; the reading adds white noise of variance R. In discrete
 time the reading obeys D(z) y = C(z) e: D is the characteristic polynomial of the motion, and C and the variance
-of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven
-part. So innovations are one call of a recursive filter over the record, with no loop in Python.
+of the innovations e follow by spectral factorisation of R D(z)D(1/z) + γ(z), γ the covariance of the driven part.
+So innovations are one call of a recursive filter over the record, with no loop in Python.
 
-The initial state and the sensor's zero are unknown and enter linearly: their responses are filtered like the
-reading and fitted to it by least squares. The covariance that the steady filter assumes for the initial state
-then has no influence. Where q is 0, C is D and the innovations are output error's residual. Sources: Maine &
-Iliff, SIAM J. Appl. Math. 41 (1981) 558–579, doi 10.1137/0141046; Åström, Automatica 16 (1980) 551–574, doi
-10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5, doi
-10.2514/4.102790.
-
-Decay rate, stiffness and the random moment's intensity are found by scoring. The start is the optimum of output
-error with the best of a range of intensities. Each step solves Fisher's information, from central differences of
-the innovations and of their variance, against the gradient of the likelihood (Maine & Iliff, SIAM J. Appl. Math.
-41 (1981) 558–579, doi 10.1137/0141046).
+The initial state and the sensor's zero enter linearly: their responses are filtered like the reading and fitted
+to it by least squares. The covariance that the steady filter assumes for the initial state then has no influence.
+Where q is 0, C is D and the innovations are output error's residual. Sources: Maine & Iliff, SIAM J. Appl. Math.
+41 (1981) 558–579, doi 10.1137/0141046 (also the scoring); Åström, Automatica 16 (1980) 551–574, doi
+10.1016/0005-1098(80)90078-3; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 5.
 """
 
 from __future__ import annotations
@@ -37,17 +31,15 @@ _DOUBLINGS = 30  # of the Riccati equation: 2^30 steps of the filter
 
 
 def discretised(dynamics: Array, drive: Array, interval: float | Array) -> tuple[Array, Array]:
-    """Linear dynamics driven by white noise, over one sample interval: one system, or many at once.
+    """Transition and disturbance covariance of linear dynamics driven by white noise, over one sample interval.
 
-    Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395–404, doi 10.1109/TAC.1978.1101743.
+    One system, or many at once. Van Loan, IEEE Trans. Automat. Contr. 23 (1978) 395–404, doi
+    10.1109/TAC.1978.1101743.
 
     Args:
         dynamics: of the state, shape (n, n) or (systems, n, n), 1/s in SI units of the state.
         drive: spectral intensity of the noise on the state, of the same shape, in SI units squared per s.
         interval: s; shape (systems,) for many.
-
-    Returns:
-        Transition and covariance of the disturbance, in SI units, of the shape of ``dynamics``.
     """
     size = dynamics.shape[-1]
     block = np.zeros((*dynamics.shape[:-2], 2 * size, 2 * size))
@@ -70,10 +62,27 @@ def steady_filters(
         variance: of the noise of a reading, shape (systems,), rad².
 
     Returns:
-        For each system numerator and denominator, shape (n + 1,) each, of the filter from readings to innovations,
-        and the variance of the innovations, rad²; infinite where the filter does not settle.
+        For each system numerator and denominator, shape (n + 1,) each, of the filter from readings to
+        innovations, and the variance of the innovations, rad²; infinite where the filter does not settle.
     """
-    covariance = _steady_covariance(transition, disturbance, variance)
+    # Prediction covariance of the filters: their Riccati equation by doubling (Anderson, Int. J. Control 28 (1978)
+    # 295–306, doi 10.1080/00207177808922455).
+    a = np.swapaxes(transition, 1, 2).copy()
+    g = np.zeros_like(a)
+    g[:, 0, 0] = 1.0 / variance
+    covariance = disturbance
+    identity = np.eye(transition.shape[1])
+    with np.errstate(all="ignore"):  # a diverging trial is refused by its spread
+        for _ in range(_DOUBLINGS):
+            inverted = np.linalg.inv(identity + g @ covariance)
+            left = a @ inverted
+            grown = covariance + np.swapaxes(a, 1, 2) @ covariance @ inverted @ a
+            g = g + left @ g @ np.swapaxes(a, 1, 2)
+            a = left @ a
+            done = np.max(np.abs(grown - covariance)) <= 1e-12 * np.max(np.abs(grown))
+            covariance = 0.5 * (grown + np.swapaxes(grown, 1, 2))
+            if done:
+                break
     spread = covariance[:, 0, 0] + variance
     gain = np.einsum("rij,rj->ri", transition, covariance[:, :, 0]) / spread[:, None]
     closed = transition.copy()
@@ -96,31 +105,6 @@ def _characteristic(matrices: Array) -> Array:
         found[:, k] = -np.trace(product, axis1=1, axis2=2) / k
         power = product + found[:, k, None, None] * np.eye(size)
     return found
-
-
-def _steady_covariance(transition: Array, disturbance: Array, variance: Array) -> Array:
-    """Prediction covariance of the steady filters, shape (systems, n, n): their Riccati equation by doubling.
-
-    Anderson, Int. J. Control 28 (1978) 295–306, doi 10.1080/00207177808922455.
-    """
-    size = transition.shape[1]
-    a = np.swapaxes(transition, 1, 2).copy()
-    g = np.zeros_like(a)
-    g[:, 0, 0] = 1.0 / variance
-    h = disturbance
-    identity = np.eye(size)
-    with np.errstate(all="ignore"):  # a diverging trial is refused by its spread
-        for _ in range(_DOUBLINGS):
-            inverse = np.linalg.inv(identity + g @ h)
-            left = a @ inverse
-            grown = h + np.swapaxes(a, 1, 2) @ h @ inverse @ a
-            g = g + left @ g @ np.swapaxes(a, 1, 2)
-            a = left @ a
-            done = np.max(np.abs(grown - h)) <= 1e-12 * np.max(np.abs(grown))
-            h = 0.5 * (grown + np.swapaxes(grown, 1, 2))
-            if done:
-                break
-    return h
 
 
 @dataclass(frozen=True)
@@ -175,13 +159,17 @@ def innovations(
         response: to a known input of unit gain, shape (n,), rad per unit of gain; None where there is none.
 
     Returns:
-        The innovations; None where the model is out of range.
+        None where the model is out of range.
     """
     time = interval * np.arange(values.size, dtype=np.float64)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = response_rows(time, model.decay)[:2]
-    known = () if response is None else (response,)
-    columns = np.vstack((values, motion, np.ones_like(time), *_started_by_moment(time, model), *known))
+    known = [] if response is None else [response]
+    if model.corner is not None and model.intensity != 0.0:
+        # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion, which
+        # is among the columns already.
+        known.insert(0, np.exp(-2.0 * np.pi * model.corner * time))
+    columns = np.vstack((values, motion, np.ones_like(time), *known))
     if not np.isfinite(columns).all():
         return None
     variance = noise_variance
@@ -211,17 +199,8 @@ def innovations(
     return Innovations(left, variance, cost, float(solution[-1]) / length, gain_variance)
 
 
-def _started_by_moment(time: Array, model: Driven) -> tuple[Array, ...]:
-    # A moment that is not white has an unknown initial value. Its response is e^(−ct) less a free motion, which is
-    # among the columns already.
-    if model.corner is None or model.intensity == 0.0:
-        return ()
-    return (np.exp(-2.0 * np.pi * model.corner * time),)
-
-
 def _factored(interval: float, model: Driven, noise_variance: float) -> tuple[Array, Array, float] | None:
     # D, C and the innovations' variance.
-    # Transition and covariance of the disturbance over one interval.
     a, k = model.decay.rate, model.decay.stiffness
     if model.corner is None:
         dynamics = np.array([[0.0, 1.0], [-k, -2.0 * a]])
@@ -267,7 +246,6 @@ class DrivenFit:
 
     Args:
         covariance: of (a, k, ln q), shape (3, 3).
-        drop: of −2 ln L against no random moment at all, dimensionless.
         gained: covariance of (a, k, g) with the gain g of a known input, shape (3, 3); zeros for g where there is
             none, or where it is k.
     """
@@ -275,7 +253,7 @@ class DrivenFit:
     model: Driven
     covariance: Array
     innovations: Innovations
-    drop: float
+
     gained: Array
 
 
@@ -285,7 +263,6 @@ class KnownInput:
 
     Args:
         response: to unit gain at the values of the fit, shape (n,), as a function of the decay.
-        by_root: whether it acts through the spring, so that its gain is k.
     """
 
     response: Callable[[Decay], Array]
@@ -300,18 +277,17 @@ def fit_driven(
     noise_variance: float,
     known: KnownInput | None = None,
 ) -> DrivenFit | None:
-    """Fit a driven decay.
+    """Fit a driven decay; None where no random moment is needed to explain the run.
+
+    The start is the optimum of output error with the best of a range of intensities. Each step solves Fisher's
+    information, from central differences of the innovations and of their variance, against the gradient of the
+    likelihood.
 
     Args:
         values: block means of one run, shape (n,), rad.
         interval: between them, s.
-        start: output error's decay.
         deviations: its standard deviations of (a, k), shape (2,), in 1/s and 1/s².
         noise_variance: of one block mean, rad².
-        known: the input of a driven run; None of a free decay.
-
-    Returns:
-        The fit; None where no random moment is needed to explain the run.
     """
     fit = _DrivenLikelihood(values, interval, noise_variance, deviations, known)
     bare = fit.at(Driven(start, 0.0))
@@ -324,7 +300,7 @@ def fit_driven(
         return None
     if bare.cost - found.innovations.cost > MOMENT_DROP_FOR_CORNER:
         found = fit.with_corner(found)
-    return replace(found, drop=bare.cost - found.innovations.cost, gained=fit.with_gain(found))
+    return replace(found, gained=fit.with_gain(found))
 
 
 class _DrivenLikelihood:
@@ -382,10 +358,21 @@ class _DrivenLikelihood:
     def maximise(self, model: Driven) -> DrivenFit | None:
         here = self.at(model)
         for _ in range(_MAX_STEPS):
-            system = None if here is None else self._system(model, here)
-            if here is None or system is None:
+            if here is None:
                 return None
-            information, gradient = system
+            # Fisher's information and minus half the gradient of −2 ln L.
+            slopes, logs = [], []
+            for i, nudge in enumerate(self.nudges):
+                away = nudge * np.eye(3)[i]
+                ahead, back = self.at(_moved(model, away)), self.at(_moved(model, -away))
+                if ahead is None or back is None:
+                    return None
+                slopes.append((ahead.values - back.values) / (2.0 * nudge))
+                logs.append(np.log(ahead.variance / back.variance) / (2.0 * nudge))
+            slope, log = np.array(slopes), np.array(logs)
+            count, power = here.values.size, float(here.values @ here.values) / here.variance
+            information = slope @ slope.T / here.variance + 0.5 * count * np.outer(log, log)
+            gradient = -slope @ here.values / here.variance + 0.5 * (power - count) * log
             try:
                 step = scaled_solve(information, gradient)
                 covariance = inverse(information)
@@ -393,35 +380,16 @@ class _DrivenLikelihood:
                 return None
             step[2] = np.clip(step[2], -2.0, 2.0)
             size = float(np.max(np.abs(step) / np.sqrt(np.diag(covariance))))
-            moved = self._search(model, here, step)
-            if moved is not None:
-                model, here = moved
-            if moved is None or size < _SETTLED:
-                return DrivenFit(model, covariance, here, 0.0, np.zeros((3, 3)))
+            lower = False
+            for factor in (1.0, 0.5, 0.25, 0.0625):
+                trial = _moved(model, factor * step)
+                there = self.at(trial)
+                if there is not None and there.cost < here.cost:
+                    model, here, lower = trial, there, True
+                    break
+            if not lower or size < _SETTLED:
+                return DrivenFit(model, covariance, here, np.zeros((3, 3)))
         return None
-
-    def _search(self, model: Driven, here: Innovations, step: Array) -> tuple[Driven, Innovations] | None:
-        for factor in (1.0, 0.5, 0.25, 0.0625):
-            trial = _moved(model, factor * step)
-            there = self.at(trial)
-            if there is not None and there.cost < here.cost:
-                return trial, there
-        return None
-
-    def _system(self, model: Driven, here: Innovations) -> tuple[Array, Array] | None:
-        # Fisher's information and minus half the gradient of −2 ln L.
-        slopes, logs = [], []
-        for i, nudge in enumerate(self.nudges):
-            away = nudge * np.eye(3)[i]
-            ahead, back = self.at(_moved(model, away)), self.at(_moved(model, -away))
-            if ahead is None or back is None:
-                return None
-            slopes.append((ahead.values - back.values) / (2.0 * nudge))
-            logs.append(np.log(ahead.variance / back.variance) / (2.0 * nudge))
-        slope, log = np.array(slopes), np.array(logs)
-        count, power = here.values.size, float(here.values @ here.values) / here.variance
-        information = slope @ slope.T / here.variance + 0.5 * count * np.outer(log, log)
-        return information, -slope @ here.values / here.variance + 0.5 * (power - count) * log
 
 
 def _moved(model: Driven, step: Array) -> Driven:

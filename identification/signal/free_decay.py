@@ -1,16 +1,11 @@
-"""The free decay β̈ + 2aβ̇ + kβ = 0 and its sensitivities, in closed form for any damping.
+"""The free decay β̈ + 2aβ̇ + kβ = 0 and its sensitivities, in closed form for any damping; rad and s.
 
-With decay rate a = C/(2 Izz) [1/s], normalised stiffness k = K/Izz [1/s²] and Δ = k − a², the response is
-
-    β(t) = β₀ u(t) + r₀ s(t),   s = e^{−at} S(t),   u = e^{−at} C(t) + a s,
-
-where C = cos(√Δ t) and S = sin(√Δ t)/√Δ are entire functions of Δ: one formula covers under-, over- and
-critical damping. All derivatives with respect to a and k are combinations of only two more functions,
-w = e^{−at} ∂S/∂Δ and t s(t):
+With a = C/(2 Izz) [1/s], k = K/Izz [1/s²] and Δ = k − a²: β(t) = β₀ u(t) + r₀ s(t), s = e^{−at} S(t), u = e^{−at}
+C(t) + a s, where C = cos(√Δ t) and S = sin(√Δ t)/√Δ are entire functions of Δ. All derivatives with respect to a
+and k are combinations of only two more functions, w = e^{−at} ∂S/∂Δ and t s(t):
 
     ∂u/∂a = −2k w,   ∂u/∂k = a w − t s/2,   ∂s/∂a = −t s − 2a w,   ∂s/∂k = w.
 
-Angles in rad, times in s. Near Δt² = 0 a power series replaces the quotients, so nothing is singular.
 Source: the characteristic equation (6) of the paper; the derivatives were derived for this project.
 """
 
@@ -69,33 +64,47 @@ class Decay:
 
 
 def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array:
-    """The four functions of time that make up a decay and its sensitivities.
+    """Unit-angle and unit-rate response of a decay, and the two functions of its sensitivities.
 
     Args:
         time: times since the initial state, shape (n,), s.
         constant: whether a row of ones, the sensor's zero, comes last.
 
     Returns:
-        Rows u [-], s [s], w [s³], t·s [s²], shape (4, n) or (5, n): unit-angle response, unit-rate response, and
-        the two functions of the derivatives.
+        Rows u [-], s [s], w [s³], t·s [s²], shape (4, n) or (5, n).
     """
     delta = decay.stiffness - decay.rate**2
     rows = np.empty((5 if constant else 4, time.size))
     rows[4:] = 1.0
     unit, sine, slope, ramp = rows[:4]
-    cosine, sine[:] = _oscillating(time, decay.rate, delta) if delta >= 0.0 else _creeping(time, decay, delta)
+    if delta >= 0.0:
+        omega = sqrt(delta)
+        decaying, phase = np.exp(-decay.rate * time), omega * time
+        cosine = decaying * np.cos(phase)
+        sine[:] = decaying * np.sin(phase) / omega if omega > 0.0 else 0.0
+    else:  # two real exponents; the root nearer to zero comes from the product of both, k, to keep its digits
+        mu = sqrt(-delta)
+        far = decay.rate + (mu if decay.rate >= 0.0 else -mu)
+        near = decay.stiffness / far
+        fast, slow = np.exp(-far * time), np.exp(-near * time)
+        cosine = 0.5 * (slow + fast)
+        sine[:] = (slow - fast) / (far - near)
     if delta != 0.0:
         np.multiply(time, cosine, out=slope)
         slope -= sine
         slope *= 0.5 / delta
     small = np.flatnonzero(np.abs(time) < sqrt(_SERIES_LIMIT / abs(delta))) if delta != 0.0 else slice(None)
-    near = time[small]
-    if near.size:
-        decaying = np.exp(-decay.rate * near)
-        x = delta * near**2
-        series = _polynomials(x, _SERIES)
-        sine[small] = decaying * near * series[0]
-        slope[small] = decaying * near**3 * series[1]
+    early = time[small]
+    if early.size:  # near Δt² = 0 a power series replaces the quotients, so nothing is singular
+        decaying = np.exp(-decay.rate * early)
+        x = delta * early**2
+        series = np.empty((2, x.size))
+        series[:] = _SERIES[-1, :, None]
+        for coefficient in _SERIES[-2::-1, :, None]:  # Horner's rule
+            series *= x
+            series += coefficient
+        sine[small] = decaying * early * series[0]
+        slope[small] = decaying * early**3 * series[1]
     np.multiply(sine, decay.rate, out=unit)
     unit += cosine
     np.multiply(time, sine, out=ramp)
@@ -103,30 +112,21 @@ def response_rows(time: Array, decay: Decay, *, constant: bool = False) -> Array
 
 
 def free_decay(time: Array, decay: Decay, angle: float, rate: float) -> Array:
-    """Yaw angle of the free decay.
+    """Yaw angle of the free decay, shape (n,), rad.
 
     Args:
         time: times since the initial state, shape (n,), s.
         angle: initial angle β₀, rad.
         rate: initial rate r₀, rad/s.
-
-    Returns:
-        β(t), shape (n,), rad.
     """
     rows = response_rows(time, decay)
     return np.asarray(angle * rows[0] + rate * rows[1])
 
 
 def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
-    """Weights of the rows of `response_rows` in ∂β/∂a and ∂β/∂k.
+    """Weights of the rows of `response_rows` in ∂β/∂a [rad s] and ∂β/∂k [rad s²], shape (2, 4).
 
-    Args:
-        angle: initial angle β₀, rad.
-        rate: initial rate r₀, rad/s.
-
-    Returns:
-        Shape (2, 4): ``sensitivity_weights(...) @ response_rows(...)`` is (∂β/∂a, ∂β/∂k),
-        in rad s and rad s².
+    The arguments as in `free_decay`.
     """
     a, k = decay.rate, decay.stiffness
     return np.array(
@@ -138,42 +138,10 @@ def sensitivity_weights(decay: Decay, angle: float, rate: float) -> Array:
 
 
 def envelope_amplitude(decay: Decay, angle: float, rate: float) -> float:
-    """Amplitude of the decaying oscillation at the time of its initial state.
+    """√(β₀² + ((r₀ + aβ₀)/ωd)²), the envelope at the time of the initial state; |β₀| where nothing oscillates.
 
-    Args:
-        angle: initial angle β₀, rad.
-        rate: initial rate r₀, rad/s.
-
-    Returns:
-        √(β₀² + ((r₀ + aβ₀)/ωd)²), rad; |β₀| where the motion does not oscillate.
+    In rad, with arguments as in `free_decay`.
     """
     if decay.omega_d == 0.0:
         return abs(angle)
     return float(np.hypot(angle, (rate + decay.rate * angle) / decay.omega_d))
-
-
-def _oscillating(time: Array, rate: float, delta: float) -> tuple[Array, Array]:
-    omega = sqrt(delta)
-    decaying = np.exp(-rate * time)
-    phase = omega * time
-    sine = decaying * np.sin(phase) / omega if omega > 0.0 else np.zeros_like(time)
-    return decaying * np.cos(phase), sine
-
-
-def _creeping(time: Array, decay: Decay, delta: float) -> tuple[Array, Array]:
-    # Two real exponents. The root nearer to zero comes from the product of both, k, to keep its digits.
-    mu = sqrt(-delta)
-    far = decay.rate + (mu if decay.rate >= 0.0 else -mu)
-    near = decay.stiffness / far
-    fast, slow = np.exp(-far * time), np.exp(-near * time)
-    return 0.5 * (slow + fast), (slow - fast) / (far - near)
-
-
-def _polynomials(x: Array, coefficients: Array) -> Array:
-    # Horner's rule for several at once; the coefficients start at the constant, shape (terms, polynomials).
-    total = np.empty((coefficients.shape[1], x.size))
-    total[:] = coefficients[-1, :, None]
-    for coefficient in coefficients[-2::-1, :, None]:
-        total *= x
-        total += coefficient
-    return total

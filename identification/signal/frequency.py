@@ -1,8 +1,6 @@
-"""The frequency of a record, and with it the decay that a fit starts from.
+"""What a record shows before any fit: its frequency, its peaks, its poles, and the decay that a fit starts from.
 
-The frequency is that of the highest peak of the power spectral density. From it and the record alone follow
-starting values of a fit at any damping. A record is refused here for numerical reasons only; the methods judge
-everything else.
+A record is refused here for numerical reasons only; the methods judge everything else.
 """
 
 from __future__ import annotations
@@ -11,8 +9,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.fft import irfft, next_fast_len, rfft
 
-from identification.policy import LEAST_SAMPLES
+from identification.policy import LEAST_NOISE, LEAST_PEAK_SHARE, LEAST_SAMPLES
 from identification.signal.decay_fit import Reading, mean_of_blocks, projected_cost
 from identification.signal.free_decay import Decay
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
@@ -25,9 +25,7 @@ _ROUNDING = 1e-12  # of the largest reading: a few thousand rounding errors, in 
 def holds_motion(record: Record) -> bool:
     """Whether a record has enough samples, and a reading that changes by more than rounding.
 
-    Returns:
-        False for a record of fewer than eight samples, for a constant one, and for one whose numbers are so large
-        or small that their squares cannot be summed.
+    Numbers so large or small that their squares cannot be summed hold none.
     """
     if record.time_s.size < LEAST_SAMPLES:
         return False
@@ -63,16 +61,13 @@ class SpectralPeak:
 
 
 def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) -> SpectralPeak:
-    """The damped frequency, as the peak of the power spectral density.
+    """The damped frequency, as the peak of the power spectral density of the record without its mean.
 
-    The mean is removed. A Hann window keeps the offset and the negative frequencies from leaking into the peak. The
-    record is padded with zeros to at least eight times its length. A parabola through the logarithms of the three
-    highest bins gives the peak between them.
+    A Hann window keeps the offset and the negative frequencies from leaking into the peak.
 
     Args:
-        record: the reading, n samples, rad against s.
-        padding: the record is padded to at least this number of times its length; 1 is faster, and good enough to
-            start a fit of many cycles.
+        padding: the record is padded with zeros to at least this number of times its length; 1 is faster, and
+            good enough to start a fit of many cycles.
         falling: whether the window falls from the start of the record, instead of rising first: it then sees a
             decay that ends long before the record does.
     """
@@ -92,33 +87,32 @@ def psd_peak(record: Record, *, padding: int = _PADDING, falling: bool = False) 
 
 
 def highest_peak(values: Array, size: int, lowest: int = 1) -> tuple[float, Array]:
-    """Where the spectrum of a series is highest, between its bins.
+    """Where the spectrum of a series is highest, in bins, and the power, shape (size // 2 + 1,).
+
+    The place is that of a parabola through the logarithms of the three highest bins.
 
     Args:
         values: the series, windowed, without its mean, shape (n,).
         size: number of samples it is padded to with zeros, at least n.
         lowest: first bin to be considered; the last bin is never considered.
-
-    Returns:
-        The place of the peak in bins, by a parabola through the logarithms of the three highest; and the power,
-        shape (size // 2 + 1,).
     """
     power = np.abs(np.fft.rfft(values, size)) ** 2
     peak = lowest + int(np.argmax(power[lowest:-1]))
-    return peak + _parabola_offset(power[peak - 1 : peak + 2]), power
+    low, middle, high = np.log(np.maximum(power[peak - 1 : peak + 2], 1e-300))
+    curvature = low - 2.0 * middle + high
+    offset = 0.0 if curvature >= 0.0 else float(np.clip(0.5 * (low - high) / curvature, -0.5, 0.5))
+    return peak + offset, power
 
 
 def peak_of_swing(swing: Array, size: int) -> float:
-    """Where the spectrum of a decay is highest, between its bins.
+    """Where the spectrum of a decay is highest, in bins, with a Hann window.
+
+    A peak below two cycles of the series is none of the motion's: a heavily damped one is over before the middle
+    of the series. It is then sought with a window that falls from the start.
 
     Args:
         swing: the series without its mean, shape (n,), any unit.
         size: number of samples it is padded to with zeros, at least n.
-
-    Returns:
-        The place of the peak in bins, with a Hann window. A peak below two cycles of the series is none of the
-        motion's: a heavily damped one is over before the middle of the series. It is then sought with a window that
-        falls from the start.
     """
     place, _ = highest_peak(swing * _window(swing.size, falling=False), size)
     per_cycle = size / swing.size
@@ -132,29 +126,17 @@ def _window(size: int, falling: bool) -> Array:
     return read_only(np.hanning(2 * size)[size:] if falling else np.hanning(size))
 
 
-def _parabola_offset(power: Array) -> float:
-    # Where the parabola through three log powers peaks, in bins from the middle one, at most one half.
-    low, middle, high = np.log(np.maximum(power, 1e-300))
-    curvature = low - 2.0 * middle + high
-    if curvature >= 0.0:
-        return 0.0
-    return float(np.clip(0.5 * (low - high) / curvature, -0.5, 0.5))
-
-
 _SAMPLES = 1024  # candidates are compared on a thinned record; the fit itself uses every sample
 _LONG = 4096  # samples for the spectrum; a longer record is thinned to them and not padded
 _DAMPING_RATIOS = (0.0, 0.002, 0.006, 0.02, 0.06, 0.2, 0.5)
 
 
 def starting_decay(record: Record) -> Decay | None:
-    """A decay close enough for the least-squares fit to converge.
+    """A decay close enough for the least-squares fit to converge; None where none fits or nothing moves.
 
     For records of many cycles the candidates are the peak of the power spectral density with several damping
-    ratios; for heavily damped ones, the fit of the twice integrated equation of motion. The candidate with the
-    smallest sum of squares is taken.
-
-    Returns:
-        The decay; None where the record holds no motion, or no decay fits it at all.
+    ratios; for heavily damped ones, the fit of the twice integrated equation of motion. That of the smallest sum
+    of squares is taken.
     """
     frequency = starting_frequency(record)
     if frequency is None:
@@ -178,11 +160,7 @@ def starting_decay(record: Record) -> Decay | None:
 
 
 def starting_frequency(record: Record) -> float | None:
-    """The approximate frequency of the strongest oscillation.
-
-    Returns:
-        Hz; None where the record holds no motion.
-    """
+    """The approximate frequency of the strongest oscillation, Hz; None where the record holds no motion."""
     if not holds_motion(record):
         return None
     # A block mean hides an oscillation of two samples per cycle or fewer: a record of some two thousand cycles.
@@ -194,13 +172,10 @@ def starting_frequency(record: Record) -> float | None:
 
 
 def thinned_reading(record: Record, frequency: float) -> Reading:
-    """Block means of a record, at least twenty per cycle; they decay at the same rate.
+    """Block means of a record, at least twenty per cycle, about a thousand of a long one; the clock starts at 0.
 
     Args:
         frequency: of its oscillation, Hz.
-
-    Returns:
-        The thinned reading, about a thousand samples of a long record; its clock starts at the first sample.
     """
     factor = max(1, min(record.time_s.size // _SAMPLES, int(record.sample_rate / (20.0 * frequency))))
     return Reading(
@@ -211,3 +186,217 @@ def thinned_reading(record: Record, frequency: float) -> Reading:
 def _integral(time: Array, values: Array) -> Array:
     steps = np.diff(time) * 0.5 * (values[1:] + values[:-1])
     return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+PEAK_HALF_WIDTH = 1.0 / 12.0  # of a period, either side of a peak, that its parabola is fitted to
+_LEAST_SAMPLES = 1.5001  # either side of a peak, whose parabola needs three
+_LEAST_PEAKS = 4
+_MOVES = 8  # of half a window each
+
+
+@dataclass(frozen=True)
+class PeakDecay:
+    """Damping and scatter of the peaks.
+
+    Args:
+        rate: decay rate σ, 1/s; the time to half amplitude is ln 2/σ.
+        rate_std: its standard deviation from the scatter of the peaks about their line, 1/s.
+        frequency_std: standard deviation of the frequency from the scatter of the peaks' instants, Hz.
+        zero: the sensor's zero, rad.
+        zero_std: its standard deviation from the scatter of the peaks, rad.
+    """
+
+    rate: float
+    rate_std: float
+    frequency_std: float
+    zero: float
+    zero_std: float
+
+
+def peak_decay(record: Record, frequency: float) -> PeakDecay | None:
+    """The decay rate from a line through the logarithm of the peaks, of both signs, against time.
+
+    The zero is the mean of (p₁ + 2p₂ + p₃)/4 over neighbouring peaks, which lie evenly on both sides of it. Peaks
+    are followed until they fall below a tenth of the first. None where there are fewer than four.
+
+    Args:
+        frequency: of the oscillation, Hz.
+    """
+    times, heights = follow_peaks(record, frequency)
+    if times.size < _LEAST_PEAKS:
+        return None
+    centres = 0.25 * (heights[:-2] + 2.0 * heights[1:-1] + heights[2:])
+    zero = float(centres.mean())
+    sizes = np.abs(heights - zero)
+    below = np.flatnonzero(sizes < LEAST_PEAK_SHARE * sizes[0])
+    count = int(below[0]) if below.size else sizes.size
+    if count < _LEAST_PEAKS:
+        return None
+    slope, slope_std = _line(times[:count], np.log(sizes[:count]))
+    period_half, period_std = _line(np.arange(count, dtype=np.float64), times[:count])
+    return PeakDecay(
+        rate=-slope,
+        rate_std=max(slope_std, LEAST_NOISE * frequency),
+        frequency_std=max(0.5 * period_std / period_half**2, LEAST_NOISE * frequency),
+        zero=zero,
+        zero_std=max(float(centres.std(ddof=1) / np.sqrt(centres.size)), LEAST_NOISE * float(sizes[0])),
+    )
+
+
+def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> tuple[Array, Array]:
+    """Peaks of both signs, each looked for half a period after the one before; the first past the release itself.
+
+    A peak is the vertex of a parabola through the samples within a twelfth of a period of it.
+
+    Args:
+        frequency: of the oscillation, Hz.
+        sparse: whether three samples make a peak where a twelfth of a period holds fewer, as noise does too.
+
+    Returns:
+        Instants since the first sample in s and heights in rad, shape (n,) each; they end where peaks no longer
+        alternate.
+    """
+    time = record.time_s - record.time_s[0]
+    half = 0.5 / frequency
+    width = PEAK_HALF_WIDTH / frequency
+    if sparse:
+        width = max(width, _LEAST_SAMPLES * float(np.median(np.diff(time))))
+    middle = 0.5 * (float(record.yaw_rad.max()) + float(record.yaw_rad.min()))
+    search = np.flatnonzero((time >= 0.25 * half) & (time <= 1.25 * half))
+    times: list[float] = []
+    heights: list[float] = []
+    expected = np.inf
+    if search.size:
+        expected = float(time[search[np.argmax(np.abs(record.yaw_rad[search] - middle))]])
+    while expected + width <= time[-1]:
+        vertex = _vertex(time, record.yaw_rad, expected, width)
+        if vertex is None:
+            break
+        if len(heights) >= 2 and (vertex[1] > heights[-1]) != (heights[-2] > heights[-1]):
+            break  # peaks no longer alternate: the oscillation is lost in the noise
+        times.append(vertex[0])
+        heights.append(vertex[1])
+        expected = vertex[0] + half
+    return np.array(times), np.array(heights)
+
+
+def _vertex(time: Array, yaw: Array, expected: float, width: float) -> tuple[float, float] | None:
+    # Where the period drifts, a peak is not at the expected instant: the window follows it.
+    for _ in range(_MOVES):
+        low, high = np.searchsorted(time, (expected - width, expected + width))
+        if high - low < 3:
+            return None
+        x = (time[low:high] - expected) / width
+        bend, slope, height = np.polyfit(x, yaw[low:high], 2)
+        place = -0.5 * slope / bend if bend != 0.0 else np.inf
+        if abs(place) <= 0.5:
+            return expected + float(place) * width, float(height + 0.5 * slope * place)
+        # Move up the slope: with curvature of the wrong sign the vertex would lie on the other side.
+        rising = slope * np.sign(yaw[low:high].mean() - yaw.mean()) > 0.0
+        expected += (0.5 if rising else -0.5) * width
+    return None
+
+
+def _line(x: Array, y: Array) -> tuple[float, float]:
+    # Gradient and its standard deviation.
+    centred = x - x.mean()
+    spread = float(centred @ centred)
+    gradient = float(centred @ y) / spread
+    residual = y - y.mean() - gradient * centred
+    return gradient, float(np.sqrt(residual @ residual / (x.size - 2) / spread))
+
+
+_LENGTH = 0.35  # rows over blocks: a third is best at light damping, and more hardly helps elsewhere
+_LEAST_BLOCKS = 8
+_DENSE = 64  # values up to which a full decomposition is faster than the iteration, which noise alone slows
+_MAX_SWEEPS = 60
+_SETTLED = 1e-10  # change of the subspace in a sweep
+
+
+@dataclass(frozen=True, eq=False)
+class PencilDecay:
+    """A decay and its sensitivity to the noise.
+
+    Args:
+        weights: first-order change of (a, k) per rad of each value, shape (2, n).
+    """
+
+    decay: Decay
+    weights: Array
+
+
+def pencil_decay(values: Array, interval: float, omega: float) -> PencilDecay | None:
+    """The decay of uniformly spaced values by the matrix pencil; None where they are too few, or hold none.
+
+    The Hankel matrix of a decay, with the mean of each row removed, has rank two. A shift by one value maps its
+    column space onto itself, and the eigenvalues of this 2×2 map are the exponentials of the poles. The two
+    leading singular vectors of a long record are found by orthogonal iteration with products by FFT. Sources: Hua
+    & Sarkar, IEEE Trans. Acoust. Speech Signal Process. 38 (1990) 814–824, doi 10.1109/29.56027 (perturbation,
+    best length); Juang & Pappa, J. Guid. Control Dyn. 8 (1985) 620–627, doi 10.2514/3.20031 (rank reduction).
+
+    Args:
+        values: readings or block means of them, offset included, shape (n,), rad.
+        interval: between them, s; well below half a period.
+        omega: an approximate angular frequency to start the iteration, rad/s.
+    """
+    if values.size < _LEAST_BLOCKS:
+        return None
+    rows = max(3, round(_LENGTH * values.size))
+    left, sizes, right = _leading_pair(values - values.mean(), rows, omega * interval)
+    if not sizes[1] > 1e-12 * sizes[0] > 0.0:
+        return None
+    upper, lower = left[:-1], left[1:]
+    solver = np.linalg.pinv(upper)
+    poles, vectors = np.linalg.eig(solver @ lower)
+    # Two real poles are an overdamped decay; a pole at or below zero is not a decay.
+    if np.any((np.abs(poles.imag) == 0.0) & (poles.real <= 0.0)) or np.linalg.cond(vectors) > 1e8:
+        return None
+    exponents = np.log(poles.astype(np.complex128)) / interval
+    vectors = vectors.astype(np.complex128)
+    duals = np.linalg.inv(vectors) @ solver
+    images = right.astype(np.complex128) @ (vectors / sizes[:, None])
+    gradients = []
+    for pole, dual, image in zip(poles, duals, images.T, strict=True):
+        # To first order δλ = Σᵢⱼ q(i) e(i + j) v(j) with the noise e: q is the shift's residual on the dual vector;
+        # the mean of v is removed, like that of the rows.
+        q = np.zeros(dual.size + 1, dtype=np.complex128)
+        q[1:] += dual
+        q[:-1] -= pole * dual
+        gradients.append(np.convolve(q, image - image.mean()) / (pole * interval))
+    stiffness = exponents[0] * exponents[1]
+    slope = np.array(
+        [
+            -0.5 * (gradients[0] + gradients[1]),
+            exponents[1] * gradients[0] + exponents[0] * gradients[1],
+        ]
+    )
+    decay = Decay(float(-0.5 * (exponents[0] + exponents[1]).real), float(stiffness.real))
+    return PencilDecay(decay, np.ascontiguousarray(slope.real))
+
+
+def _leading_pair(values: Array, rows: int, angle: float) -> tuple[Array, Array, Array]:
+    """Left vectors (rows, 2), singular values (2,), right vectors (columns, 2) of the row-centred Hankel matrix."""
+    columns = values.size - rows + 1
+    if values.size <= _DENSE:
+        hankel = sliding_window_view(values, columns)
+        vectors, sizes, turn = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)
+        return vectors[:, :2], sizes[:2], turn[:2].T
+    size = next_fast_len(values.size, real=True)
+    spectrum = rfft(values, size)[:, None]
+
+    def times(block: Array, count: int) -> Array:
+        return np.asarray(irfft(spectrum * rfft(block, size, axis=0).conj(), size, axis=0)[:count])
+
+    steps = angle * np.arange(columns)[:, None]
+    right = np.hstack((np.cos(steps), np.sin(steps)))
+    right = np.linalg.qr(right - right.mean(axis=0))[0]
+    for _ in range(_MAX_SWEEPS):
+        left = np.linalg.qr(times(right, rows))[0]
+        image = times(left, columns)
+        image -= image.mean(axis=0)
+        before = right
+        right = np.linalg.qr(image)[0]
+        if np.linalg.norm(right - before @ (before.T @ right)) < _SETTLED:
+            break
+    vectors, sizes, turn = np.linalg.svd(image, full_matrices=False)
+    return left @ turn.T, sizes, vectors

@@ -1,9 +1,8 @@
 """The noise of the sensor, and whether the residual of a fit is that noise and nothing else.
 
-White noise has the same power at low and high frequencies. The fast part of a residual (its sixth differences)
-holds only noise, whatever the model. The slow part (means over an eighth of a cycle) also holds what the model
-does not explain, in the band of the oscillation, which determines the parameters. Their ratio is tested by F.
-Quantisation adds resolution²/12 to the variance.
+The fast part of a residual (its sixth differences) holds only noise, whatever the model. The slow part (means
+over an eighth of a cycle) also holds what the model does not explain, in the band of the oscillation, which
+determines the parameters. White noise has the same power in both: their ratio is tested by F.
 """
 
 from __future__ import annotations
@@ -34,7 +33,6 @@ class Residual:
 
     Args:
         values: reading less model, shape (n,), rad.
-        block: samples in an eighth of a cycle.
         unknowns: number of parameters fitted to the run's own data.
         peak: largest distance of the reading from the sensor's zero, rad.
     """
@@ -63,13 +61,7 @@ def stated_noise(sensor: SensorProperties) -> float | None:
 
 
 def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> NoiseLevel:
-    """The noise level behind the standard deviations, checked against the residuals.
-
-    The stated noise is used where the residuals agree with it; otherwise the level of the residuals is used.
-
-    Returns:
-        The level, with the verdicts on the model (``departs``) and on the statement (``disagrees``).
-    """
+    """The noise level behind the standard deviations: the stated one where the residuals agree, else theirs."""
     floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
@@ -81,7 +73,16 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     stated = None if stated is None else max(stated, floor)
     bears_out = stated is not None and _agree(fast, stated, degrees)
     reference = stated if stated is not None and bears_out else fast
-    ratio, departs = _slow_part(residuals, reference, np.inf if bears_out else degrees)
+    # Power of the block means relative to white noise of the reference level, and the verdict by F.
+    power, freedom, ratio, departs = 0.0, 0, 1.0, False
+    for residual in residuals:
+        own, blocks = slow_power(residual.values, residual.block)
+        power += own
+        freedom += blocks - residual.unknowns
+    if freedom >= 3:
+        ratio = power / freedom / reference**2
+        chance = float(fdtri(freedom, min(np.inf if bears_out else degrees, 1e9), 1.0 - MISFIT_RATE))
+        departs = bool(ratio > chance * (1.0 + NOISE_TOLERANCE) ** 2)
     if not departs and bears_out and stated is not None:
         bears_out = _agree(total, stated, count - unknowns)
     used = reference if departs or (bears_out and stated is not None) else total
@@ -89,21 +90,18 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
         std=used,
         source="stated" if bears_out else "residual",
         residual_std=total,
-        slow_ratio=ratio if departs else 1.0,
+        slow_ratio=max(ratio, 1.0) if departs else 1.0,
         departs=departs,
         disagrees=stated is not None and not bears_out,
     )
 
 
 def white_noise(reading: Array, sensor: SensorProperties) -> float:
-    """The white part of a reading's noise, from its sixth differences, which hold almost none of the motion.
+    """The white part of a reading's noise, from its sixth differences: standard deviation of one sample, rad.
 
     Args:
         reading: of many samples per cycle, evenly spaced, shape (n,), rad.
-        sensor: what the campaign states; used where the reading agrees with it.
-
-    Returns:
-        Standard deviation of one sample, rad, quantisation included.
+        sensor: its stated noise is used where the reading agrees with it; quantisation is included.
     """
     peak = 0.5 * float(np.ptp(reading))
     floor = max(LEAST_NOISE * peak, 1e-300)
@@ -111,30 +109,33 @@ def white_noise(reading: Array, sensor: SensorProperties) -> float:
 
 
 def reading_noise(record: Record, sensor: SensorProperties) -> float:
-    """`white_noise` of a record, whatever its times.
-
-    Args:
-        record: of many samples per cycle.
-        sensor: what the campaign states; used where the record agrees with it.
-
-    Returns:
-        Standard deviation of one sample, rad, quantisation included.
-    """
+    """`white_noise` of a record of many samples per cycle, whatever its times."""
     if record.uniform or record.time_s.size <= 4 * _ORDER:
         return white_noise(record.yaw_rad, sensor)
-    floor = max(0.5 * LEAST_NOISE * float(np.ptp(record.yaw_rad)), 1e-300)
-    return _as_stated(*_scattered(record), floor, sensor)
+    # A sixth divided difference is zero for the quintic that a swing resembles over seven samples.
+    time, values = record.time_s, record.yaw_rad
+    count = time.size - _ORDER
+    nodes = np.stack([time[i : i + count] for i in range(_ORDER + 1)])
+    difference, power = np.zeros(count), np.zeros(count)
+    for i, node in enumerate(nodes):
+        away = (node - nodes) / (nodes[-1] - nodes[0])
+        away[i] = 1.0
+        weight = 1.0 / np.prod(away, axis=0)
+        difference += weight * values[i : i + count]
+        power += weight**2
+    fast = sqrt(float(np.mean(difference**2 / power)))
+    floor = max(0.5 * LEAST_NOISE * float(np.ptp(values)), 1e-300)
+    return _as_stated(fast, count / _SAMPLES_PER_DEGREE, floor, sensor)
 
 
 def slow_power(values: Array, block: int) -> tuple[float, int]:
-    """Power of the slow part of a residual, by its means over blocks.
+    """Power of the slow part of a residual, by its means over blocks, rad², and the number of blocks.
+
+    The power of white noise is its variance times that number.
 
     Args:
         values: shape (n,), rad.
         block: number of samples in a block, such as `eighth_of_a_cycle`.
-
-    Returns:
-        The power, rad², and the number of blocks. The power of white noise is its variance times that number.
     """
     blocks = values.size // block
     means = values[: blocks * block].reshape(blocks, block).mean(axis=1)
@@ -146,24 +147,6 @@ def _as_stated(fast: float, degrees: float, floor: float, sensor: SensorProperti
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
     stated = stated_noise(sensor)
     return max(stated, floor) if stated is not None and _agree(fast, max(stated, floor), degrees) else fast
-
-
-def _scattered(record: Record) -> tuple[float, float]:
-    """Standard deviation and degrees of freedom of white noise on a smooth motion that is sampled at any times.
-
-    A sixth divided difference is zero for the quintic that a swing resembles over seven samples.
-    """
-    time, values = record.time_s, record.yaw_rad
-    count = time.size - _ORDER
-    nodes = np.stack([time[i : i + count] for i in range(_ORDER + 1)])
-    difference, power = np.zeros(count), np.zeros(count)
-    for i, node in enumerate(nodes):
-        away = (node - nodes) / (nodes[-1] - nodes[0])
-        away[i] = 1.0
-        weight = 1.0 / np.prod(away, axis=0)
-        difference += weight * values[i : i + count]
-        power += weight**2
-    return sqrt(float(np.mean(difference**2 / power))), count / _SAMPLES_PER_DEGREE
 
 
 def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, float]:
@@ -179,20 +162,3 @@ def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, f
 def _agree(measured: float, stated: float, degrees: float) -> bool:
     tolerance = NOISE_TOLERANCE + MISFIT_DEVIATIONS / np.sqrt(2.0 * max(degrees, 1.0))
     return bool(abs(measured / stated - 1.0) <= tolerance)
-
-
-def _slow_part(
-    residuals: Sequence[Residual], reference: float, reference_degrees: float
-) -> tuple[float, bool]:
-    # Power of the block means relative to white noise of the reference level, and the verdict by F.
-    power, degrees = 0.0, 0
-    for residual in residuals:
-        own, blocks = slow_power(residual.values, residual.block)
-        power += own
-        degrees += blocks - residual.unknowns
-    if degrees < 3:
-        return 1.0, False
-    ratio = power / degrees / reference**2
-    chance = float(fdtri(degrees, min(reference_degrees, 1e9), 1.0 - MISFIT_RATE))
-    departs = bool(ratio > chance * (1.0 + NOISE_TOLERANCE) ** 2)
-    return max(ratio, 1.0), departs

@@ -1,9 +1,8 @@
 """Identification of one run: start, least squares, noise, standard deviations, windows.
 
 One test for every method says whether one damped oscillation explains a record. On a record of little noise a
-method's own motion misses the record by the error of the method alone, so its residual does not judge the
-record. The least-squares motion nearest to the method's decay is tested instead, by `noise.noise_level`. The
-false-alarm rate is `identification.policy.MISFIT_RATE`.
+method's own motion misses the record by the error of the method alone. So the least-squares motion nearest to the
+method's decay is tested instead, by `noise.noise_level`.
 """
 
 from __future__ import annotations
@@ -13,15 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.estimate import (
-    NoiseLevel,
-    Quantity,
-    RunEstimate,
-    Status,
-    WindowEstimate,
-    by_severity,
-)
-from identification.policy import FEW_CYCLES, LEAST_ENERGY
+from identification.estimate import NoiseLevel, Quantity, RunEstimate, Status, WindowEstimate, by_severity
+from identification.policy import FEW_CYCLES, LEAST_ENERGY, LEAST_WINDOW_ENERGY
 from identification.signal.decay_fit import (
     ANGLE,
     ANGULAR_RATE,
@@ -33,14 +25,17 @@ from identification.signal.decay_fit import (
     RunFit,
     fit_run,
 )
-from identification.signal.free_decay import Decay
+from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay, thinned_reading
-from identification.signal.noise import Residual, eighth_of_a_cycle, noise_level
-from identification.signal.windows import fit_windows, modal_quantities
+from identification.signal.noise import Residual, eighth_of_a_cycle, noise_level, slow_power
 from identification.statistics import determined, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
-from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.record import Array, Record
 
+CYCLES = 3
+_LEAST_WINDOWS = 4
+_LEAST_SAMPLES = 16
+_TOLERANCE = 1e-5  # relative, of a window's fit; the next Gauss–Newton step would be a thousand times smaller
 NO_WINDOWS = 10**6
 """As periods in a window: longer than any record, so that a run has none."""
 _UNKNOWNS = 5
@@ -53,8 +48,6 @@ class FittedRun:
 
     Args:
         fit: None where the run could not be identified; the estimate's status says why.
-        noise: what the fit's residual says of the noise; None where the fit is.
-        estimate: the run's own result.
     """
 
     reading: Reading
@@ -62,25 +55,29 @@ class FittedRun:
     noise: NoiseLevel | None
     estimate: RunEstimate
 
+    @classmethod
+    def failed(cls, run: Run, reading: Reading, status: Status) -> FittedRun:
+        """A run without a result, and the reason."""
+        return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))
+
 
 def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int | None = None) -> FittedRun:
-    """Identify ωn, ζ, the initial state and the sensor's zero of one run by maximum likelihood.
+    """Identify ωn, ζ, the initial state and the zero of one run by maximum likelihood, whatever its spring.
 
     Args:
-        run: the run; its wind and spring are not used.
         cycles_per_window: periods in each of its windows; where None three, or one in a short record.
     """
     reading = Reading.from_record(run.record)
     start = starting_decay(run.record)
     if start is None:
-        return _failed(run, reading, Status.NO_OSCILLATION)
+        return FittedRun.failed(run, reading, Status.NO_OSCILLATION)
     fit = fit_from(run, reading, start)
     if fit is None:
-        return _failed(run, reading, Status.NOT_CONVERGED)
+        return FittedRun.failed(run, reading, Status.NOT_CONVERGED)
     fitted = fit.runs[0]
     noise, failure = noise_and_failure(reading, fitted, fit.zero, sensor)
     if failure is not None:
-        return _failed(run, reading, failure)
+        return FittedRun.failed(run, reading, failure)
     variance = noise.std**2 * noise.slow_ratio
     covariance = decay_covariance_of(fitted) * variance
     windows = fit_windows(reading, fitted.decay, fit.zero, noise, cycles=cycles_per_window)
@@ -92,24 +89,15 @@ def identify_run(run: Run, sensor: SensorProperties, *, cycles_per_window: int |
 
 
 def fit_from(run: Run, reading: Reading, start: Decay) -> DecayFit | None:
-    """The least-squares fit of a run by itself.
-
-    Returns:
-        The fit; None where it does not converge to a decay of positive stiffness.
-    """
-    fit = fit_run(reading, _near(run, start))
+    """The least-squares fit of a run by itself; None where it finds no decay of positive stiffness."""
+    if start.omega_d > 0.0:
+        # Block means lead most of the way to the optimum at a twentieth of the cost; the fit uses all samples.
+        thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
+        if thin.time.size <= run.record.time_s.size // 4:
+            near = fit_run(thin, start, tolerance=_NEAR)
+            start = near.runs[0].decay if near.converged else start
+    fit = fit_run(reading, start)
     return fit if fit.converged and fit.runs[0].decay.stiffness > 0.0 else None
-
-
-def _near(run: Run, start: Decay) -> Decay:
-    # Block means lead most of the way to the optimum at a twentieth of the cost; the fit itself uses all samples.
-    if start.omega_d == 0.0:
-        return start
-    thin = thinned_reading(run.record, start.omega_d / (2.0 * np.pi))
-    if thin.time.size > run.record.time_s.size // 4:
-        return start
-    fit = fit_run(thin, start, tolerance=_NEAR)
-    return fit.runs[0].decay if fit.converged else start
 
 
 def residuals_of(
@@ -121,47 +109,31 @@ def residuals_of(
         zero: the sensor's, rad.
         unknowns: number of parameters fitted to each run's own data.
     """
-    return [
-        Residual(
-            values=run.residual,
-            block=eighth_of_a_cycle(
-                _pace(reading, run), float(reading.time[-1] - reading.time[0]) / (reading.time.size - 1)
-            ),
-            unknowns=unknowns,
-            peak=float(np.abs(reading.yaw - zero).max()),
-        )
-        for reading, run in zip(readings, runs, strict=True)
-    ]
-
-
-def _pace(reading: Reading, run: RunFit) -> float:
-    """ωn, or of a body without a spring its root-mean-square rate over that of its angle, rad/s."""
-    if run.decay.stiffness != 0.0:
-        return float(np.sqrt(abs(run.decay.stiffness)))
-    motion = reading.yaw - run.residual
-    rate, angle = float(np.std(np.gradient(motion, reading.time))), float(np.std(motion))
-    return max(rate, 1e-300) / max(angle, 1e-300)
+    residuals = []
+    for reading, run in zip(readings, runs, strict=True):
+        omega = float(np.sqrt(abs(run.decay.stiffness)))
+        if omega == 0.0:  # a body without a spring: its root-mean-square rate over that of its angle
+            motion = reading.yaw - run.residual
+            rate, angle = float(np.std(np.gradient(motion, reading.time))), float(np.std(motion))
+            omega = max(rate, 1e-300) / max(angle, 1e-300)
+        interval = float(reading.time[-1] - reading.time[0]) / (reading.time.size - 1)
+        peak = float(np.abs(reading.yaw - zero).max())
+        residuals.append(Residual(run.residual, eighth_of_a_cycle(omega, interval), unknowns, peak))
+    return residuals
 
 
 def decay_covariance_of(fitted: RunFit) -> Array:
-    """Covariance of (a, k) per noise variance, at the optimum of the least squares.
-
-    Returns:
-        Shape (2, 2); times the noise variance in rad² it is in 1/s and 1/s².
-    """
+    """Covariance of (a, k) at the optimum of the least squares, shape (2, 2), over the noise variance in rad²."""
     return inverse(fitted.information)[np.ix_([RATE, STIFFNESS], [RATE, STIFFNESS])]
 
 
 def noise_and_failure(
     reading: Reading, fitted: RunFit, zero: float, sensor: SensorProperties
 ) -> tuple[NoiseLevel, Status | None]:
-    """The noise level from the residual of one run's fit, and whether the run shows a decay at all.
+    """The noise level from the residual of one run's fit, and the status of the failure, None if there is none.
 
     Args:
         zero: its sensor zero, rad.
-
-    Returns:
-        The noise level, and the status of the failure, None if there is none.
     """
     noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
     motion = reading.yaw - zero - fitted.residual
@@ -183,18 +155,13 @@ def describe_run(
 ) -> RunEstimate:
     """The result of one run from its decay, whatever the method.
 
-    The initial state and the zero are those that fit the decay best; their uncertainty is that of the reading
-    and that of the decay.
+    The initial state and the zero are those that fit the decay best; their uncertainty is that of the reading and
+    that of the decay. Its only status is NOT_DETERMINED where the covariance is not positive definite.
 
     Args:
         zero: its sensor zero, rad.
         covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
         noise_variance: of one sample of the reading, rad².
-        noise: the level behind the standard deviations; None where the method does not use it.
-
-    Returns:
-        The estimate with the statuses that follow from its noise, its length and its spring; only NOT_DETERMINED
-        where the method's covariance is not positive definite.
     """
     if not determined(covariance):
         return RunEstimate(run.id, (Status.NOT_DETERMINED,))
@@ -226,10 +193,6 @@ def describe_run(
     )
 
 
-def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
-    return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))
-
-
 @dataclass(frozen=True, eq=False)
 class ResidualCheck:
     """The verdict of the least-squares residual of a run.
@@ -242,14 +205,7 @@ class ResidualCheck:
     covariance: Array
 
     def widened(self, covariance: Array) -> Array:
-        """A method's covariance of (a, k), raised to that of least squares where the model departs.
-
-        Args:
-            covariance: the method's own, shape (2, 2), in 1/s and 1/s².
-
-        Returns:
-            Shape (2, 2); no standard deviation is smaller than that of the widened least squares.
-        """
+        """A covariance of (a, k), shape (2, 2), raised to that of least squares where the model departs."""
         if not self.noise.departs:
             return covariance
         return widened_covariance(covariance, np.sqrt(self.covariance.diagonal()))
@@ -258,8 +214,7 @@ class ResidualCheck:
 def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> ResidualCheck | None:
     """Fit a run by least squares, starting from a method's decay, and test the residual.
 
-    Returns:
-        The verdict; None where the least squares do not converge to a decay that the record determines.
+    None where the least squares do not converge to a decay that the record determines.
     """
     reading = Reading.from_record(run.record)
     fit = fit_from(run, reading, decay)
@@ -270,3 +225,111 @@ def residual_check(run: Run, decay: Decay, sensor: SensorProperties) -> Residual
         return None
     covariance = decay_covariance_of(fit.runs[0]) * (noise.std**2 * noise.slow_ratio)
     return ResidualCheck(noise, covariance)
+
+
+def fit_windows(
+    reading: Reading, run: Decay, zero: float, noise: NoiseLevel, *, cycles: int | None = None
+) -> tuple[WindowEstimate, ...]:
+    """Fit a decay to each window of a few cycles of a run separately, as in the paper's Table III.
+
+    Each window lasts ``cycles`` periods of its own fitted frequency and the next starts where it ends. The
+    sensor's zero is common to them: that of the whole run, or, where one decay does not fit the whole run, the
+    median of the windows' own. The series ends with the record, or where the oscillation is lost in the noise; a
+    window that one decay does not describe even roughly is skipped.
+
+    Args:
+        zero: its sensor zero, rad.
+        cycles: periods in a window; where None three, or one where the record is too short for four such.
+    """
+    if cycles is None:
+        cycles = CYCLES if _LEAST_WINDOWS * _length(run, CYCLES) <= float(reading.time[-1]) else 1
+    if noise.departs:
+        run = _start_at(reading, 0, run, cycles)
+        own = [fit.zero for _, fit in _series(reading, run, None, noise, cycles)]
+        zero = float(np.median(own)) if own else zero
+    return tuple(window for window, _ in _series(reading, run, zero, noise, cycles))
+
+
+def _series(
+    reading: Reading, decay: Decay, zero: float | None, noise: NoiseLevel, cycles: int
+) -> list[tuple[WindowEstimate, DecayFit]]:
+    series: list[tuple[WindowEstimate, DecayFit]] = []
+    interval = float(reading.time[-1]) / (reading.time.size - 1)
+    begin = 0
+    while True:
+        # Fitted with the expected frequency, and again where the fitted frequency changes the length of the window.
+        count = 0
+        for _ in range(2):
+            length = _length(decay, cycles) / interval
+            if not _LEAST_SAMPLES <= length < reading.time.size - begin + 0.5:
+                return series
+            if count and abs(length - count) <= 0.01 * count:
+                break
+            count = round(length)
+            part = slice(begin, begin + count)
+            stretch = Reading(reading.time[part] - reading.time[begin], reading.yaw[part])
+            fit = fit_run(stretch, decay, zero=zero, tolerance=_TOLERANCE)
+            if not fit.runs:
+                return series
+            decay = fit.runs[0].decay
+        motion = reading.yaw[part] - fit.zero - fit.runs[0].residual
+        if float(motion @ motion) < LEAST_WINDOW_ENERGY * noise.std**2:
+            return series
+        window = _window_estimate(reading.time[part], fit.runs[0], noise, cycles) if fit.converged else None
+        if window is not None:
+            series.append((window, fit))
+        begin += count
+        if window is None and begin < reading.time.size:
+            decay = _start_at(reading, begin, decay, cycles)
+
+
+def _start_at(reading: Reading, begin: int, decay: Decay, cycles: int) -> Decay:
+    # Where one decay does not fit what went before, its values may be far from those of the window to come.
+    part = slice(begin, int(np.searchsorted(reading.time, reading.time[begin] + _length(decay, cycles))))
+    if part.stop - part.start < _LEAST_SAMPLES or part.stop >= reading.time.size:
+        return decay
+    return starting_decay(Record(reading.time[part], reading.yaw[part])) or decay
+
+
+def _length(decay: Decay, cycles: int) -> float:
+    return cycles * 2.0 * np.pi / decay.omega_d if decay.omega_d > 0.0 else np.inf
+
+
+def _window_estimate(time: Array, run: RunFit, noise: NoiseLevel, cycles: int) -> WindowEstimate | None:
+    count = time.size
+    interval = float(time[-1] - time[0]) / (count - 1)
+    duration = count * interval
+    decay = run.decay
+    amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * duration)
+    power, blocks = slow_power(run.residual, eighth_of_a_cycle(decay.omega_n, interval))
+    variance = noise.std**2 * max(1.0, power / max(blocks - 4, 1) / noise.std**2)
+    if not np.isfinite(amplitude) or 0.5 * count * amplitude**2 < LEAST_WINDOW_ENERGY * variance:
+        return None
+    order = [RATE, STIFFNESS, ANGLE, ANGULAR_RATE]
+    information = run.information[np.ix_(order, order)]
+    if not determined(information):
+        return None
+    covariance = inverse(information) * variance
+    omega_n, zeta = modal_quantities(decay, covariance[:2, :2])
+    # At mid-window the amplitude hardly depends on the damping: white noise gives A √(2/N).
+    return WindowEstimate(
+        start_s=float(time[0]),
+        duration_s=duration,
+        amplitude=Quantity(float(amplitude), float(np.sqrt(2.0 * variance / count)), "rad"),
+        omega_n=omega_n,
+        zeta=zeta,
+        cycles=cycles,
+    )
+
+
+def modal_quantities(decay: Decay, covariance: Array) -> tuple[Quantity, Quantity]:
+    """ωn in rad/s and ζ with their standard deviations, of a decay of positive stiffness.
+
+    Args:
+        covariance: of (a, k), shape (2, 2), in 1/s and 1/s².
+    """
+    omega, zeta = decay.omega_n, decay.zeta
+    slope = np.array([1.0 / omega, -0.5 * zeta / omega**2])
+    omega_std = float(np.sqrt(covariance[1, 1])) / (2.0 * omega)
+    zeta_std = float(np.sqrt(slope @ covariance @ slope))
+    return Quantity(omega, omega_std, "rad/s"), Quantity(zeta, zeta_std, "1")

@@ -1,45 +1,13 @@
 """The uncertainty budget: from noise, stated inputs, scatter of the runs and choice of model to one covariance.
 
-How well a campaign's stated inputs are known: standard uncertainties, and which errors are common to runs. The
-campaign format states Kr, V, ρ, A and l as exact numbers; how well they are known comes from a small TOML:
-
-    schema_version = 1
-
-    [common]                      # one error for all runs: calibration of an instrument, a dimension
-    spring_stiffness = 0.005      # relative standard uncertainties throughout: 0.005 is 0.5 %
-    wind_speed = 0.01
-    air_density = 0.003
-    frontal_area = 0.005
-    reference_length = 0.001
-
-    [individual]                  # a separate error for every spring, or every wind-on run
-    spring_stiffness = 0.002
-    wind_speed = 0.005
-
-    [[correlations]]              # between common errors, such as V from a pitot tube and ρ
-    between = ["wind_speed", "air_density"]
-    coefficient = -0.5
-
-First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2:
-
-    U = U_noise + Σ_ij ρ_ij uᵢ cᵢ (u_j c_j)ᵀ + U_scatter + U_model.
-
-- Noise: the estimator's own covariance.
-- Inputs: an error common to all runs scales the coefficients in closed form, whatever the method:
-  (Cnβ, Cnr) ∝ Kr, V^(−2, −1), ρ^−1, A^−1, l^(−1, −2). An error of a single spring or run is propagated through
-  the estimator itself, one input at a time by one standard uncertainty (Kragten, Analyst 119 (1994) 2161–2165,
-  doi 10.1039/AN9941902161).
-- Scatter: how far the wind-off and the wind-on runs scatter about the coefficients they share, as far as it
-  exceeds what noise and the individual errors of the inputs explain (see `identification.uncertainty.scatter`).
-- Model: how far other methods, or the first half of every record, change the result beyond chance; the largest
-  change is the half-width of a rectangular distribution (GUM 4.3.7).
-
+First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2: U = U_noise + Σ_ij ρ_ij uᵢ cᵢ (u_j c_j)ᵀ +
+U_scatter + U_model. How well the stated inputs are known comes from a TOML (docs/how-to/state-uncertainties.md).
 Errors that neither repeats nor other methods with the same model show are not included: run the diagnosis.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
 from pathlib import Path
@@ -47,12 +15,20 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
+from scipy.linalg import block_diag
+from scipy.special import chdtri
 
-from identification.estimate import PARAMETERS, Estimate, Quantity
-from identification.policy import DIFFERENCE_DEVIATIONS
-from identification.uncertainty.scatter import error_groups, side_scatter, with_scaled_input
+from identification.campaign.derivatives import Design, build_design, combine, derivatives
+from identification.estimate import PARAMETERS, Estimate, Quantity, RunEstimate
+from identification.policy import (
+    DIFFERENCE_DEVIATIONS,
+    DIFFERENCE_RATE,
+    LEAST_FREE_SHARE,
+    LEAST_SCATTER_FREEDOM,
+)
+from identification.statistics import inverse
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -89,8 +65,7 @@ class InputUncertainties:
 
     Args:
         common: by name of `COMMON`: one error for all runs.
-        individual: of ``spring_stiffness``, ``wind_speed`` and ``air_density``: independent errors of springs or
-            wind-on runs, besides the common one.
+        individual: independent errors of springs or wind-on runs, besides the common one.
         correlations: pairs of common inputs with their correlation coefficient.
     """
 
@@ -99,14 +74,7 @@ class InputUncertainties:
     correlations: tuple[tuple[str, str, float], ...] = ()
 
     def correlation(self, names: tuple[str, ...]) -> Array:
-        """Correlation matrix of common inputs.
-
-        Args:
-            names: of the inputs, n of them.
-
-        Returns:
-            Shape (n, n).
-        """
+        """Correlation matrix of common inputs, by n names: shape (n, n)."""
         matrix = np.eye(len(names))
         for first, second, coefficient in self.correlations:
             if first in names and second in names:
@@ -132,14 +100,13 @@ class _Document(StrictModel):
 
 
 def load_uncertainties(path: Path) -> InputUncertainties:
-    """Read a file of uncertainties, as at the top of this module.
+    """Read a file of uncertainties, as in docs/how-to/state-uncertainties.md.
 
     Raises:
         TunnelError: for the first thing that is wrong, in one line that names file, key and remedy.
     """
-    missing = "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md"
+    where, missing = shown(path), "name a TOML of uncertainties, see docs/how-to/state-uncertainties.md"
     document = read_document(_Document, path, missing=missing)
-    where = shown(path)
     common = {name: value for name, value in document.common.model_dump().items() if value > 0.0}
     individual = {name: value for name, value in document.individual.model_dump().items() if value > 0.0}
     pairs: list[tuple[str, str, float]] = []
@@ -169,6 +136,7 @@ def load_uncertainties(path: Path) -> InputUncertainties:
 
 Identify = Callable[[Campaign], Estimate]
 Progress = Callable[[str], None]
+_STEP = 1e-4  # relative, of an input whose influence on (a, k) is found by a difference
 _NAMES = (*PARAMETERS, "wind_off_inertia")
 # Powers with which a common scale of a stated input enters; the clock's is that of the time axis.
 _POWERS: Mapping[str, tuple[float, float, float, float, float]] = {
@@ -187,9 +155,8 @@ class Component:
     """One line of the budget.
 
     Args:
-        kind: GUM's evaluation: ``A`` by statistics, ``B`` by other means.
-        covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may
-            reduce it.
+        covariance: what it adds, shape (p, p), in the products of the quantities' units; a correlation may reduce
+            it.
         note: why it is zero or unknown; otherwise empty.
         known: whether it could be determined; if not, its covariance is zero and the total omits it.
     """
@@ -203,19 +170,16 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """The budget of an estimate.
+    """The budget of an estimate, noise first.
 
     Args:
-        names: of the quantities, p of them: the estimate's parameters, and ``wind_off_inertia``.
-        units: of the quantities.
+        names: of p quantities: the estimate's parameters, and ``wind_off_inertia``.
         values: shape (p,).
-        components: noise first.
     """
 
     names: tuple[str, ...]
-    units: tuple[str, ...]
     values: Array
-    components: tuple[Component, ...] = field(default_factory=tuple)
+    components: tuple[Component, ...] = ()
 
     @property
     def covariance(self) -> Array:
@@ -224,15 +188,10 @@ class Budget:
 
     def std(self, name: str) -> float:
         """Combined standard uncertainty of a quantity, in its unit."""
-        place = self.names.index(name)
-        return sqrt(float(self.covariance[place, place]))
+        return sqrt(float(self.covariance.diagonal()[self.names.index(name)]))
 
     def share(self, component: Component, name: str) -> float:
-        """Share of a component in the variance of a quantity, as a fraction.
-
-        Args:
-            component: one of the budget's.
-        """
+        """Share of a component of the budget in the variance of a quantity, as a fraction."""
         place = self.names.index(name)
         return float(component.covariance[place, place] / self.covariance[place, place])
 
@@ -265,9 +224,7 @@ def make_budget(
     """The budget of a campaign's coefficients.
 
     Args:
-        identify: the estimator that made it; it is called again with changed campaigns.
         others: other estimators, by name, whose spread counts as the choice of model.
-        progress: called with a description of each step.
 
     Raises:
         TunnelError: when the estimate has no coefficients.
@@ -280,7 +237,7 @@ def make_budget(
             remedy="state spring_stiffness, or leave --budget and --uncertainties out",
         )
     quantities: list[Quantity] = [getattr(estimate, name) for name in names]
-    budget = Budget(names, tuple(q.unit for q in quantities), np.array([q.value for q in quantities]))
+    budget = Budget(names, np.array([quantity.value for quantity in quantities]))
     covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])
     places = [budget.names.index(name) for name in estimate.parameters]
     covariance[np.ix_(places, places)] = estimate.covariance_matrix
@@ -289,21 +246,18 @@ def make_budget(
     individual = _individual(campaign, budget, identify, inputs, progress)
     scatter = _scatter(campaign, estimate, budget, inputs)
     progress("choice of model")
-    rivals: dict[str, Estimate] = {name: other(campaign) for name, other in (others or {}).items()}
-    rivals["the first half of the records"] = identify(_first_half(campaign))
+    rivals = {name: other(campaign) for name, other in (others or {}).items()}
+    halves = []
+    for run in campaign.runs:
+        half = slice(0, max(2, run.record.time_s.size // 2))
+        halves.append(replace(run, record=Record(run.record.time_s[half], run.record.yaw_rad[half])))
+    rivals["the first half of the records"] = identify(replace(campaign, runs=tuple(halves)))
     model = _model(budget, np.sqrt(np.diag(noise.covariance)), rivals)
     return replace(budget, components=(noise, *common, *individual, *scatter, model))
 
 
 def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
-    """The estimate with combined standard uncertainties in place of those of noise alone.
-
-    Args:
-        estimate: the budget's.
-
-    Returns:
-        The same values; standard deviations and covariance are the budget's.
-    """
+    """The estimate with combined standard uncertainties and covariance in place of those of noise."""
     places = [budget.names.index(name) for name in estimate.parameters]
     total = budget.covariance[np.ix_(places, places)]
     quantities: dict[str, Any] = {
@@ -313,6 +267,7 @@ def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
 
 
 def _common(budget: Budget, inputs: InputUncertainties, windy: bool) -> list[Component]:
+    """An error common to all runs scales the coefficients in closed form, whatever the method."""
     given = tuple(name for name in _POWERS if inputs.common.get(name, 0.0) > 0.0)
     columns = [_NAMES.index(name) for name in budget.names]
     moves = np.array(
@@ -334,6 +289,10 @@ def _common(budget: Budget, inputs: InputUncertainties, windy: bool) -> list[Com
 def _individual(
     campaign: Campaign, budget: Budget, identify: Identify, inputs: InputUncertainties, progress: Progress
 ) -> list[Component]:
+    """An error of a single spring or run goes through the estimator itself, by one standard uncertainty.
+
+    Kragten, Analyst 119 (1994) 2161–2165, doi 10.1039/AN9941902161.
+    """
     found = []
     for name, size in inputs.individual.items():
         if size <= 0.0:
@@ -385,15 +344,16 @@ def _scatter(
 
 
 def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Component:
-    """The largest change beyond chance, as the half-width of a rectangular distribution."""
+    """The largest change beyond chance, as the half-width of a rectangular distribution (GUM 4.3.7)."""
     largest, blamed = np.zeros(len(budget.names)), []
     for name, rival in rivals.items():
         values = _values(rival, budget)
         if values is None:
             continue
         move = np.abs(values - budget.values)
+        stds = np.array([getattr(rival, name).std for name in budget.names])
         # Of two unbiased estimates from the same records, the better one is uncorrelated with their difference.
-        chance = np.sqrt(np.abs(_deviations(rival, budget) ** 2 - own_std**2))
+        chance = np.sqrt(np.abs(stds**2 - own_std**2))
         move = np.where(move > DIFFERENCE_DEVIATIONS * chance, move, 0.0)
         if np.any(move > 0.0):
             blamed.append(name)
@@ -402,14 +362,137 @@ def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Co
     return Component("choice of model", "B", np.diag(largest**2 / 3.0), note)
 
 
-def _deviations(estimate: Estimate, budget: Budget) -> Array:
-    found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
-    return np.array([0.0 if quantity is None else quantity.std for quantity in found])
+@dataclass(frozen=True, eq=False)
+class SideScatter:
+    """The scatter of the wind-off or of the wind-on runs.
+
+    Args:
+        known: whether the runs leave a degree of freedom to determine it.
+        covariance: what the excess adds to that of the named parameters, shape (p, p); zero within chance.
+    """
+
+    known: bool
+    names: tuple[str, ...]
+    covariance: Array
 
 
-def _first_half(campaign: Campaign) -> Campaign:
-    runs = []
-    for run in campaign.runs:
-        half = slice(0, max(2, run.record.time_s.size // 2))
-        runs.append(replace(run, record=Record(run.record.time_s[half], run.record.yaw_rad[half])))
-    return replace(campaign, runs=tuple(runs))
+@dataclass(frozen=True, eq=False)
+class _SideFit:
+    """The runs' (a, k), stacked as one vector of length 2n."""
+
+    residual: Array
+    weight: Array
+    hat: Array
+    noise: Array
+    influence: Array
+    names: tuple[str, ...]
+
+
+def side_scatter(
+    campaign: Campaign, estimates: Sequence[RunEstimate], individual: Mapping[str, float]
+) -> tuple[SideScatter, SideScatter]:
+    """The scatter of wind-off and of wind-on runs about the coefficients they share.
+
+    The residuals of decay rate a and stiffness k about the generalised least-squares fit are squared, weighted by
+    the runs' variances and summed, separately for both sides and for a and k. If a sum exceeds its expectation
+    from noise and the stated individual errors of the inputs by more than chance, every run in it gets the
+    variance of its own residual: a linearised jackknife (J. G. MacKinnon & H. White, J. Econometrics 29 (1985)
+    305–325, doi 10.1016/0304-4076(85)90158-7). A weighted sum of squares is distributed as by Satterthwaite,
+    Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
+
+    Args:
+        estimates: one per run, with ωn and ζ where they were identified.
+        individual: relative standard uncertainties of inputs with separate errors by run or by spring.
+    """
+    runs, decays, blocks = [], [], []
+    for run, found in zip(campaign.runs, estimates, strict=True):
+        if run.spring_stiffness is None or found.omega_n is None or found.zeta is None:
+            continue
+        omega, zeta = found.omega_n, found.zeta
+        runs.append(run)
+        decays.append([zeta.value * omega.value, omega.value**2])
+        # ωn and ζ of a decay are uncorrelated to first order in the damping.
+        jacobian = np.array([[zeta.value, omega.value], [2.0 * omega.value, 0.0]])
+        blocks.append(jacobian @ np.diag([omega.std**2, zeta.std**2]) @ jacobian.T)
+    nothing = SideScatter(False, (), np.zeros((0, 0)))
+    if not runs:
+        return nothing, nothing
+    design = build_design(runs, campaign.rig)
+    informations = [inverse(block) for block in blocks]
+    combined = combine(design, np.array(decays), informations)
+    values = None if combined is None else derivatives(design, combined[0])
+    if combined is None or values is None or not values.names:
+        return nothing, nothing
+    shared, inverse_normal = combined
+    links, weight, noise = np.concatenate(design.links), block_diag(*informations), block_diag(*blocks)
+    gain = inverse_normal @ links.T @ weight
+    residual = np.concatenate(decays) - links @ shared
+    fit = _SideFit(residual, weight, links @ gain, noise, values.jacobian @ gain, values.names)
+    covariance = fit.noise + _input_covariance(runs, campaign.rig, design, shared, individual)
+    windy = np.repeat([run.wind_on for run in runs], 2)
+    return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
+
+
+def _input_covariance(
+    runs: Sequence[Run], rig: RigProperties, design: Design, shared: Array, individual: Mapping[str, float]
+) -> Array:
+    """Covariance of the runs' (a, k) due to the errors of their stated inputs."""
+    total = np.zeros((2 * len(runs),) * 2)
+    before = np.concatenate(design.links) @ shared
+    for name, size in individual.items():
+        for group in error_groups(runs, name):
+            moved = [
+                with_scaled_input(run, name, 1.0 + _STEP) if i in group else run for i, run in enumerate(runs)
+            ]
+            links = build_design(moved, rig).links
+            if links[0].shape != design.links[0].shape:
+                continue
+            move = (np.concatenate(links) @ shared - before) * (size / _STEP)
+            total += np.outer(move, move)
+    return total
+
+
+def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
+    """Which runs share one individual error: those of a spring, or a single wind-on run."""
+    if name != "spring_stiffness":
+        return [[i] for i, run in enumerate(runs) if run.wind_on]
+    springs: dict[float, list[int]] = {}
+    for i, run in enumerate(runs):
+        if run.spring_stiffness is not None:
+            springs.setdefault(run.spring_stiffness, []).append(i)
+    return list(springs.values())
+
+
+def with_scaled_input(run: Run, name: str, factor: float) -> Run:
+    """A run with one stated input changed; the same run where it states none.
+
+    Args:
+        factor: what the input is multiplied by (1).
+    """
+    value = getattr(run, name)
+    changed: dict[str, Any] = {} if value is None else {name: value * factor}
+    return replace(run, **changed)
+
+
+def _side(fit: _SideFit, covariance: Array, mine: Array) -> SideScatter:
+    size = fit.residual.size
+    added = np.zeros((len(fit.names),) * 2)
+    seen = False
+    for row in (0, 1):  # decay rates, then stiffnesses
+        chosen = (mine & (np.arange(size) % 2 == row)).astype(np.float64)
+        root = np.sqrt(chosen * np.diag(fit.weight))
+        # The weighted residuals of these rows are a linear map of errors with this covariance.
+        residual_map = root[:, None] * (np.eye(size) - fit.hat)
+        spread = residual_map @ covariance @ residual_map.T
+        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < LEAST_SCATTER_FREEDOM:
+            continue
+        seen = True
+        expected = float(np.trace(spread))
+        degrees = expected**2 / float(np.sum(spread**2))
+        ratio = float(np.sum((root * fit.residual) ** 2)) / expected
+        if ratio > float(chdtri(degrees, DIFFERENCE_RATE)) / degrees:
+            # As in the jackknife, every run gets the variance of its own residual, corrected for its leverage.
+            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), LEAST_FREE_SHARE)
+            excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
+            added += (fit.influence * (chosen * excess)) @ fit.influence.T
+    return SideScatter(seen, fit.names, added)

@@ -1,7 +1,7 @@
 """The Cramér–Rao bound: the smallest standard deviations any unbiased estimator can reach.
 
 Exact Fisher information of real damped sinusoids, and of motions under an input, in white Gaussian noise at given
-sample times, with their exact sensitivities. For long records of light damping it tends to
+sample times. For long records of light damping it tends to
 
     std(ζ)/ζ = 4 (S/A) √(σ/fs),   std(f)/f = ζ · std(ζ)/ζ,
 
@@ -16,15 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.campaign.combination import with_gains
 from identification.campaign.derivatives import build_design, derivatives, has_size
-from identification.campaign.driven import with_gains
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import information_at
 from identification.signal.driven_fit import normal_equations
 from identification.signal.filter import discretised, steady_filters
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -69,7 +69,6 @@ def damped_sinusoid_bound(
         frequency: damped frequency f, Hz, above 0.
         zeta: damping ratio, below 1.
         noise_std: S, rad.
-        offset_known: whether the offset is known.
 
     Raises:
         ValueError: for an amplitude or frequency that is not positive, or |ζ| of 1 or more.
@@ -86,8 +85,6 @@ def damped_sinusoid_bound(
     covariance[: len(kept), : len(kept)] = inverse(information[np.ix_(kept, kept)]) * noise_std**2
     # Rows: amplitude, phase, f, ωn, ζ, offset. Columns: a, k, angle, rate, offset.
     a, omega = decay.rate, decay.omega_n
-    omega_row = np.array([0.0, 0.5 / omega, 0.0, 0.0, 0.0])
-    zeta_row = np.array([1.0 / omega, -0.5 * a / omega**3, 0.0, 0.0, 0.0])
     damped_row = np.array([-a / omega_d, 0.5 / omega_d, 0.0, 0.0, 0.0])
     # In-phase part x = A cos φ is the angle, quadrature A sin φ = −(rate + a·angle)/ωd.
     in_phase, quadrature = amplitude * np.cos(phase), amplitude * np.sin(phase)
@@ -98,8 +95,8 @@ def damped_sinusoid_bound(
             (in_phase * x_row + quadrature * q_row) / amplitude,
             (in_phase * q_row - quadrature * x_row) / amplitude**2,
             damped_row / (2.0 * np.pi),
-            omega_row,
-            zeta_row,
+            np.array([0.0, 0.5 / omega, 0.0, 0.0, 0.0]),
+            np.array([1.0 / omega, -0.5 * a / omega**3, 0.0, 0.0, 0.0]),
             np.array([0.0, 0.0, 0.0, 0.0, 1.0]),
         ]
     )
@@ -114,7 +111,6 @@ class CampaignBound:
     The zero is common to the runs, unless one of them has no spring.
 
     Args:
-        parameters: names, as in `Estimate.parameters`.
         covariance: smallest covariance, shape (p, p), in the products of their units.
     """
 
@@ -122,14 +118,7 @@ class CampaignBound:
     covariance: tuple[tuple[float, ...], ...]
 
     def std(self, name: str) -> float:
-        """The smallest standard deviation of a parameter.
-
-        Args:
-            name: one of ``parameters``.
-
-        Raises:
-            KeyError: when the campaign does not determine it.
-        """
+        """The smallest standard deviation of a parameter; KeyError when the campaign does not determine it."""
         if name not in self.parameters:
             raise KeyError(name)
         place = self.parameters.index(name)
@@ -187,41 +176,31 @@ def campaign_bound(
     parameters: Array = np.linalg.lstsq(
         np.vstack(linked.links), np.array(truths, dtype=np.float64) / yaw_inertia, rcond=None
     )[0].astype(np.float64)
-    states = initial_states if initial_states is not None else _released(campaign)
+    states = initial_states
+    if states is None:
+        for run in runs:
+            if run.release_angle is None and run.drive is None:
+                remedy = "state release_angle or initial_states"
+                raise TunnelError("no initial state", where=f"run {run.id}", remedy=remedy)
+        states = [(run.release_angle or 0.0, 0.0) for run in runs]
     own = np.array([(0.0, angle, rate) for angle, rate in states])
     drifting = any(run.unrestrained for run in runs)
     filters = None
     if random_moments is not None:
-        coefficients = np.array([link[:2] @ parameters for link in linked.links])
-        filters = _whitening(runs, coefficients, np.asarray(random_moments), noise_std**2)
+        # From readings to innovations, of the variance of a reading.
+        dynamics, drive = np.zeros((2, len(runs), 2, 2))
+        dynamics[:, 0, 1] = 1.0
+        for of_run, link in zip(dynamics, linked.links, strict=True):
+            rate, stiffness = link[:2] @ parameters
+            of_run[1] = -stiffness, -2.0 * rate
+        drive[:, 1, 1] = random_moments
+        interval = np.array([run.record.duration / (run.record.time_s.size - 1) for run in runs])
+        variance = noise_std**2
+        steady = steady_filters(*discretised(dynamics, drive, interval), np.full(len(runs), variance))
+        filters = [(numerator * np.sqrt(variance / spread), poles) for numerator, poles, spread in steady]
     normal = normal_equations(runs, linked.links, parameters, own, own_zeros=drifting, filters=filters)[1]
     information, _ = eliminate(normal, np.zeros(len(normal)), design.size)
     found = derivatives(design, parameters[: design.size])
     covariance = found.jacobian @ (inverse(information) * noise_std**2) @ found.jacobian.T
     names = tuple(name for name in PARAMETERS if name in found.names)
     return CampaignBound(names, tuple(map(tuple, covariance.tolist())))
-
-
-def _released(campaign: Campaign) -> list[tuple[float, float]]:
-    states = []
-    for run in campaign.runs:
-        if run.release_angle is None and run.drive is None:
-            where = f"run {run.id}"
-            raise TunnelError("no initial state", where=where, remedy="state release_angle or initial_states")
-        states.append((run.release_angle or 0.0, 0.0))
-    return states
-
-
-def _whitening(
-    runs: Sequence[Run], coefficients: Array, intensities: Array, variance: float
-) -> list[tuple[Array, Array]]:
-    """The runs' filters from readings to innovations, of the variance of a reading; coefficients (a, k) by run."""
-    dynamics, drive = np.zeros((2, len(runs), 2, 2))
-    dynamics[:, 0, 1] = 1.0
-    dynamics[:, 1, 0], dynamics[:, 1, 1] = -coefficients[:, 1], -2.0 * coefficients[:, 0]
-    drive[:, 1, 1] = intensities
-    interval = np.array([run.record.duration / (run.record.time_s.size - 1) for run in runs])
-    steady = steady_filters(*discretised(dynamics, drive, interval), np.full(len(runs), variance))
-    return [
-        (numerator * np.sqrt(variance / spread), denominator) for numerator, denominator, spread in steady
-    ]

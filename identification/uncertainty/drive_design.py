@@ -1,11 +1,9 @@
 """The drive that tells most about Cnβ and Cnr, of those that a plan can express and a rig allows.
 
 Inputs are compared by the Cramér–Rao bound of the nominal model at the plan's truth, in the noise of its sensor
-and in the random moment of the plan's buffeting. A stepped sine begins at the resonances and loses
-frequencies as long as that lowers the bound. Its frequencies, and the ends of a multisine and a chirp, are then
-moved one at a time. The best of these, of sines at the resonances and of a broad multisine is taken. The response
-is linear in the input, so that the amplitude follows from the limits. Optimal inputs for linear systems: Goodwin &
-Payne, Dynamic System Identification (1977), ch. 6.
+and in the random moment of the plan's buffeting. The response is linear in the input, so that the amplitude
+follows from the limits. Optimal inputs for linear systems: Goodwin & Payne, Dynamic System Identification (1977),
+ch. 6.
 """
 
 from __future__ import annotations
@@ -58,11 +56,10 @@ class Limits:
 
 
 def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
-    """The bound of a plan's coefficients at its truth, with the quantisation, and with its buffeting.
+    """The bound of a plan's coefficients at its truth, of free decays and runs driven by a moment.
 
-    Args:
-        plan: free decays and runs driven by a moment. Of its effects only buffeting counts; its moment is taken as
-            white with the intensity that it has at each run's natural frequency.
+    Of its effects only buffeting counts; its moment is taken as white with the intensity that it has at each
+    run's natural frequency.
 
     Raises:
         TunnelError: where the runs do not determine Cnβ and Cnr, or the readings have no noise.
@@ -80,10 +77,19 @@ def plan_bound(plan: CampaignPlan, rig: Rig) -> CampaignBound:
         for c in plan.conditions
     )
     campaign = Campaign(plan.name, RigProperties.of(rig), SensorProperties.of(sensor), runs)
+    moments = None  # spectral intensity over the inertia at the natural frequency of each run, rad²/s³
+    if plan.effects:
+        from tunnel_sim.effects import effect_from  # only here: most plans have none
+
+        effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
+        if any(effect.random == "broad_band" for effect in effects):
+            moments = []
+            for condition in plan.conditions:
+                scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
+                rate = sqrt(_decay(plan, condition, rig)[1])
+                moments.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
     try:
-        bound = campaign_bound(
-            campaign, **asdict(plan.truth), noise_std=noise, random_moments=_random_moments(plan, rig)
-        )
+        bound = campaign_bound(campaign, **asdict(plan.truth), noise_std=noise, random_moments=moments)
     except np.linalg.LinAlgError:
         bound = CampaignBound((), ())
     if not {"cn_beta", "cn_r"} <= set(bound.parameters):
@@ -136,15 +142,14 @@ def within_limits(
     """The driven plan whose input is as large as the limits allow.
 
     Args:
-        drive: of one amplitude, which is replaced.
         duration: of each record, s.
     """
     unit = driven_plan(document, drive.model_copy(update={"amplitudes_nm": [1.0]}), duration)
     plan = plan_from(unit, rig, document.name)
     largest = min(limits.moment, limits.angle / _peak_between_samples(plan, drive, rig))
-    return driven_plan(
-        document, drive.model_copy(update={"amplitudes_nm": [_rounded_down(largest)]}), duration
-    )
+    digit = 10.0 ** (_DIGITS - 1 - floor(log10(largest)))
+    rounded_down = floor(largest * digit) / digit
+    return driven_plan(document, drive.model_copy(update={"amplitudes_nm": [rounded_down]}), duration)
 
 
 def propose_drive(
@@ -156,15 +161,15 @@ def propose_drive(
     duration: float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> PlanDocument:
-    """The driven plan whose bound is the lowest that the search finds.
+    """The driven plan, of one run for each spring and speed, whose bound is the lowest that the search finds.
+
+    A stepped sine begins at the resonances and loses frequencies as long as that lowers the bound. Its
+    frequencies, and the ends of a multisine and a chirp, are then moved one at a time. The best of these, of
+    sines at the resonances and of a broad multisine is taken.
 
     Args:
         document: of free decays; its conditions, sensor and truth are kept.
         duration: of each record, s; None: the plan's.
-        progress: called after each input that was tried.
-
-    Returns:
-        A plan of one driven run for each spring and speed, by a moment on the body.
 
     Raises:
         TunnelError: as `plan_bound` and `peak_response`.
@@ -177,13 +182,18 @@ def propose_drive(
             "the wind overcomes the spring: a run has no resonance",
             remedy="lower wind_speeds, or stiffen springs",
         )
-    coarse = _thinned(document, _PER_CYCLE * _BROAD * resonances[-1])
+    coarse, rate = document, _PER_CYCLE * _BROAD * resonances[-1]
+    if rate < document.sample_rate:  # fewer readings of as much information
+        sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
+        noise = _noise(sensor) * sqrt(rate / document.sample_rate)
+        thin = SensorModelTable(sample_rate=rate, noise_std=noise, resolution=0.0)
+        coarse = document.model_copy(update={"sensor": thin})
     tried: dict[str, float] = {}
 
     def score(drive: DriveTable) -> float:
         key = drive.model_dump_json()
         if key not in tried:
-            tried[key] = _score(driven_plan(coarse, drive, length), rig, limits, goal)
+            tried[key] = _score(driven_plan(coarse, drive, length), drive, rig, limits, goal)
             progress()
         return tried[key]
 
@@ -252,15 +262,8 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS + 1}g}")
 
 
-def _rounded_down(value: float) -> float:
-    unit = 10.0 ** (_DIGITS - 1 - floor(log10(value)))
-    return floor(value * unit) / unit
-
-
-def _score(unit: PlanDocument, rig: Rig, limits: Limits, goal: Goal) -> float:
+def _score(unit: PlanDocument, drive: DriveTable, rig: Rig, limits: Limits, goal: Goal) -> float:
     """Logarithm of Cnr's standard deviation or of the geometric mean of both; infinite for a refused input."""
-    drive = unit.drive
-    assert drive is not None
     try:
         check_drive(drive, unit.samples, unit.sample_rate, unit.name)
     except TunnelError:
@@ -271,9 +274,8 @@ def _score(unit: PlanDocument, rig: Rig, limits: Limits, goal: Goal) -> float:
     if goal == "cn_r":
         return log(bound.std("cn_r")) - log(amplitude)
     places = [bound.parameters.index(name) for name in ("cn_beta", "cn_r")]
-    return 0.25 * float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1]) - log(
-        amplitude
-    )
+    volume = float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1])
+    return 0.25 * volume - log(amplitude)
 
 
 def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> float:
@@ -286,16 +288,6 @@ def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> fl
         *(sqrt(_decay(plan, c, rig)[1]) / (2.0 * pi) for c in plan.conditions),
     )
     return peak_response(plan, rig) / max(cos(pi * fastest / plan.sensor.sample_rate), 0.5)
-
-
-def _thinned(document: PlanDocument, sample_rate: float) -> PlanDocument:
-    """The same plan with fewer readings of as much information."""
-    if sample_rate >= document.sample_rate:
-        return document
-    sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
-    noise = _noise(sensor) * sqrt(sample_rate / document.sample_rate)
-    thin = SensorModelTable(sample_rate=sample_rate, noise_std=noise, resolution=0.0)
-    return document.model_copy(update={"sensor": thin})
 
 
 def _noise(sensor: SensorModel) -> float:
@@ -317,18 +309,3 @@ def _air(condition: Condition, rig: Rig) -> dict[str, float]:
         "frontal_area": rig.body.frontal_area,
         "reference_length": rig.body.length,
     }
-
-
-def _random_moments(plan: CampaignPlan, rig: Rig) -> list[float] | None:
-    """Spectral intensity of the buffeting of each run over the inertia, at its natural frequency, rad²/s³."""
-    from tunnel_sim.effects import effect_from  # only here: most plans have none
-
-    effects = [effect_from(setting.name, setting.parameters) for setting in plan.effects]
-    if not any(effect.random == "broad_band" for effect in effects):
-        return None
-    found = []
-    for condition in plan.conditions:
-        scale = aerodynamic_stiffness(1.0, **_air(condition, rig)) / plan.truth.yaw_inertia
-        rate = sqrt(_decay(plan, condition, rig)[1])
-        found.append(scale**2 * sum(effect.moment_density(rate) for effect in effects))
-    return found

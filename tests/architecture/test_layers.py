@@ -77,7 +77,7 @@ def test_the_import_contracts_hold() -> None:
         ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
         ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
         ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
-        ("identification/statistics.py", "import identification.signal.peaks"),
+        ("identification/statistics.py", "import identification.signal.frequency"),
         ("diagnosis/result.py", "import diagnosis.search.investigate"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.run_settings"),
         ("tunnel_lab/cli.py", "import tunnel_reference.forms"),

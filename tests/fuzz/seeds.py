@@ -197,8 +197,8 @@ def weights() -> tuple[bytes, dict[str, Any]]:
 @cache
 def checkpoint() -> tuple[Any, bytes]:
     """A training of a few steps, and the checkpoint it had after half of them."""
+    from identification.neural.networks import DataSpec
     from identification.neural.train import TrainingSpec, train
-    from identification.neural.training_set import DataSpec
 
     data = DataSpec(zeta_count=8, grid=(3, 4), test_count=4)
     spec = TrainingSpec(seed=5, data=data, starts=1, damping_steps=2, frequency_steps=2)

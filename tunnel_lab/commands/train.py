@@ -81,8 +81,8 @@ def run(
     [bold]Exit status[/bold]
       0 trained, 2 bad input, 130 interrupted (finished work is kept).
     """
+    from identification.neural.networks import DataSpec
     from identification.neural.train import TrainingSpec
-    from identification.neural.training_set import DataSpec
 
     if out.suffix != ".safetensors":
         _refuse(f"{out}", "does not end in .safetensors", "give the file this suffix")

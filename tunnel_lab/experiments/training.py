@@ -16,7 +16,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from identification.neural.posterior.network import (
+from identification.neural.posterior import (
     KINDS,
     TrainedPosterior,
     forward,

@@ -14,8 +14,8 @@ import numpy as np
 from safetensors.numpy import load_file, save
 
 from identification.campaign.derivatives import build_design
-from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import Features, campaign_features, record_features
+from identification.neural.demodulated import Demodulated, demodulate
+from identification.neural.rivals import Features, campaign_features, record_features
 from tunnel_reference.catalogue import LINEAR_IN_A_RECORD, LOST_SAMPLES, ROD, Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign

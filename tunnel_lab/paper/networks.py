@@ -13,9 +13,8 @@ import numpy as np
 from identification import identify
 from identification.datasets import paper_derivatives, paper_springs, paper_windows
 from identification.estimate import Estimate, WindowEstimate
-from identification.neural.networks import Networks, shipped_networks
+from identification.neural.networks import Networks, held_out_points, shipped_networks
 from identification.neural.three_cycles import cycles_time, network_inputs
-from identification.neural.training_set import held_out_points
 from identification.printing import concise, significant
 from identification.signal.free_decay import Decay, response_rows
 from tunnel_lab.paper.page import Picture, Section, signed

@@ -161,7 +161,7 @@ def test_scatter_is_unknown_where_no_run_can_be_spared():
 @pytest.mark.slow
 def test_scatter_beyond_noise_is_flagged_as_rarely_as_stated():
     """Four sums of squares at 1 % each; a ratio that ignored how far a run bends the fit to itself would not."""
-    from identification.uncertainty.scatter import side_scatter
+    from identification.uncertainty.budget import side_scatter
 
     flagged = 0
     for seed in range(60):

@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from identification.scoring import Aspect, Trials, _rank_sum, changes, holm
+from identification.scoring import Aspect, Trials, _larger, changes, holm
 
 CELLS, COUNT = 6, 60
 
@@ -159,5 +159,5 @@ def test_ranks_of_several_cells_are_weighed_as_van_elteren_does():
         excess += (wins - 0.5 * n * m) / (n + m + 1)
         variance += n * m / (12.0 * (n + m + 1))
     expected = 0.5 * math.erfc(excess / math.sqrt(2.0 * variance))
-    assert _rank_sum(cells) == pytest.approx(expected, rel=1e-9)
-    assert _rank_sum([(np.zeros(0), np.ones(3))]) == 1.0
+    assert _larger(cells, same=False) == pytest.approx(expected, rel=1e-9)
+    assert _larger([(np.zeros(0), np.ones(3))], same=False) == 1.0

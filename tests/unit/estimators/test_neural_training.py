@@ -10,27 +10,33 @@ import pytest
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
-from identification.neural.levenberg import (
-    Hyperparameters,
-    Problem,
-    Progress,
-    advance_training,
-    first_weights,
-    log_evidence,
-    one_thread,
-    outputs_and_jacobian,
-    updated_hyperparameters,
-)
 from identification.neural.networks import (
+    DAMPING,
+    FREQUENCY,
+    SIZES,
+    DataSpec,
     held_out_errors,
     networks_of,
     parameter_count,
     shipped_networks,
     shipped_record,
+    training_pairs,
 )
 from identification.neural.three_cycles import network_inputs, response_points
-from identification.neural.train import Checkpoint, TrainingSpec, train
-from identification.neural.training_set import DAMPING, FREQUENCY, SIZES, DataSpec, training_pairs
+from identification.neural.train import (
+    Checkpoint,
+    Hyperparameters,
+    Problem,
+    Progress,
+    TrainingSpec,
+    advance_training,
+    first_weights,
+    log_evidence,
+    one_thread,
+    outputs_and_jacobian,
+    train,
+    updated_hyperparameters,
+)
 from tunnel_sim.vocabulary.errors import TunnelError
 
 SHORT = TrainingSpec(seed=5, data=DataSpec(zeta_count=40, grid=(5, 9), test_count=50), starts=2,
@@ -244,7 +250,7 @@ def test_numpy_and_torch_agree_on_the_shipped_networks():
         np.testing.assert_allclose(network.input_gradient(rows[7]), moved.grad.numpy(), rtol=1e-9, atol=1e-12)
         # The posterior from its few directions, against the whole matrix.
         start = next(s for s in starts_of(network) if s["chosen"])
-        pairs = network.inputs.apply(training_pairs(networks.spec, start["which"]).inputs)
+        pairs = network.inputs.apply(training_pairs(networks.spec, start["which"])[0])
         whole = outputs_and_jacobian(
             torch.from_numpy(network.weights), network.sizes, torch.from_numpy(pairs)
         )[1]

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from decays import campaign, grid, run
 
-from identification.examination.clock import find_clock, with_clocks
-from identification.examination.examine import examine
+from identification.examination.examine import examine, find_clock, with_clocks
 from identification.status import Outcome
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Record, evenly_spaced

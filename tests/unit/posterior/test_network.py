@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from identification.neural.posterior.network import TrainedPosterior, forward, to_bytes, trained_of
+from identification.neural.posterior import TrainedPosterior, forward, to_bytes, trained_of
 from tunnel_lab.experiments.training import INPUTS, FitSpec, contexts, fit, judged, losses, start_state
 from tunnel_reference.forms import FAMILIES
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from identification.campaign.derivatives import build_design
-from identification.neural.posterior.demodulated import Demodulated, demodulate
-from identification.neural.posterior.features import OWN, _conditions, record_features
-from identification.neural.posterior.network import distribution, quantiles
-from identification.neural.posterior.rivals import (
+from identification.neural.demodulated import Demodulated, RivalWindows, demodulate
+from identification.neural.posterior import distribution, quantiles
+from identification.neural.rivals import (
+    OWN,
     RivalConditions,
-    RivalWindows,
     best_step,
     campaign_columns,
     fit_rivals,
     forward_selection,
+    record_features,
 )
 from identification.signal.free_decay import Decay, free_decay
 from identification.status import Status
@@ -136,7 +136,7 @@ def test_an_error_of_the_wind_speed_that_is_a_power_of_it_is_a_rival(power):
 def test_conditions_of_the_runs_are_shares_of_the_fastest_and_places_of_the_springs():
     plan = ((44.84, 12.0), (16.12, 0.0), (16.12, 24.0), (21.02, 18.0))
     data = campaign(tuple(Setting(*of) for of in plan), duration=1.0)
-    found = _conditions(data.runs, build_design(data.runs, data.rig), (0.5, -0.3))
+    found = RivalConditions.of(data.runs, build_design(data.runs, data.rig), (0.5, -0.3))
     assert found.speed == pytest.approx([0.5, 0.0, 1.0, 0.75])
     assert found.spring.tolist() == [2, 0, 0, 1]
     assert found.stiffness.tolist() == [spring for spring, _ in plan]
@@ -144,7 +144,7 @@ def test_conditions_of_the_runs_are_shares_of_the_fastest_and_places_of_the_spri
     assert found.stiffness_load == pytest.approx(0.5 * DENSITY * speed**2 * AREA * LENGTH)
     assert found.damping_load == pytest.approx(0.5 * DENSITY * speed * AREA * LENGTH**2)
     still = data.runs[1:2]
-    assert _conditions(still, build_design(still, data.rig), (0.0, 0.0)).speed.tolist() == [0.0]
+    assert RivalConditions.of(still, build_design(still, data.rig), (0.0, 0.0)).speed.tolist() == [0.0]
 
 
 @pytest.mark.parametrize(("zeta", "noise"), [(0.07, 5e-3), (0.1, 1e-3), (0.1, 5e-3)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from identification.signal.peaks import _line, follow_peaks
+from identification.signal.frequency import _line, follow_peaks
 from tunnel_sim.vocabulary.record import Record
 
 

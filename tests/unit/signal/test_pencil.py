@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.signal import pencil
+from identification.signal import frequency
 from identification.signal.free_decay import Decay, free_decay
-from identification.signal.pencil import pencil_decay
+from identification.signal.frequency import pencil_decay
 
 
 @pytest.mark.parametrize("zeta", [-0.01, 0.0, 0.002, 0.05, 0.4, 1.5])
@@ -46,7 +46,7 @@ def test_short_and_long_records_are_decomposed_alike(zeta, monkeypatch):
     yaw = free_decay(0.05 * np.arange(60), Decay.from_modal(9.0, zeta), 0.3, 0.0)
     yaw += 1e-3 * np.random.default_rng(6).standard_normal(60)
     dense = pencil_decay(yaw, 0.05, 9.0)
-    monkeypatch.setattr(pencil, "_DENSE", 0)
+    monkeypatch.setattr(frequency, "_DENSE", 0)
     iterated = pencil_decay(yaw, 0.05, 9.0)
     assert iterated.decay.rate == pytest.approx(dense.decay.rate, rel=1e-7)
     assert iterated.decay.stiffness == pytest.approx(dense.decay.stiffness, rel=1e-9)

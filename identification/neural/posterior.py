@@ -1,12 +1,8 @@
-"""The network that weighs the rivals, its files, and the posterior it gives.
+"""The network that weighs the rivals, from all rivals and all runs, its files, and the posterior it gives.
 
-The network gives a weight and a width to every rival, from all rivals and all runs. Every rival goes through the
-same layers, and every run through others; runs are pooled, so their order and number do not matter. The
-posterior of each quantity is the mixture of the rivals' normal distributions, scaled and widened. The network
-only learns when to believe which rival, and how far.
-
-The function runs in NumPy for an estimate and in torch for training. Trained networks are kept as safetensors,
-with their record beside them as JSON, without pickle.
+The posterior of each quantity is the mixture of the rivals' normal distributions, scaled and widened: the network
+only learns when to believe which rival, and how far. It runs in NumPy for an estimate and in torch for training.
+Trained networks are kept as safetensors, with their record beside them as JSON, without pickle.
 """
 
 from __future__ import annotations
@@ -22,9 +18,8 @@ from safetensors.numpy import save
 from scipy.special import ndtr
 
 from identification.estimate import Quantity
-from identification.neural.posterior.features import LEVEL, Features
-from identification.neural.posterior.rivals import MORE, SETS
-from identification.neural.training_set import open_stored, read_packaged, read_stored
+from identification.neural.networks import open_stored, read_packaged, read_stored
+from identification.neural.rivals import LEVEL, MORE, SETS, Features
 from tunnel_sim.vocabulary.record import Array
 
 LEVELS = (0.025, 0.5, 0.975)
@@ -35,32 +30,20 @@ _NEGLIGIBLE = 1e-9  # weight of a component that moves no quantile
 
 
 def distribution(weights: Array, means: Array, stds: Array, values: Array) -> Array:
-    """Cumulative probability of mixtures.
+    """Cumulative probability of mixtures, shape (b, q, d).
 
     Args:
         weights: shape (b, r), each row sums to 1.
         means: shape (b, r, d).
         stds: shape (b, r, d).
         values: shape (b, q, d).
-
-    Returns:
-        Shape (b, q, d).
     """
     away = (values[:, :, None, :] - means[:, None]) / stds[:, None]
     return np.asarray((weights[:, None, :, None] * ndtr(away)).sum(axis=2))
 
 
 def quantiles(weights: Array, means: Array, stds: Array) -> Array:
-    """The quantiles at `LEVELS`, by bisection.
-
-    Args:
-        weights: shape (b, r).
-        means: shape (b, r, d).
-        stds: shape (b, r, d).
-
-    Returns:
-        Shape (b, 3, d).
-    """
+    """The quantiles at `LEVELS`, by bisection, shape (b, 3, d): arguments as in `distribution`."""
     there = (weights > _NEGLIGIBLE)[..., None]
     low = np.where(there, means - _FAR * stds, np.inf).min(axis=1)[:, None, :]
     high = np.where(there, means + _FAR * stds, -np.inf).max(axis=1)[:, None, :]
@@ -73,25 +56,6 @@ def quantiles(weights: Array, means: Array, stds: Array) -> Array:
         below = distribution(weights, means, stds, middle) < levels
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     return np.asarray(0.5 * (low + high))
-
-
-def correlation(weights: Array, means: Array, covariances: Array, extras: Array) -> Array:
-    """Correlations of one mixture.
-
-    Args:
-        weights: shape (r,).
-        means: shape (r, d).
-        covariances: of each component, shape (r, d, d).
-        extras: variances added to them, shape (r, d).
-
-    Returns:
-        Shape (d, d).
-    """
-    centred = means - weights @ means
-    spread = covariances + np.einsum("ri,rj->rij", centred, centred)
-    total = np.einsum("r,rij->ij", weights, spread) + np.diag(weights @ extras)
-    sizes = np.sqrt(np.diag(total))
-    return np.asarray(total / np.outer(sizes, sizes))
 
 
 Tensor = Any
@@ -128,12 +92,7 @@ class Output:
 def weight_shapes(
     rivals: int, features: int, runs: int, quantities: int, effects: int
 ) -> dict[str, tuple[int, ...]]:
-    """Shapes of the trained weights by name; a matrix ends in ``.w`` and its bias in ``.b``.
-
-    Args:
-        features: of a rival.
-        runs: features of a run.
-    """
+    """Shapes of the trained weights by name; a matrix ends in ``.w`` and its bias in ``.b``."""
     layers = {
         "token1": (features, TOKEN),
         "token2": (TOKEN, TOKEN),
@@ -162,9 +121,13 @@ def forward(
 ) -> Output:
     """Put samples through the network.
 
+    Every rival goes through the same layers, and every run through others; runs are pooled, so their order and
+    number do not matter.
+
     Args:
         xp: numpy or torch.
-        weights: as `weight_shapes`, with the scalings ``rivals.mean``, ``rivals.std``, ``runs.mean``, ``runs.std``.
+        weights: as `weight_shapes`, with the scalings ``rivals.mean``, ``rivals.std``, ``runs.mean``,
+            ``runs.std``.
         rivals: features, shape (b, r, f).
         runs: features, shape (b, n, k); after them 1 for a run and 0 for padding.
         valid: 1 for rivals that apply, shape (b, r).
@@ -177,12 +140,15 @@ def forward(
     def positive(values: Tensor) -> Tensor:
         return values * (values > 0.0)
 
+    def scaled(values: Tensor, name: str) -> Tensor:
+        return xp.clip((values - weights[f"{name}.mean"]) / weights[f"{name}.std"], -_CLIP, _CLIP)
+
     shown = valid[..., None]
-    tokens = _scaled(xp, rivals, weights, "rivals") * shown
+    tokens = scaled(rivals, "rivals") * shown
     hidden = positive(layer("token1", tokens) + weights["names"])
     hidden = positive(layer("token2", hidden)) * shown
     mask, on = runs[..., -1:], runs[..., -1:] * (runs[..., -2:-1] > 0.0)
-    seen = _scaled(xp, runs[..., :-1], weights, "runs") * mask
+    seen = scaled(runs[..., :-1], "runs") * mask
     seen = positive(layer("run2", positive(layer("run1", seen)))) * mask
     pooled = (
         tokens[..., 0],
@@ -211,10 +177,6 @@ def forward(
     return Output(
         logarithms, means, scales, (along * shifts) ** 2 + extras**2, layer("effects", context), context
     )
-
-
-def _scaled(xp: Any, values: Tensor, weights: Mapping[str, Tensor], name: str) -> Tensor:
-    return xp.clip((values - weights[f"{name}.mean"]) / weights[f"{name}.std"], -_CLIP, _CLIP)
 
 
 def variances(output: Output, widths: Tensor) -> Tensor:
@@ -277,14 +239,7 @@ def to_bytes(networks: Mapping[str, TrainedPosterior]) -> bytes:
 
 
 def read_trained(path: Path) -> dict[str, TrainedPosterior]:
-    """Read networks that ``tunnel train`` wrote.
-
-    Args:
-        path: the safetensors file; its record is the ``.json`` of the same name beside it.
-
-    Raises:
-        TunnelError: when a file is missing or malformed, or the two do not belong together.
-    """
+    """Read networks that ``tunnel train`` wrote: arguments and errors as in `trained_of` and `read_stored`."""
     return trained_of(*read_stored(path), str(path))
 
 
@@ -295,37 +250,34 @@ def shipped_posteriors() -> dict[str, TrainedPosterior]:
 
 
 def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPosterior]:
-    """Networks from the contents of their two files.
+    """Networks from safetensors and the JSON of their training record, by kind.
 
     Raises:
         TunnelError: when they are malformed, or do not belong together.
     """
     with open_stored(weights, record, where, estimator="neural_posterior") as (tensors, document):
-        return {kind: _one(tensors, kind, document) for kind in KINDS}
+        found = {}
+        for kind in KINDS:
+            own = {
+                name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
+                for name, value in tensors.items()
+                if name.startswith(f"{kind}/")
+            }
+            stated = document["networks"][kind]
+            counts = ("rivals", "features", "runs", "quantities", "effects")
+            for name, shape in weight_shapes(*(stated["sizes"][count] for count in counts)).items():
+                if own[name].shape != shape:
+                    raise ValueError(name)
+            if not all(np.all(np.isfinite(value)) for value in own.values()):
+                raise ValueError(kind)
+            centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
+            threshold, effects = float(stated["threshold"]), tuple(document["effects"])
+            found[kind] = TrainedPosterior(own, centre, precision, threshold, effects)
+        return found
 
 
-def _one(tensors: Mapping[str, Array], kind: str, document: Mapping[str, Any]) -> TrainedPosterior:
-    own = {
-        name.removeprefix(f"{kind}/"): np.asarray(value, dtype=np.float64)
-        for name, value in tensors.items()
-        if name.startswith(f"{kind}/")
-    }
-    stated = document["networks"][kind]
-    expected = weight_shapes(
-        *(stated["sizes"][name] for name in ("rivals", "features", "runs", "quantities", "effects"))
-    )
-    for name, shape in expected.items():
-        if own[name].shape != shape:
-            raise ValueError(name)
-    if not all(np.all(np.isfinite(value)) for value in own.values()):
-        raise ValueError(kind)
-    centre, precision = own.pop("unlike.centre"), own.pop("unlike.precision")
-    return TrainedPosterior(own, centre, precision, float(stated["threshold"]), tuple(document["effects"]))
-
-
-_NOISY = float(
-    np.log(0.5)
-)  # of χ² over its freedom: less is a record with hardly any noise, which nothing contradicts
+# Logarithm of χ² over its freedom: less is a record with hardly any noise, which nothing contradicts.
+_NOISY = float(np.log(0.5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,8 +288,6 @@ class Posterior:
         values: medians, SI, shape (d,).
         intervals: 95 % intervals, SI, shape (d, 2).
         covariance: of normal distributions with these intervals and the mixture's correlations, SI, shape (d, d).
-        effects: probability of each effect by name.
-        unlike: whether the sample is unlike anything trained on.
     """
 
     values: Array
@@ -360,11 +310,15 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
     shifts = np.stack([one.shifts for one in samples])
     covariances = np.stack([one.covariances for one in samples])
     known = np.stack([one.known for one in samples])
+    longest = max(len(one.runs) for one in samples)
+    runs = np.zeros((len(samples), longest, samples[0].runs.shape[1] + 1))
+    for place, one in enumerate(samples):  # with 1 after the features of a run, and 0 after padding
+        runs[place, : len(one.runs), :-1], runs[place, : len(one.runs), -1] = one.runs, 1.0
     output = forward(
         np,
         network.weights,
         np.stack([one.rivals for one in samples]),
-        padded_runs([one.runs for one in samples]),
+        runs,
         np.stack([one.valid for one in samples]).astype(np.float64),
         shifts,
     )
@@ -380,7 +334,14 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
         stds = (high - low) / NORMAL_WIDTH
         scaled = covariances[place] * output.scales[place, :, :, None] ** 2
         scaled = np.where(np.outer(one.known, one.known), scaled, np.eye(one.known.size))
-        related = correlation(weights[place], output.means[place], scaled, output.extras[place])
+        # Correlations of the mixture, shape (d, d).
+        centred = output.means[place] - weights[place] @ output.means[place]
+        spread = scaled + np.einsum("ri,rj->rij", centred, centred)
+        related = np.einsum("r,rij->ij", weights[place], spread) + np.diag(
+            weights[place] @ output.extras[place]
+        )
+        sizes = np.sqrt(np.diag(related))
+        related = related / np.outer(sizes, sizes)
         result.append(
             Posterior(
                 middle,
@@ -391,18 +352,3 @@ def posteriors(samples: Sequence[Features], network: TrainedPosterior) -> list[P
             )
         )
     return result
-
-
-def padded_runs(runs: Sequence[Array]) -> Array:
-    """Features of the runs of several campaigns in one array, with 1 after those of a run and 0 after padding.
-
-    Args:
-        runs: shape (n, k) each.
-
-    Returns:
-        Shape (b, largest n, k + 1).
-    """
-    table = np.zeros((len(runs), max(len(one) for one in runs), runs[0].shape[1] + 1))
-    for place, one in enumerate(runs):
-        table[place, : len(one), :-1], table[place, : len(one), -1] = one, 1.0
-    return table

@@ -1,15 +1,13 @@
 """A record as windows of whole periods: envelope, phase, zero and two harmonics, with their weights.
 
-The record is thinned to block means. In every window a least-squares fit gives the complex amplitudes of the
-oscillation and of its second and third harmonic, and the mean. The deviations from one damped oscillation are
-independent from window to window and nearly normal, so the fits that follow are linear. Missing samples only reduce
-the weight of a window.
+The deviations from one damped oscillation are independent from window to window and nearly normal, so the fits
+that follow are linear. Missing samples only reduce the weight of a window.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +45,6 @@ class Demodulated:
         third: of the third harmonic, shape (w,).
         noise: standard deviation of a block mean within the windows, rad.
         samples: block means in each window, shape (w,).
-        block: samples in a block mean.
         fast_noise: noise between neighbouring samples of the record over that of white noise of the same level.
         duration: of the record, s.
     """
@@ -72,20 +69,14 @@ class Demodulated:
 @dataclass(frozen=True, eq=False)
 class _Windows:
     time: Array
-    amplitudes: (
-        Array  # complex, one column per harmonic, at the windows' middles, phases from the first sample
-    )
+    amplitudes: Array  # complex, one column per harmonic, at the middles, phases from the first sample
     zero: Array
     samples: Array
     noise: float
 
 
 def demodulate(record: Record) -> Demodulated | Status:
-    """Reduce a record to windows.
-
-    Returns:
-        The windows; a status where nothing oscillates, or where fewer than four periods stand out of the noise.
-    """
+    """Reduce a record to windows; a status where nothing oscillates, or too few periods stand out of the noise."""
     frequency = starting_frequency(record)
     if frequency is None:
         return Status.NO_OSCILLATION
@@ -101,9 +92,14 @@ def demodulate(record: Record) -> Demodulated | Status:
         sizes = np.abs(windows.amplitudes[:, 0])
         if last:
             break
+        # Lines through logarithm and phase: the decay rate, and a correction of the frequency.
         noise = max(windows.noise, _ROUGH * peak)
-        falling, turning = _lines(windows, noise)
-        omega, rate = omega + turning, falling
+        weight = windows.samples * np.maximum(sizes, noise) ** 2
+        weight[sizes < noise * np.sqrt(2.0 / windows.samples)] *= 1e-3
+        centred = (windows.time - float(weight @ windows.time / weight.sum())) * weight
+        spread = float(centred @ windows.time)
+        rate = -(float(centred @ np.log(np.maximum(sizes, 1e-300))) / spread)
+        omega = omega + float(centred @ np.unwrap(np.angle(windows.amplitudes[:, 0]))) / spread
         if not (omega > 0.0 and np.isfinite(rate) and abs(rate) < omega):
             return Status.NO_OSCILLATION
         least = _SEEN * noise * np.sqrt(2.0 / windows.samples.mean())
@@ -120,7 +116,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
         return None
     edges = np.searchsorted(time, np.linspace(0.0, span * (1.0 + 1e-12), count + 1))
     sizes = np.diff(edges)
-    kept = sizes >= max(_LEAST_SAMPLES if harmonics > 1 else 5, 0)
+    kept = sizes >= (_LEAST_SAMPLES if harmonics > 1 else 5)
     if kept.sum() < LEAST_WINDOWS:
         return None
     place = np.repeat(np.arange(count), sizes)
@@ -137,7 +133,7 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
         columns += [power.real, power.imag]
     basis = np.stack(columns)
     size = len(basis)
-    upper = _upper(size)
+    upper = np.triu_indices(size)
     gram = np.empty((sizes.size, size, size))
     gram[:, upper[0], upper[1]] = np.add.reduceat(basis[upper[0]] * basis[upper[1]], starts, axis=1).T
     gram[:, upper[1], upper[0]] = gram[:, upper[0], upper[1]]
@@ -156,30 +152,10 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
     )
 
 
-@cache
-def _upper(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Places of the upper triangle of a square matrix."""
-    return np.triu_indices(size)
-
-
-def _lines(windows: _Windows, noise: float) -> tuple[float, float]:
-    """Decay rate, and correction of the frequency."""
-    sizes = np.abs(windows.amplitudes[:, 0])
-    weight = windows.samples * np.maximum(sizes, noise) ** 2
-    weight[sizes < noise * np.sqrt(2.0 / windows.samples)] *= 1e-3
-    mean = float(weight @ windows.time / weight.sum())
-    centred = (windows.time - mean) * weight
-    spread = float(centred @ windows.time)
-    logarithm = np.log(np.maximum(sizes, 1e-300))
-    slope = float(centred @ logarithm) / spread
-    phase = np.unwrap(np.angle(windows.amplitudes[:, 0]))
-    return -slope, float(centred @ phase) / spread
-
-
 def _relative(
     windows: _Windows, omega: float, rate: float, noise: float, record: Record, factor: int
 ) -> Demodulated | Status:
-    """Deviations from the oscillation of the last correction; a status where the windows have no common phase."""
+    """Deviations from one oscillation; a status where the windows have no common phase."""
     first = windows.amplitudes[:, 0]
     weight = windows.samples * np.abs(first) ** 2
     logs = np.log(np.maximum(np.abs(first), 1e-300)) + rate * windows.time
@@ -214,3 +190,85 @@ def _relative(
         fast_noise=fast / (noise * np.sqrt(factor)),
         duration=record.duration,
     )
+
+
+Places = NDArray[np.intp]
+Column = tuple[Array | None, Array | None]
+"""Of the logarithm of the amplitude and of the phase; None where it is zero."""
+_FLOOR = 0.02  # least amplitude over the first: smaller ones would make inverse powers of noise
+_POWERS = (-1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0)
+_SETTLING = 4.0  # time constants in a record
+
+
+@dataclass(frozen=True, eq=False)
+class RivalWindows:
+    """The windows of all runs, one after the other.
+
+    Args:
+        sizes: number of windows of each run, shape (runs,).
+        run: number of each window's run, shape (w,).
+        omega: angular frequency of each run, shape (runs,), rad/s.
+        rate: decay rate of each run, shape (runs,), 1/s.
+        time: shape (w,), s.
+        powers: of the amplitude, by exponent, shape (w,) each.
+        integrals: of these powers over time, by exponent, shape (w,) each.
+        drift: integral of the time as a share of the record, shape (w,), s.
+        settling: integral of a step that settles, shape (w,), s.
+    """
+
+    runs: Sequence[Demodulated]
+    sizes: Places
+    run: Places
+    omega: Array
+    rate: Array
+    time: Array
+    powers: dict[float, Array]
+    integrals: dict[float, Array]
+    drift: Array
+    settling: Array
+
+    @classmethod
+    def of(cls, runs: Sequence[Demodulated]) -> RivalWindows:
+        """Integrals over time, from each run's first window, by the trapezium rule."""
+        sizes = np.array([run.time.size for run in runs])
+        place = np.repeat(np.arange(len(runs)), sizes)
+        time = np.concatenate([run.time for run in runs])
+        first = np.array([run.amplitude[0] for run in runs])[place]
+        relative = np.concatenate([run.amplitude for run in runs]) / first
+        amplitude = first * np.maximum(relative, _FLOOR)
+        share = time / np.array([run.duration for run in runs])[place]
+        begins = np.concatenate(([0], np.cumsum(sizes)[:-1]))
+        steps = np.diff(time, prepend=0.0)
+        steps[begins] = 0.0
+        table = np.stack([*(amplitude**power for power in _POWERS), share, 1.0 - np.exp(-_SETTLING * share)])
+        before = np.concatenate((table[:, :1], table[:, :-1]), axis=1)
+        total = np.cumsum(0.5 * steps * (table + before), axis=1)
+        total = total - total[:, begins][:, place]
+        return cls(
+            runs,
+            sizes,
+            place,
+            np.array([run.omega for run in runs]),
+            np.array([run.rate for run in runs]),
+            time,
+            dict(zip(_POWERS, table, strict=False)),
+            dict(zip(_POWERS, total, strict=False)),
+            total[-2],
+            total[-1],
+        )
+
+    def joined(self, columns: Sequence[Column]) -> Array:
+        """Columns of logarithm and phase; within a run the logarithms of its windows come first."""
+        table = np.zeros((2, self.time.size, len(columns)))
+        for place, pair in enumerate(columns):
+            for channel, values in enumerate(pair):
+                if values is not None:
+                    table[channel, :, place] = values
+        ends = np.cumsum(self.sizes)
+        order = np.concatenate(
+            [
+                np.concatenate((np.arange(a, b), self.time.size + np.arange(a, b)))
+                for a, b in zip(ends - self.sizes, ends, strict=True)
+            ]
+        )
+        return np.asarray(table.reshape(2 * self.time.size, -1)[order])
