@@ -98,7 +98,8 @@ def sweep_file(file: Path, out: Path, workers: int | None, scheduler: str | None
         TunnelError: for bad input.
     """
     from tunnel_lab.experiments.runner import available_processors, lasting_processes, on_cluster
-    from tunnel_lab.experiments.sweep import read_sweep, run_sweep
+    from tunnel_lab.experiments.sweep import run_sweep
+    from tunnel_lab.experiments.sweep_cases import read_sweep
     from tunnel_lab.terminal.progress import bar
     from tunnel_lab.terminal.tables import say
     from tunnel_sim.vocabulary.errors import TunnelError
@@ -140,7 +141,7 @@ def show_summary(folder: Path) -> None:
 
     from tunnel_lab.experiments import sweep_summary
     from tunnel_lab.experiments.sweep import open_store
-    from tunnel_lab.experiments.sweep_summary import paces, summarise
+    from tunnel_lab.experiments.sweep_summary import summarise
     from tunnel_lab.plotting import style
     from tunnel_lab.terminal.tables import say, show_tables
     from tunnel_sim.files.writing import output_folder, write_encoded
@@ -162,7 +163,7 @@ def show_summary(folder: Path) -> None:
     show_tables(
         sweep_summary.overall_table(lines),
         *map(sweep_summary.axis_table, grouped.values()),
-        sweep_summary.pace_table(paces(store)),
+        sweep_summary.pace_table(store),
     )
     say(sweep_summary.BRACKETS)
     say(f"Written to {target}: {', '.join(path.name for path in written)}")

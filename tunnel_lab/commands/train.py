@@ -111,16 +111,16 @@ def _train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int
     if restart and folder.exists():
         shutil.rmtree(folder)
     with bar("training", 1) as progress:
-        trained = train(
+        weights, record = train(
             TrainingSpec(seed, shards, steps),
             folder,
             jobs=jobs,
             progress=lambda what, done, all_of_it: progress(done, all_of_it, what),
         )
-    write_whole(out, trained.weights)
-    write_json(out.with_suffix(".json"), trained.record)
+    write_whole(out, weights)
+    write_json(out.with_suffix(".json"), record)
     shutil.rmtree(folder)
-    for kind, network in trained.record["networks"].items():
+    for kind, network in record["networks"].items():
         losses = ", ".join(f"{part} {loss:.3f}" for part, (loss, _) in network["loss"].items())
         say(
             f"{kind}: {network['samples']['training']} samples; −ln of the density at the truth, in standard "

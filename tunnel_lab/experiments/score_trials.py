@@ -9,12 +9,15 @@ import hashlib
 import io
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib import resources
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import polars as pl
 
 from identification.estimate import UNITS, Quantity
 from identification.scoring import ScoredEstimate, Trials, collect
@@ -34,10 +37,6 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import polars as pl
-
     from identification.estimate import Estimate
     from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -48,6 +47,12 @@ UNIT_TRIALS = 5
 _COLUMNS = (
     "cell", "trial", "estimator", "quantity", "unit", "truth", "value", "std", "bound", "status", "milliseconds"
 )  # fmt: skip
+_TYPES: Mapping[str, Any] = {
+    **dict.fromkeys(("estimator", "quantity", "unit", "status"), pl.Utf8),
+    **dict.fromkeys(("truth", "value", "std", "bound", "milliseconds"), pl.Float64),
+    **dict.fromkeys(("cell", "trial"), pl.Int64),
+}
+_UNITS = {**UNITS, "zeta": "1", "omega_n": "rad/s"}
 Key = tuple[str, int, str]
 """Estimator, index of the cell, quantity."""
 
@@ -150,7 +155,7 @@ def estimate_rows(
                 **about,
                 "estimator": estimator,
                 "quantity": quantity,
-                "unit": unit_of(quantity),
+                "unit": _UNITS[quantity],
                 "truth": value,
                 "value": None if answer is None else answer.value,
                 "std": None if answer is None else answer.std,
@@ -166,15 +171,6 @@ def outcome(row: Row) -> ScoredEstimate:
     """A row as it is scored."""
     quantity = None if row["value"] is None else Quantity(row["value"], row["std"], row["unit"])
     return ScoredEstimate(row["truth"], quantity, row["bound"])
-
-
-def unit_of(quantity: str) -> str:
-    """Unit of a scored quantity.
-
-    Raises:
-        KeyError: when no cell scores it.
-    """
-    return {**UNITS, "zeta": "1", "omega_n": "rad/s"}[quantity]
 
 
 def score_grid(
@@ -236,8 +232,16 @@ def rows_of(
     """
     rows: dict[str, list[Row]] = {}
     if parts is not None:
-        kept = {task.name: _kept(parts / f"{task.name}.json", mark) for task in tasks}
-        rows = {name: found for name, found in kept.items() if found is not None}
+        for task in tasks:
+            try:
+                document = read_json(parts / f"{task.name}.json", remedy="score it again")
+            except TunnelError:  # there is none, or it is damaged
+                continue
+            kept = document.get("rows")
+            if document.get("fingerprint") != mark or not isinstance(kept, list):
+                continue
+            if all(isinstance(row, dict) for row in kept):
+                rows[task.name] = kept
 
     def keep(task: NamedT, found: list[Row]) -> None:
         if parts is not None:
@@ -285,17 +289,6 @@ def _code() -> str:
     return digest.hexdigest()
 
 
-def _kept(path: Path, mark: str) -> list[Row] | None:
-    """Stored rows of a task; None where there are none, or they have another mark."""
-    try:
-        document = read_json(path, remedy="score it again")
-    except TunnelError:
-        return None
-    rows = document.get("rows")
-    whole = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
-    return rows if whole and document.get("fingerprint") == mark else None
-
-
 def describe(cell: Cell) -> Row:
     """A cell's conditions as columns of a table, units in their names."""
     return {
@@ -338,8 +331,6 @@ class Results:
         Args:
             cells: indices of the cells to include.
         """
-        from statistics import median
-
         wanted = set(cells)
         return median(
             float(row["milliseconds"])
@@ -360,14 +351,11 @@ def groups_of(grid: Grid) -> dict[str, list[int]]:
     """Cells that are pooled: decays, campaigns, and campaigns with each effect."""
     groups: dict[str, list[int]] = {}
     for index, cell in enumerate(grid.cells):
-        groups.setdefault(_group(cell), []).append(index)
+        name = "single decays" if cell.kind == "decay" else "campaigns"
+        if cell.effect != NO_EFFECT:
+            name = f"campaigns with {cell.effect}"
+        groups.setdefault(name, []).append(index)
     return groups
-
-
-def _group(cell: Cell) -> str:
-    if cell.kind == "decay":
-        return "single decays"
-    return "campaigns" if cell.effect == NO_EFFECT else f"campaigns with {cell.effect}"
 
 
 def write_trials(path: Path, results: Results) -> Path:
@@ -376,8 +364,6 @@ def write_trials(path: Path, results: Results) -> Path:
     Args:
         path: the file; replaced when it exists.
     """
-    import polars as pl
-
     frame = trials_frame(results)
     described = json_line(results.grid.to_json_dict(), sort_keys=True)
     return write_whole(path, parquet(frame.with_columns(pl.lit(described).alias("grid"))))
@@ -389,10 +375,8 @@ def trials_frame(results: Results) -> pl.DataFrame:
     Returns:
         Columns as in the rows; ``cell`` is the index of the grid's cell.
     """
-    import polars as pl
-
     columns = {name: [row[name] for row in results.rows] for name in _COLUMNS}
-    return pl.DataFrame(columns, schema_overrides=_types())
+    return pl.DataFrame(columns, schema_overrides=_TYPES)
 
 
 def read_trials(path: Path) -> Results:
@@ -408,7 +392,7 @@ def read_trials(path: Path) -> Results:
     content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
     with as_described("is not a table of trials", where, remedy):
         schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
-        wrong = [name for name, kind in _types().items() if schema.get(name) != kind]
+        wrong = [name for name, kind in _TYPES.items() if schema.get(name) != kind]
         if wrong or "grid" not in schema:
             raise ValueError(", ".join(wrong) or "grid")
         frame = read_frame(content, where, remedy, _COLUMNS)
@@ -416,7 +400,20 @@ def read_trials(path: Path) -> Results:
         text = read_frame(content, where, remedy, ("grid",))["grid"][0]
         grid = Grid.from_json_dict(parse_json(text, where, remedy))
         rows = tuple(frame.to_dicts())
-        _check_rows(rows, grid)
+        wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
+        scored: dict[str, set[tuple[int, str]]] = {}
+        for row in rows:  # each estimator must have all cells, and each estimate all values
+            scored.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
+            if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
+                raise ValueError("a row without its truth or status")
+            if row["unit"] != _UNITS[row["quantity"]]:
+                raise ValueError("a unit that is not the quantity's")
+            if (row["value"] is None) != (row["std"] is None):
+                raise ValueError("a value without its standard deviation")
+            if not _can_be_scored(row):
+                raise ValueError("a number out of all range")
+        if not scored or any(cells != wanted for cells in scored.values()):
+            raise ValueError("cells that are not those of the grid")
     return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
 
 
@@ -424,24 +421,6 @@ def packaged_baseline() -> Results:
     """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
         return read_trials(path)
-
-
-def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
-    """Refuse incomplete rows: each estimator must have all cells, and each estimate all values."""
-    wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
-    scored: dict[str, set[tuple[int, str]]] = {}
-    for row in rows:
-        scored.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
-        if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
-            raise ValueError("a row without its truth or status")
-        if row["unit"] != unit_of(row["quantity"]):
-            raise ValueError("a unit that is not the quantity's")
-        if (row["value"] is None) != (row["std"] is None):
-            raise ValueError("a value without its standard deviation")
-        if not _can_be_scored(row):
-            raise ValueError("a number out of all range")
-    if not scored or any(cells != wanted for cells in scored.values()):
-        raise ValueError("cells that are not those of the grid")
 
 
 def _can_be_scored(row: Row) -> bool:
@@ -463,11 +442,3 @@ def parquet(frame: pl.DataFrame) -> bytes:
     buffer = io.BytesIO()
     frame.write_parquet(buffer, compression="zstd")
     return buffer.getvalue()
-
-
-def _types() -> dict[str, Any]:
-    import polars as pl
-
-    text = dict.fromkeys(("estimator", "quantity", "unit", "status"), pl.Utf8)
-    numbers = dict.fromkeys(("truth", "value", "std", "bound", "milliseconds"), pl.Float64)
-    return {**text, **numbers, "cell": pl.Int64, "trial": pl.Int64}

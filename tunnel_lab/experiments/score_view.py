@@ -34,7 +34,6 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     import polars as pl
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from rich.table import Table
 
@@ -105,13 +104,20 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
         TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.
     """
     estimators = [name for name in baseline.estimators if name in now.estimators]
-    places = _places(baseline, now)
+    for known in baseline.grid.cells:
+        if known not in now.grid.cells:
+            raise TunnelError(
+                f"the baseline's cell {known.label!r} is not in the grid",
+                where="--check",
+                remedy="leave the grid out: the baseline's own grid is then used",
+            )
     if not estimators:
         raise TunnelError(
             "the baseline has none of the estimators",
             where="--check",
             remedy=f"score one of {', '.join(baseline.estimators)}",
         )
+    places = [now.grid.cells.index(cell) for cell in baseline.grid.cells]
     before, after = baseline.trials(), now.trials()
     tested: list[tuple[str, str, str, Change]] = []
     for name in estimators:
@@ -119,7 +125,12 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
             for quantity in baseline.grid.cells[cells[0]].quantities:
                 old = [before[name, cell, quantity] for cell in cells]
                 new = [after[name, places[cell], quantity] for cell in cells]
-                tested += [(name, *rest) for rest in _tests(baseline, cells, group, quantity, old, new)]
+                for cell, *pair in zip(cells, old, new, strict=True):
+                    label = baseline.grid.cells[cell].label
+                    tested += [(name, label, quantity, c) for c in changes(pair[:1], pair[1:])]
+                if len(cells) > 1:
+                    every = f"all {len(cells)} {group}"
+                    tested += [(name, every, quantity, change) for change in changes(old, new)]
     verdicts = holm([change.p_value for *_, change in tested], rate)
     return Verdict(
         findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
@@ -127,36 +138,6 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
         identical=_estimates(baseline, estimators) == _estimates(now, estimators),
         added=tuple(name for name in now.estimators if name not in baseline.estimators),
     )
-
-
-def _tests(
-    baseline: Results,
-    cells: Sequence[int],
-    group: str,
-    quantity: str,
-    old: Sequence[Trials],
-    new: Sequence[Trials],
-) -> list[tuple[str, str, Change]]:
-    tests = []
-    for cell, before, after in zip(cells, old, new, strict=True):
-        tests += [(baseline.grid.cells[cell].label, quantity, c) for c in changes([before], [after])]
-    if len(cells) > 1:
-        tests += [(f"all {len(cells)} {group}", quantity, change) for change in changes(old, new)]
-    return tests
-
-
-def _places(baseline: Results, now: Results) -> list[int]:
-    """Index of each of the baseline's cells in the present grid."""
-    places = []
-    for cell in baseline.grid.cells:
-        if cell not in now.grid.cells:
-            raise TunnelError(
-                f"the baseline's cell {cell.label!r} is not in the grid",
-                where="--check",
-                remedy="leave the grid out: the baseline's own grid is then used",
-            )
-        places.append(now.grid.cells.index(cell))
-    return places
 
 
 def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, int], object]:
@@ -181,31 +162,27 @@ def scores_frame(results: Results) -> pl.DataFrame:
     rows = []
     for (estimator, index, quantity), trials in results.trials().items():
         judged = score(trials)
+        figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
+        for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
+            found: Quantity | None = getattr(judged, name)
+            label = "relative_bias_percent" if name == "relative_bias" else name
+            figures[label] = None if found is None else found.value
+            figures[f"{label}_std_error"] = None if found is None else found.std
+        for name, share in {"coverage": judged.coverage, "failure_share": judged.failures}.items():
+            ends = (None, None) if share is None else share.interval
+            figures[name] = None if share is None else share.value
+            figures[f"{name}_low"], figures[f"{name}_high"] = ends
         rows.append(
             {
                 "estimator": estimator,
                 **describe(results.grid.cells[index]),
                 "quantity": quantity,
                 "unit": trials.unit,
-                **_figures(judged),
+                **figures,
                 "milliseconds_per_record": results.milliseconds(estimator, [index]),
             }
         )
     return pl.DataFrame(rows, infer_schema_length=None)
-
-
-def _figures(judged: Score) -> dict[str, Any]:
-    figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
-    for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
-        quantity: Quantity | None = getattr(judged, name)
-        label = "relative_bias_percent" if name == "relative_bias" else name
-        figures[label] = None if quantity is None else quantity.value
-        figures[f"{label}_std_error"] = None if quantity is None else quantity.std
-    shares = {"coverage": judged.coverage, "failure_share": judged.failures}
-    for name, share in shares.items():
-        figures[name] = None if share is None else share.value
-        figures[f"{name}_low"], figures[f"{name}_high"] = (None, None) if share is None else share.interval
-    return figures
 
 
 def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
@@ -318,24 +295,16 @@ def worse_table(verdict: Verdict) -> Table:
         right=("before", "now", "p"),
     )
     for finding in verdict.worse[:_SHOWN_WORSE]:
-        before, now = _before_and_now(finding)
+        change = finding.change
+        if change.aspect in ("bias", "spread"):
+            before, now = significant(change.before, 3), significant(change.now, 3)
+        else:
+            before, now = f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
         result.add_row(
-            Text(finding.estimator),
-            NAMES[finding.quantity],
-            finding.change.aspect,
-            before,
-            now,
-            f"{finding.change.p_value:.1g}",
+            Text(finding.estimator), NAMES[finding.quantity], change.aspect, before, now, f"{change.p_value:.1g}",
             Text(finding.where),
-        )
+        )  # fmt: skip
     return result
-
-
-def _before_and_now(finding: Finding) -> tuple[str, str]:
-    change = finding.change
-    if change.aspect in ("bias", "spread"):
-        return significant(change.before, 3), significant(change.now, 3)
-    return f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
 
 
 def verdict_lines(verdict: Verdict) -> list[str]:
@@ -393,9 +362,25 @@ def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], 
         for place, quantity in enumerate(quantities):
             scores = [score(trials[name, cell, quantity]) for cell in cells]
             shift = 0.36 * ((place + 0.5) / len(quantities) - 0.5)
-            draw = _coverage if covered else _errors
-            style = {"color": COLOURS[place], "marker": MARKERS[place], "label": NAMES[quantity]}
-            draw(axes, scores, shift, style)
+            spans: Any
+            if covered:
+                shares = [(row + shift, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
+                rows, values = (
+                    [row for row, _ in shares],
+                    np.array([100 * share.value for _, share in shares]),
+                )
+                ends = 100 * np.array([share.interval for _, share in shares]).reshape(-1, 2)
+                spans = np.maximum(np.stack((values - ends[:, 0], ends[:, 1] - values)), 0.0)
+            else:
+                errors = [
+                    (row + shift, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound
+                ]
+                rows, values = [row for row, _ in errors], np.array([error.value for _, error in errors])
+                spans = [min(INTERVAL * error.std, 0.9 * error.value) for _, error in errors]
+            axes.errorbar(
+                values, rows, xerr=spans, color=COLOURS[place], marker=MARKERS[place], label=NAMES[quantity],
+                linestyle="none", markersize=3.0, elinewidth=0.8,
+            )  # fmt: skip
         axes.set_title(name.replace("_", " "), loc="center", fontsize=8)
         axes.tick_params(axis="y", length=0)
         grid(axes, "x")
@@ -413,36 +398,20 @@ def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], 
     part.legend(handles, names, loc="upper right", ncols=len(names), borderaxespad=0.0)
 
 
-def _errors(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
-    points = [(row, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound is not None]
-    axes.errorbar(
-        [figure.value for _, figure in points],
-        [row + shift for row, _ in points],
-        xerr=[min(INTERVAL * figure.std, 0.9 * figure.value) for _, figure in points],
-        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
-    )  # fmt: skip
-
-
-def _coverage(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
-    points = [(row, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
-    value = np.array([100 * share.value for _, share in points])
-    ends = 100 * np.array([share.interval for _, share in points]).reshape(-1, 2)
-    spans = np.maximum(np.stack((value - ends[:, 0], ends[:, 1] - value)), 0.0)
-    axes.errorbar(
-        value,
-        [row + shift for row, _ in points],
-        xerr=spans,
-        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
-    )  # fmt: skip
-
-
 def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
     """The conditions of cells of one kind in a few words.
 
     Returns:
         What distinguishes each cell from the others; and what is common to all.
     """
-    parts = [_parts(cell) for cell in cells]
+    parts = []
+    for cell in cells:
+        noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
+        effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
+        if cell.kind == "decay":
+            parts.append((f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration))
+        else:
+            parts.append((f"{cell.wind_speed:g} m/s", noise, duration, effect))
     if len(parts) == 1:
         return [", ".join(filter(None, parts[0]))], ""
     varied = [len(set(column)) > 1 for column in zip(*parts, strict=True)]
@@ -452,11 +421,3 @@ def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
         for texts in parts
     ]
     return labels, ", ".join(common)
-
-
-def _parts(cell: Cell) -> tuple[str, ...]:
-    noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
-    if cell.kind == "decay":
-        return (f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration)
-    effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
-    return (f"{cell.wind_speed:g} m/s", noise, duration, effect)

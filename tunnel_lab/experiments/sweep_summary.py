@@ -187,42 +187,6 @@ def _score(data: pl.DataFrame) -> Score:
     )
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Time of one step of the work.
-
-    Args:
-        step: ``simulate``, an estimator's name or ``pack``.
-        middle: median over the shards, s per run.
-        low: their lower quartile, s per run.
-        high: their upper quartile, s per run.
-    """
-
-    step: str
-    middle: float
-    low: float
-    high: float
-
-
-def paces(store: Store) -> Sequence[Pace]:
-    """Times of the steps of a sweep per run; they are not comparable under different machine load.
-
-    Args:
-        store: at least one shard finished.
-
-    Raises:
-        TunnelError: when the timings are damaged.
-    """
-    import polars as pl
-
-    each = pl.col("seconds") / pl.col("runs")
-    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
-    folder = shown(store.folder / TIMINGS)
-    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
-        table = store.timings().group_by("step", maintain_order=True).agg(*wanted)
-        return [Pace(str(step), float(a), float(b), float(c)) for step, a, b, c in table.iter_rows()]
-
-
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
     """Lines grouped by figure.
 
@@ -253,37 +217,43 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     estimators = list(dict.fromkeys(line.estimator for line in lines))
     fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
     panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
-    logarithmic = _is_logarithmic(lines)
+    first, values = lines[0], [line.at for line in lines if line.at is not None]
+    spread = first.axis in _LOGARITHMIC and min(values) > 0.0 and max(values) / min(values) >= _WIDE
     for name, (errors, biases) in zip(quantities, panels, strict=True):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
         for place, estimator in enumerate(estimators):
-            shown = [line for line in mine if line.estimator == estimator and line.at is not None]
-            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE
-            at = _moved(shown, aside, logarithmic=logarithmic)
-            _errorbars(errors, at, [line.score.rmse for line in shown], place, estimator)
-            _errorbars(biases, at, [line.score.bias for line in shown], place, estimator)
-        _dress(errors, biases, mine[0], name)
+            drawn = [line for line in mine if line.estimator == estimator and line.at is not None]
+            at = [float(line.at) for line in drawn if line.at is not None]
+            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE  # intervals must not hide each other
+            if spread:
+                at = [x * (max(at) / min(at)) ** aside for x in at]
+            else:
+                at = [x + aside * (max(at) - min(at)) for x in at]
+            _errorbars(errors, at, [line.score.rmse for line in drawn], place, estimator)
+            _errorbars(biases, at, [line.score.bias for line in drawn], place, estimator)
+        scale = mine[0].score.rmse.unit if mine[0].score.rmse else ""
+        per = "% of truth" if scale == "%" else scale
+        log_axis(errors, "y")
+        biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+        errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
+        biases.set_ylabel(f"bias [{per}]")
+        for axes in (errors, biases):
+            grid(axes)
     for axes in panels[-1]:
-        if logarithmic:
+        if spread:
             log_axis(axes, "x")
         else:
             axes.locator_params(axis="x", nbins=_TICKS)
     for column in panels.T:
         fig.align_ylabels(column)
-    first = lines[0]
-    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
-    fig.supxlabel(f"{label} [{first.at_unit}]", fontsize=9)
+    fig.supxlabel(f"{_label(first)} [{first.at_unit}]", fontsize=9)
     handles, names = panels[0, 0].get_legend_handles_labels()
     fig.legend(handles, names, loc="outside upper center", ncols=min(4, len(names)))
     return fig
 
 
-def _moved(lines: Sequence[Line], aside: float, *, logarithmic: bool) -> list[float]:
-    """Where the lines stand on the axis, a little aside, so that intervals do not hide each other."""
-    at = [float(line.at) for line in lines if line.at is not None]
-    if logarithmic:
-        return [x * (max(at) / min(at)) ** aside for x in at]
-    return [x + aside * (max(at) - min(at)) for x in at]
+def _label(line: Line) -> str:
+    return line.effect.replace("_", " ") if line.axis == SEVERITY else AXES[line.axis][0]
 
 
 def _errorbars(
@@ -302,22 +272,6 @@ def _errorbars(
         linewidth=1.0,
         label=label.replace("_", " "),
     )
-
-
-def _dress(errors: Axes, biases: Axes, line: Line, name: str) -> None:
-    scale = line.score.rmse.unit if line.score.rmse else ""
-    per = "% of truth" if scale == "%" else scale
-    log_axis(errors, "y")
-    biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
-    errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
-    biases.set_ylabel(f"bias [{per}]")
-    for axes in (errors, biases):
-        grid(axes)
-
-
-def _is_logarithmic(lines: Sequence[Line]) -> bool:
-    at = [line.at for line in lines if line.at is not None]
-    return lines[0].axis in _LOGARITHMIC and min(at) > 0.0 and max(at) / min(at) >= _WIDE
 
 
 def overall_table(lines: Iterable[Line]) -> Table:
@@ -347,11 +301,10 @@ def axis_table(lines: Sequence[Line]) -> Table:
     Args:
         lines: of one axis, and of one effect where that is severity.
     """
-    first = lines[0]
-    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
+    label, at_unit = _label(lines[0]), lines[0].at_unit
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
     heads = [f"RMSE {NAMES[name]}" for name in quantities]
-    result = table(f"Error against {label}", f"{label} {unit(first.at_unit)}", "estimator", *heads)
+    result = table(f"Error against {label}", f"{label} {unit(at_unit)}", "estimator", *heads)
     cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
     for at in sorted({line.at for line in lines if line.at is not None}):
         if result.row_count:
@@ -362,12 +315,26 @@ def axis_table(lines: Sequence[Line]) -> Table:
     return result
 
 
-def pace_table(paces: Sequence[Pace]) -> Table:
-    """Times of the steps."""
+def pace_table(store: Store) -> Table:
+    """Times of the steps of a sweep per run; they are not comparable under different machine load.
+
+    Args:
+        store: at least one shard finished.
+
+    Raises:
+        TunnelError: when the timings are damaged.
+    """
+    import polars as pl
+
+    each = pl.col("seconds") / pl.col("runs")
+    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
     result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
-    for pace in paces:
-        middle, low, high = (significant(1e3 * value, 3) for value in (pace.middle, pace.low, pace.high))
-        result.add_row(pace.step, middle, f"{low} to {high}")
+    folder = shown(store.folder / TIMINGS)
+    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
+        steps = store.timings().group_by("step", maintain_order=True).agg(*wanted)
+        for step, *seconds in steps.iter_rows():
+            middle, low, high = (significant(1e3 * float(value), 3) for value in seconds)
+            result.add_row(str(step), middle, f"{low} to {high}")
     return result
 
 

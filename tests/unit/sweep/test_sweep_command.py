@@ -19,9 +19,8 @@ from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
 from tunnel_lab.experiments import runner, sweep_summary
-from tunnel_lab.experiments.sweep import read_sweep, run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
-from tunnel_lab.experiments.sweep_shards import RESULT_COLUMNS
+from tunnel_lab.experiments.sweep import RESULT_COLUMNS, run_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_summary import Line, lines_of, summarise
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.errors import TunnelError
