@@ -116,7 +116,7 @@ def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
     assert "tunnel_sim.engine.simulate" in importers
     outside = {name for name in importers if not name.startswith("tunnel_sim.")}
     # Inside functions, in a process of their own where they draw; live, the engine runs in front of the user.
-    shown = {f"tunnel_lab.show.{name}" for name in ("film", "live", "overlay", "stepper", "web", "window")}
+    shown = {f"tunnel_lab.show.{name}" for name in ("film", "live")}
     # A model of one's own, with the causes written into it, is simulated by the engine itself.
     assert outside <= shown | {"diagnosis.patched", "diagnosis.patch.patched_model"}
 

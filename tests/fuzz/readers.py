@@ -164,11 +164,11 @@ def spring_table(folder: Path, rng: Rng) -> None:
     """A table of springs changed, and fitted and shown where it is accepted."""
     import typer
 
-    from tunnel_lab.commands.springs import read_spring_table, show
+    from tunnel_lab.commands.paper import read_spring_table, show_springs
 
     table = read_spring_table(_written(folder / "springs.csv", changed_csv(seeds.springs_csv(), rng), rng))
     try:
-        show(table, "springs.csv")
+        show_springs(table, "springs.csv")
     except typer.Exit:  # how the command says that there is no inertia
         return
 

@@ -147,7 +147,7 @@ def regression(name: str) -> Path:
 @cache
 def springs_csv() -> bytes:
     """The paper's springs as a table a user would write."""
-    from tunnel_lab.commands.springs import paper_table
+    from tunnel_lab.commands.paper import paper_table
 
     table = paper_table()
     rows = zip(table.names, table.stiffness, table.frequency_hz, strict=True)

@@ -16,7 +16,7 @@ from identification.estimate import Estimate, Quantity, RunEstimate
 from identification.neural.networks import read_networks, shipped_record
 from identification.neural.train import Checkpoint, read_checkpoint
 from identification.uncertainty.budget import load_uncertainties
-from tunnel_lab.commands.springs import read_spring_table
+from tunnel_lab.commands.paper import read_spring_table
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.score_trials import read_trials
 from tunnel_lab.experiments.sweep import open_store

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import given_campaign, split_names
+from tunnel_lab.terminal.tables import say, say_written
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from tunnel_sim.vocabulary.campaign import Campaign, Run
-
-NAME = "plot"
 
 
 def run(
     campaign: Annotated[
-        Path,
-        typer.Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its fit."),
+        Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its fit.")
     ],
     out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder."),
+        Path, Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder.")
     ] = Path("tunnel-output"),
     runs: Annotated[
-        list[str] | None,
-        typer.Option("--run", metavar="ID", help="Runs of a diagnosis to draw. Default: all."),
+        list[str] | None, Option("--run", metavar="ID", help="Runs of a diagnosis to draw. Default: all.")
     ] = None,
 ) -> None:
     """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
@@ -51,54 +47,37 @@ def run(
       0 drawn, 1 no run could be identified (windows is left out), 2 bad
       input.
     """
+    from identification import identify
+    from tunnel_lab.plotting import runs as figures
     from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.terminal.inputs import given_campaign
-    from tunnel_lab.terminal.options import split_names
-    from tunnel_lab.terminal.tables import say, say_written
+    from tunnel_lab.report.diagnosis_file import read_document
+    from tunnel_lab.report.fit import fit_pages
     from tunnel_sim.files.writing import output_folder
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     failure = ""
     if campaign.suffix.lower() == ".json":
-        drawn = _fit(campaign, split_names(runs))
+        pages = fit_pages(read_document(campaign), split_names(runs))
+        if not pages:
+            remedy = "diagnose the campaign again"
+            raise TunnelError("has no curves to draw", where=shown(campaign), remedy=remedy)
+        drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
         folder = output_folder(out / campaign.stem)
     else:
         if runs:
             raise TunnelError("--run is for the file of a diagnosis", remedy="leave it out for a campaign")
         data = given_campaign(campaign)
         folder = output_folder(out / campaign.resolve().name)
-        drawn, failure = _campaign(data)
+        drawn = {f"traces-{number}": page for number, page in enumerate(figures.trace_pages(data), 1)}
+        drawn["spectrum"] = figures.spectrum_figure(spread(data))
+        estimate = identify(data, "output_error", throw=False)
+        if any(run.windows for run in estimate.runs):
+            drawn["windows"] = figures.windows_figure(estimate)
+        failure = estimate.status.value if estimate.status.failed else ""
     written = [save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
     say_written(*(path for pair in written for path in pair))
     if failure:
         say(f"Note: {failure}", stderr=True)
         raise typer.Exit(1)
-
-
-def _fit(path: Path, ids: Sequence[str]) -> dict[str, Figure]:
-    """The pages of a diagnosis' fit, by name."""
-    from tunnel_lab.report.diagnosis_file import read_document
-    from tunnel_lab.report.fit import fit_pages
-    from tunnel_sim.vocabulary.errors import TunnelError, shown
-
-    pages = fit_pages(read_document(path), ids)
-    if not pages:
-        raise TunnelError("has no curves to draw", where=shown(path), remedy="diagnose the campaign again")
-    return {f"fit-{number}": page for number, page in enumerate(pages, 1)}
-
-
-def _campaign(data: Campaign) -> tuple[dict[str, Figure], str]:
-    """The figures of a campaign by name, and why it could not be identified; empty where it could."""
-    from identification import identify
-    from tunnel_lab.plotting import runs
-    from tunnel_lab.plotting.runs import windows_figure
-
-    drawn = {f"traces-{number}": page for number, page in enumerate(runs.trace_pages(data), 1)}
-    drawn["spectrum"] = runs.spectrum_figure(spread(data))
-    estimate = identify(data, "output_error", throw=False)
-    if any(run.windows for run in estimate.runs):
-        drawn["windows"] = windows_figure(estimate)
-    return drawn, estimate.status.value if estimate.status.failed else ""
 
 
 def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:

@@ -175,8 +175,7 @@ def equations(_: Path) -> Section:
 
 def figure_1(folder: Path) -> Section:
     """The rig."""
-    from tunnel_lab.show.film import Look, write_still
-    from tunnel_lab.show.request import Request
+    from tunnel_lab.show.film import Look, Request, write_still
 
     words = "The paper shows a photograph. This is the virtual rig of the same sizes."
     pictures: tuple[Picture, ...] = ()

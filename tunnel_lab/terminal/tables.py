@@ -1,10 +1,16 @@
-"""Estimates as tables for a terminal: every number with its unit, every estimate with its deviation."""
+"""What commands print: lines, and estimates, imports and budgets as tables with their units and deviations."""
 
 from __future__ import annotations
 
+import csv
+import io
+import re
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from math import sqrt
+from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.cells import cell_len
@@ -12,16 +18,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from identification.printing import SYMBOLS, concise, in_stds, significant, unit, with_std
-from tunnel_lab.terminal.options import TableFormat, chosen, quiet, rendered
+from identification import printing
+from identification.printing import SYMBOLS, TextTable, concise, in_stds, significant, unit, with_std
+from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rich.table import Column
 
     from identification.estimate import Estimate, Quantity, RunEstimate, Status
-    from identification.printing import TextTable
+    from tunnel_sim.files.importing.records import Imported
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
@@ -30,6 +35,11 @@ BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is
 PROSE = 30
 """Columns: a longer cell is a sentence, which may go over several lines."""
 _PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
+DIAGNOSE = "run the diagnosis"
+"""How notes end whose remedy is the diagnosis."""
+Document = Mapping[str, Any]
+_DOMINANT = 0.5  # of the variance: more than all others together
+_NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 
 
 class _Console(Console):
@@ -84,6 +94,41 @@ def show_tables(*tables: Table) -> None:
             out.print(rendered(table, chosen.get()), soft_wrap=True, end="")
         if chosen.get() is not TableFormat.JSON:
             out.print()
+
+
+def rendered(table: Table, kind: TableFormat) -> str:
+    """A table of texts in another format than text.
+
+    Returns:
+        Lines with a final line feed. Cells are as printed; JSON has numbers where a cell is one.
+    """
+    heads = [_plain(column.header) for column in table.columns]
+    rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
+    title = _plain(table.title or "")
+    if kind is TableFormat.JSON:
+        from tunnel_sim.files.writing import json_line
+
+        records = [{head: _value(cell) for head, cell in zip(heads, row, strict=True)} for row in rows]
+        return json_line({"table": title, "rows": records}) + "\n"
+    if kind is TableFormat.MD:
+        lines = [heads, ["---"] * len(heads), *rows]
+        cells = (" | ".join(cell.replace("|", "\\|") for cell in line) for line in lines)
+        body = "\n".join(f"| {line} |" for line in cells)
+        return f"**{title}**\n\n{body}\n"
+    stream = io.StringIO()
+    stream.write(f"# {title}\n")
+    csv.writer(stream, lineterminator="\n").writerows([heads, *rows])
+    return stream.getvalue()
+
+
+def _plain(cell: object) -> str:
+    return " ".join(str(cell).split())
+
+
+def _value(cell: str) -> str | float:
+    if not _NUMBER.fullmatch(cell):
+        return cell
+    return int(cell) if cell.isdecimal() else float(cell)
 
 
 def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
@@ -214,14 +259,11 @@ def keep_whole(table: Table) -> Table:
 
 
 def _least_width(column: Column) -> int:
-    words = map(cell_len, str(column.header).split())
-    return max((*words, *map(_unbroken, column.cells)), default=0)
-
-
-def _unbroken(cell: object) -> int:
-    """Columns that a cell takes: its longest line, or the longest word of a sentence."""
-    longest = max(map(cell_len, str(cell).splitlines()), default=0)
-    return longest if longest <= PROSE else max(map(cell_len, str(cell).split()))
+    widths = [cell_len(word) for word in str(column.header).split()]
+    for cell in column.cells:  # its longest line, or the longest word of a sentence
+        longest = max(map(cell_len, str(cell).splitlines()), default=0)
+        widths.append(longest if longest <= PROSE else max(map(cell_len, str(cell).split())))
+    return max(widths, default=0)
 
 
 def stacked(table: Table, width: int) -> str:
@@ -251,3 +293,88 @@ def _wrapped(text: str, prefix: str, width: int) -> Iterator[str]:
     lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
     for number, line in enumerate(lines or [""]):
         yield f"{prefix if number == 0 else ' ' * cell_len(prefix)}{line}".rstrip()
+
+
+def show_estimate(
+    campaign: Campaign, estimate: Estimate, *, windows: bool, source: Path | None = None
+) -> None:
+    """Print an estimate.
+
+    Args:
+        source: what the campaign was read from, for commands to copy; None: nowhere.
+    """
+    document = estimate.to_json_dict()
+    show_tables(rich_table(printing.coefficients_table(document)), runs_table(campaign, estimate))
+    if windows:
+        show_tables(*map(windows_table, estimate.runs))
+    say(BRACKETS)
+    command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
+    for line in (*map(str, estimate.remarks), *printing.status_lines(document)):
+        say(f"Note: {line.replace(DIAGNOSE, command)}")
+
+
+def parts_table(imported: Imported) -> TextTable:
+    """The runs of an import, a row for each.
+
+    Returns:
+        The file where there are several, samples, rate, the stretch of the record, the swing and the conditions.
+    """
+    swing = f"swing\n[{imported.campaign.sensor.unit}]"
+    headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, "V\n[m/s]", "Kr\n[N m/rad]")
+    several = len(imported.sources) > 1
+    rows = []
+    for part in imported.parts:
+        time, run = part.raw.cleaned.time_s[part.piece.first : part.piece.last], part.run
+        cells = [f"{time.size}", "left out", "", "", "", "", ""]
+        if run is not None:
+            cells[1:] = [
+                f"{run.record.sample_rate:.4g}",
+                f"{time[0]:.2f}",
+                f"{time[-1]:.2f}",
+                f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
+                f"{run.wind_speed:g}",
+                "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+            ]
+        rows.append((part.id, *([part.raw.source.name] if several else []), *cells))
+    return TextTable("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)
+
+
+def budget_table(budget: Document) -> TextTable:
+    """Standard uncertainties, source by source.
+
+    Returns:
+        A row for each source and one for all of them, in the quantities' units; a negative value is the
+        reduction by a correlation.
+    """
+    from identification.estimate import UNITS
+
+    names = [name for name in UNITS if name in budget["combined_std"]]
+    headings = tuple(f"{SYMBOLS[name]}\n{unit(UNITS[name])}" for name in names)
+    rows = []
+    for component in budget["components"]:
+        cells = []
+        for variance in (float(component["variance"][name]) for name in names):
+            if variance == 0.0:
+                cells.append("0" if component["known"] else "–")
+            else:
+                cells.append(f"{'−' if variance < 0.0 else ''}{significant(sqrt(abs(variance)), 2)}")
+        rows.append((component["name"], *cells))
+    rows.append(("all together", *(significant(budget["combined_std"][name], 2) for name in names)))
+    title = "Uncertainty budget: one standard uncertainty each"
+    return TextTable(title, ("source", *headings), tuple(rows), right=headings)
+
+
+def budget_lines(budget: Document) -> list[str]:
+    """The dominant source of each quantity, and the notes of the sources."""
+    from identification.estimate import UNITS
+
+    components = budget["components"]
+    lines = []
+    for name in (name for name in UNITS if name in budget["combined_std"]):
+        variances = [float(component["variance"][name]) for component in components]
+        largest, total = max(variances), sum(variances)
+        share = largest / total if total > 0.0 else 0.0
+        verb = "dominates" if share > _DOMINANT else "is the largest source"
+        source = components[variances.index(largest)]["name"]
+        lines.append(f"{SYMBOLS[name]}: {source} {verb}, {100.0 * share:.0f} % of the variance")
+    return [*lines, *(f"{part['name']}: {part['note']}" for part in components if part["note"])]
