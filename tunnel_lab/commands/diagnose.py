@@ -185,11 +185,7 @@ def diagnose(
 
 
 def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
-    """Write the formula proposed as an effects file.
-
-    Returns:
-        The file; None where no formula is proposed, and nothing is written.
-    """
+    """Write the formula proposed as an effects file; None where no formula is proposed."""
     import tomli_w
 
     from tunnel_sim.files.writing import write_whole
@@ -203,11 +199,7 @@ def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
 def diagnose_with_progress(
     campaign: Campaign, kinds: tuple[type[Effect], ...], model: JointModel | None = None
 ) -> Diagnosis:
-    """Diagnose, with step and effect on standard error where that is a terminal.
-
-    Args:
-        model: the nominal model; None: spring and damper.
-    """
+    """Diagnose, with step and effect on standard error where that is a terminal."""
     import diagnosis
 
     with step_display() as show_step:
@@ -215,14 +207,7 @@ def diagnose_with_progress(
 
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
-    """Write the patched model of an answer.
-
-    Args:
-        path: of the MJCF file.
-
-    Raises:
-        TunnelError: when the answer has none, with the reason.
-    """
+    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when it has none."""
     from diagnosis.patched import UNPATCHED
 
     if answer.model is None:
@@ -290,14 +275,11 @@ def compare(
 
 
 def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[TextTable]:
-    """All tables of a comparison.
+    """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
 
     Args:
         names: of the documents, each different.
         documents: of diagnoses, the reference first.
-
-    Returns:
-        Gap and answer, parameters of the answers, coefficients, and the coefficients' differences from the first.
     """
     from diagnosis.decision import probability
     from diagnosis.printing import excess_std, share

@@ -154,11 +154,7 @@ def summary(kind: type[Effect]) -> str:
 
 
 def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
-    """The full description of effects, in JSON's types.
-
-    Returns:
-        ``{"schema_version", "effects": [...]}`` in the order given.
-    """
+    """The full description of effects, in JSON's types and in the order given."""
     return {
         "schema_version": SCHEMA_VERSION,
         "effects": [

@@ -90,11 +90,9 @@ def demo(
 
 
 def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
-    """The checks that fail: estimates that are missing, or too far from the truth for their standard deviation.
+    """Clauses on the checks that fail: estimates that are missing, or too far from the truth for their std.
 
-    Returns:
-        A clause for each; the distance is checked for the maximum-likelihood estimator only, whose
-        standard deviations should be exact.
+    The distance is checked for the maximum-likelihood estimator only, whose standard deviations should be exact.
     """
     lines = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
     for estimate in estimates:
@@ -110,11 +108,7 @@ def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
 
 
 def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
-    """Simulate, identify by the paper's two methods and the default one, and write all of it.
-
-    Args:
-        folder: where ``campaign`` and the estimates go.
-    """
+    """Simulate, identify by the paper's two methods and the default one, and write all of it into the folder."""
     from identification import identify
     from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
     from tunnel_sim.files.campaign_folder import write_campaign
@@ -209,14 +203,7 @@ def paper_table() -> SpringTable:
 
 
 def show_springs(springs: SpringTable, source: str) -> None:
-    """Fit and print.
-
-    Args:
-        source: where it comes from, for the heading.
-
-    Raises:
-        typer.Exit: with status 1 when the gradient is not above zero.
-    """
+    """Fit and print; `typer.Exit` with status 1 when the gradient is not above zero."""
     from identification.campaign.springs import fit_springs
     from identification.printing import with_std
 
@@ -263,11 +250,9 @@ class SpringTable:
 
 
 def read_spring_table(path: Path) -> SpringTable:
-    """Read a spring table; lines starting with ``#`` are comments.
+    """Read a spring table in CSV; lines starting with ``#`` are comments.
 
-    Args:
-        path: CSV file with the columns ``stiffness_N_m_per_rad`` (N m/rad) and ``frequency_Hz`` (Hz), and
-            optionally ``spring``, its name or number.
+    Columns are ``stiffness_N_m_per_rad`` (N m/rad), ``frequency_Hz`` (Hz) and, optionally, ``spring``, its name.
 
     Raises:
         TunnelError: when the file cannot be read or is too large, a column is missing or unknown, a value is not a

@@ -138,15 +138,7 @@ def simulate(
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
-    """Refuse an unsuitable folder before the work is done.
-
-    Args:
-        folder: where the campaign is to go.
-        overwrite: whether what is there may be replaced.
-
-    Raises:
-        TunnelError: when it is a file, or exists and may not be replaced.
-    """
+    """Refuse a file, or a folder that may not be replaced, before the work is done."""
     from tunnel_sim.files.writing import clear_leftovers
 
     clear_leftovers(folder.resolve().parent)  # restore what a killed command had set aside

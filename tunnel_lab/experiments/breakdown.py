@@ -123,16 +123,12 @@ def make_cases(
     """Size the effects and simulate their campaigns.
 
     Realisations differ in the noise, and in the forcing where it is random. Effects that have a sign are
-    positive.
+    positive. The campaign without effect comes first, then by effect, severity and realisation.
 
     Args:
-        realisations: number of campaigns for each effect and severity.
         severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
         show_steps: show the progress of sizing on standard error.
-
-    Returns:
-        The campaign without effect, then by effect, severity and realisation.
     """
     from identification.uncertainty.cramer_rao import campaign_bound
 
@@ -212,9 +208,7 @@ def break_down(
 
     Args:
         seed: the cases were made with.
-        jobs: number of processes; 0 works in this one.
         parts: folder for finished work, so that an interrupted score can be continued; None for none.
-        progress: called with the number of finished cases and of all cases.
     """
     mark = fingerprint({"breakdown": sorted(case.name for case in cases), "seed": seed}, estimators)
     work = partial(_estimate_case, tuple(estimators))
@@ -266,11 +260,7 @@ def biases(rows: Sequence[Row]) -> list[Bias]:
 
 
 def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
-    """The map as a table.
-
-    Returns:
-        A row for each effect, severity, estimator and quantity; units in the columns' names.
-    """
+    """The map as a table: a row for each effect, severity, estimator and quantity; units in the columns' names."""
     import polars as pl
 
     def value(quantity: Quantity | None) -> float | None:
@@ -336,13 +326,8 @@ def _compact(value: float) -> str:
 def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
     """The biases of one quantity that exceed one reported standard deviation.
 
-    Args:
-        frame: of `breakdown_frame`.
-        quantity: ``cn_beta`` or another of the frame.
-
-    Returns:
-        Effects in rows and estimators in columns, each with its severities side by side. The colour is the bias
-        in reported standard deviations, the number the bias in %; smaller biases stay empty.
+    Effects are in rows and estimators in columns, each with its severities side by side. The colour is the bias in
+    reported standard deviations, the number the bias in %; smaller biases stay empty.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -387,14 +372,10 @@ def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
 
 
 def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str], tuple[float, float]]:
-    """Biases that are larger than one reported standard deviation.
-
-    Args:
-        frame: of `breakdown_frame`.
+    """Biases that are larger than one reported standard deviation, by effect, severity and estimator.
 
     Returns:
-        By effect, severity in noise powers (a ratio) and estimator: the bias in % of the truth and in reported
-        standard deviations (a ratio).
+        The bias in % of the truth and in reported standard deviations; severities are in noise powers (ratios).
     """
     cells = {}
     for row in frame.filter(frame["quantity"] == quantity).iter_rows(named=True):

@@ -89,11 +89,7 @@ def run_tasks(
 
 
 def processes(jobs: int) -> Workers:
-    """Processes of this machine.
-
-    Args:
-        jobs: how many; 0 works in this one.
-    """
+    """Processes of this machine; no job works in this one."""
     return partial(in_processes, jobs=jobs)
 
 

@@ -151,13 +151,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Grid:
-    """What to score on.
-
-    Args:
-        trials: number of records, or campaigns, in each cell.
-        trials_of: the same for estimators that get fewer, by name.
-        cells: at least one, all different.
-    """
+    """What to score on: at least one cell, all different, and the number of records or campaigns in each."""
 
     name: str
     seed: int
@@ -181,14 +175,7 @@ class Grid:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Grid:
-        """The inverse of `to_json_dict`.
-
-        Args:
-            data: of one grid.
-
-        Raises:
-            TunnelError: when it is not a grid, or too large.
-        """
+        """The inverse of `to_json_dict`; a `TunnelError` when it is not a grid, or too large."""
         where, remedy = "the grid as JSON", "write it again"
         check_shape(data, where, remedy)
         with as_described("is not a grid", where, remedy):
@@ -210,11 +197,7 @@ _GRID = TypeAdapter(Grid)
 
 
 def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
-    """Refuse more trials than a table can hold before any is drawn.
-
-    Raises:
-        TunnelError: with the number of rows and the limit.
-    """
+    """Refuse more trials than a table can hold before any is drawn, with the number of rows and the limit."""
     quantities = sum(len(cell.quantities) for cell in grid.cells)
     rows = quantities * sum(grid.trials_for(name) for name in estimators)
     what = "rows (trials × estimators × quantities)"
@@ -222,10 +205,7 @@ def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
 
 
 def load_grid(path: Path) -> Grid:
-    """Read a grid.
-
-    Args:
-        path: a TOML file like the packaged ``score-grid.toml``.
+    """Read a grid, a TOML file like the packaged ``score-grid.toml``.
 
     Returns:
         The grid; cells in the order of the tables, the last list of a table varies fastest.
@@ -304,13 +284,7 @@ class Trial:
 
 
 def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
-    """Make one trial.
-
-    Args:
-        number: of the trial in its cell, from 0.
-
-    Returns:
-        The trial; the same arguments give the same bits.
+    """Make one trial of a cell, which are numbered from 0; the same arguments give the same bits.
 
     Raises:
         TunnelError: when a run leaves the finite range.

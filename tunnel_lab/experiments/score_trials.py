@@ -70,13 +70,7 @@ NamedT = TypeVar("NamedT", bound=Named)
 
 @dataclass(frozen=True)
 class Unit:
-    """Some trials of one cell.
-
-    Args:
-        cell: index of the cell in the grid.
-        first: number of the first trial.
-        stop: number after the last trial.
-    """
+    """Some trials of one cell, from the first to before the last; both and the cell are numbers from 0."""
 
     cell: int
     first: int
@@ -125,15 +119,12 @@ def estimate_rows(
     """One estimator on one campaign of known truth, a row for each quantity of the truth.
 
     An estimator that raises an exception has failed, and its status names the exception: one bad record must not
-    stop the work.
+    stop the work. Value and std are then None.
 
     Args:
         truth: by quantity, SI; ζ and ωn are those of the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
         about: first columns of every row.
-
-    Returns:
-        The rows; value and std are None where the estimator failed.
     """
     from identification import identify
 
@@ -181,16 +172,12 @@ def score_grid(
     parts: Path | None = None,
     progress: Progress | None = None,
 ) -> list[Row]:
-    """Every estimator on every trial of a grid.
+    """Every estimator on every trial of a grid, in the order of cells, trials and estimators.
 
     Args:
         jobs: processes; 0 works in this one. Except for the times, the rows are the same to the bit.
         parts: folder for finished work, from which an interrupted score continues if grid, estimators and code
             are the same; None for none.
-        progress: called with the number of finished trials and of all trials.
-
-    Returns:
-        The rows, in the order of cells, trials and estimators.
 
     Raises:
         TunnelError: more trials than a table can hold.
@@ -223,12 +210,9 @@ def rows_of(
     """The rows of every task, by its name; those of finished tasks are kept in files of JSON.
 
     Args:
-        work: function of a module.
-        tasks: each with the name of its file.
         mark: rows kept under another mark are computed again, see `fingerprint`.
         jobs: number of processes; 0 works in this one.
         parts: folder of the files; None for none.
-        size: of a task, as progress counts it.
     """
     rows: dict[str, list[Row]] = {}
     if parts is not None:
@@ -261,14 +245,7 @@ def rows_of(
 
 
 def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
-    """Hash of all that results depend on: conditions, names of the estimators, and code of the packages below.
-
-    Args:
-        document: the conditions, in JSON's types.
-
-    Returns:
-        SHA-256 in hexadecimal.
-    """
+    """SHA-256 of all that results depend on: conditions, names of the estimators, code of the packages below."""
     text = json.dumps([document, list(estimators), _code()], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -306,12 +283,7 @@ def describe(cell: Cell) -> Row:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A finished score.
-
-    Args:
-        estimators: names, in the order given.
-        rows: one per trial, estimator and quantity; see `tunnel_lab.experiments.score_trials`.
-    """
+    """A finished score: a row for each trial, estimator and quantity, see `estimate_rows`."""
 
     grid: Grid
     estimators: tuple[str, ...]
@@ -326,11 +298,7 @@ class Results:
         return {key: collect(every) for key, every in outcomes.items()}
 
     def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
-        """Median time an estimator took for one record, ms.
-
-        Args:
-            cells: indices of the cells to include.
-        """
+        """Median time an estimator took for one record of some cells, ms."""
         wanted = set(cells)
         return median(
             float(row["milliseconds"])
@@ -359,31 +327,20 @@ def groups_of(grid: Grid) -> dict[str, list[int]]:
 
 
 def write_trials(path: Path, results: Results) -> Path:
-    """Write the trials with their grid as Parquet, completely or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-    """
+    """Write the trials with their grid as Parquet, completely or not at all."""
     frame = trials_frame(results)
     described = json_line(results.grid.to_json_dict(), sort_keys=True)
     return write_whole(path, parquet(frame.with_columns(pl.lit(described).alias("grid"))))
 
 
 def trials_frame(results: Results) -> pl.DataFrame:
-    """A row for every trial, estimator and quantity.
-
-    Returns:
-        Columns as in the rows; ``cell`` is the index of the grid's cell.
-    """
+    """A row for every trial, estimator and quantity; ``cell`` is the index of the grid's cell."""
     columns = {name: [row[name] for row in results.rows] for name in _COLUMNS}
     return pl.DataFrame(columns, schema_overrides=_TYPES)
 
 
 def read_trials(path: Path) -> Results:
-    """Read what `write_trials` wrote.
-
-    Returns:
-        The results, estimators in the order of their first rows.
+    """Read what `write_trials` wrote; estimators are in the order of their first rows.
 
     Raises:
         TunnelError: when there is no such file, or it is not a table of trials.

@@ -53,11 +53,7 @@ _PANEL, _LABELS, _ROW, _HEAD = 0.95, 1.7, 0.2, 0.85  # inches
 
 @dataclass(frozen=True)
 class Finding:
-    """One aspect of one estimator in the baseline and now.
-
-    Args:
-        worse: whether it is worse beyond chance, corrected for the number of findings.
-    """
+    """One aspect of one estimator in the baseline and now, and whether it is worse beyond chance."""
 
     estimator: str
     where: str
@@ -149,14 +145,7 @@ def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, i
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
-    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals.
-
-    Args:
-        results: at least one trial.
-
-    Returns:
-        Columns with the unit in their name, or in the column ``unit``.
-    """
+    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals."""
     import polars as pl
 
     rows = []
@@ -186,11 +175,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
 
 
 def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
-    """One table for each kind of cell, with all cells of that kind pooled.
-
-    Returns:
-        Tables with a section for each estimator and a row for each quantity.
-    """
+    """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     tables = []
     trials = results.trials()
     for group, cells in groups_of(results.grid).items():
@@ -221,11 +206,7 @@ def _section(result: Table, results: Results, name: str, cells: Sequence[int], *
 
 
 def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
-    """Figures of cells taken together, as text.
-
-    Returns:
-        RMSE over the bound, the worst cell's, bias over the bound, and the shares covered and failed in %.
-    """
+    """Of cells taken together: RMSE over the bound, the worst cell's, bias over the bound, % covered and failed."""
     scores = [score(trials) for trials in every]
     worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
     scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
@@ -244,11 +225,7 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
 
 
 def cell_tables(results: Results) -> list[Table]:
-    """One table for each cell.
-
-    Returns:
-        Tables with a section for each estimator and a row for each quantity.
-    """
+    """One table for each cell: a section for each estimator, a row for each quantity."""
     trials = results.trials()
     tables = []
     for index, cell in enumerate(results.grid.cells):
@@ -284,11 +261,7 @@ def _share(share: Proportion | None) -> str:
 
 
 def worse_table(verdict: Verdict) -> Table:
-    """The findings that are worse, the most significant first.
-
-    Returns:
-        A table; without rows where none is worse.
-    """
+    """The findings that are worse, the most significant first."""
     result = table(
         "Worse than the baseline",
         *("estimator", "", "aspect", "before", "now", "p", "where"),
@@ -332,9 +305,8 @@ def verdict_lines(verdict: Verdict) -> list[str]:
 def score_figure(results: Results) -> Figure:
     """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
 
-    Returns:
-        For each kind of cell two rows of panels, one panel for each estimator. Cells are in rows, in the grid's
-        order, so that reading across compares the estimators; quantities differ in colour and marker.
+    For each kind of cell there are two rows of panels, one panel for each estimator. Cells are in rows, in the order of
+    the grid, so that reading across compares the estimators; quantities differ in colour and marker.
     """
     kinds = [cell.kind for cell in results.grid.cells]
     groups = {
@@ -399,11 +371,7 @@ def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], 
 
 
 def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
-    """The conditions of cells of one kind in a few words.
-
-    Returns:
-        What distinguishes each cell from the others; and what is common to all.
-    """
+    """What distinguishes each cell of one kind from the others, in a few words, and what is common."""
     parts = []
     for cell in cells:
         noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"

@@ -109,11 +109,7 @@ class Finished:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a case has no estimate.
-
-    Args:
-        status: `NOT_SIMULATED`, `REFUSED` or `RAISED`.
-    """
+    """Why a case has no estimate: `NOT_SIMULATED`, `REFUSED` or `RAISED`, and the message."""
 
     status: str
     message: str
@@ -274,12 +270,7 @@ def _figures(owner: Estimate | RunEstimate | None, name: str) -> tuple[float | N
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of one sweep.
-
-    Args:
-        folder: an existing folder with the ``sweep.json`` of the sweep.
-        made_with: versions that its results are made with.
-    """
+    """The folder of one sweep, which has its ``sweep.json``, and the versions that its results are made with."""
 
     folder: Path
     sweep: Sweep
@@ -312,11 +303,7 @@ class Store:
         return f"{hashlib.sha256(content).hexdigest()}  {name}\n"
 
     def keep(self, shard: Finished) -> None:
-        """Write a finished shard.
-
-        Raises:
-            TunnelError: when it was made with other versions, or cannot be written.
-        """
+        """Write a finished shard; a `TunnelError` when it was made with other versions, or cannot be written."""
         wanted = {**self.made_with, "threads": "1"}
         odd = _first_difference(wanted, {name: shard.made_with.get(name) for name in wanted})
         if odd:
@@ -334,13 +321,10 @@ class Store:
         write_whole(self._file(RESULTS, shard.index), shard.results)
 
     def timings(self) -> pl.DataFrame:
-        """The times of the finished shards; a shard whose times were removed is left out.
-
-        Returns:
-            Columns ``step``, ``runs`` and ``seconds``, with a row for each step of each shard.
+        """Step, runs and seconds of each step of the finished shards; a shard whose times were removed is left out.
 
         Raises:
-            TunnelError: when one is damaged.
+            TunnelError: when a file of times is damaged.
         """
         frames = [pl.DataFrame(schema={name: TIMING_COLUMNS[name] for name in _READ_TIMINGS})]
         remedy = "remove it: no result depends on it"
@@ -355,13 +339,10 @@ class Store:
         return pl.concat(frames)
 
     def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
-        """The rows of the finished shards, in the order of the cases.
-
-        Args:
-            dataset: ``results`` or ``records``.
+        """The results or records of the finished shards, in the order of the cases.
 
         Raises:
-            TunnelError: when there is none yet.
+            TunnelError: when there are none yet.
         """
         parts = [self._file(dataset, index) for index in self.finished()]
         if not parts or not all(path.exists() for path in parts):
@@ -374,10 +355,7 @@ class Store:
 
 
 def begin(sweep: Sweep, folder: Path) -> Store:
-    """The folder of a sweep, which may be new.
-
-    Args:
-        folder: created where it is missing.
+    """The folder of a sweep, which is created where it is missing.
 
     Raises:
         TunnelError: when the folder holds another sweep or something else, or cannot be written.
@@ -432,9 +410,6 @@ def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 def open_store(folder: Path) -> Store:
     """Open the folder of a sweep, finished or not.
 
-    Args:
-        folder: as given to `begin`.
-
     Raises:
         TunnelError: when it holds no sweep, or one that is malformed or of another version of the format.
     """
@@ -451,12 +426,7 @@ def open_store(folder: Path) -> Store:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a sweep.
-
-    Args:
-        found: number of shards that were finished already.
-        crashes: number of estimates that raised an exception, in the shards done now.
-    """
+    """The outcome of a sweep: shards found finished, and estimates that raised an exception in those done now."""
 
     store: Store
     found: int

@@ -170,11 +170,7 @@ class SweepCase:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep file with its rigs, which together determine the results.
-
-    Args:
-        rigs: sections of each rig's description, in the order of the file.
-    """
+    """A sweep file with the sections of each rig's description, which together determine the results."""
 
     document: SweepDocument
     rigs: tuple[Mapping[str, Any], ...]
@@ -187,11 +183,7 @@ class Sweep:
 
     @classmethod
     def from_json(cls, text: str) -> Sweep:
-        """The inverse of `to_json`.
-
-        Raises:
-            TunnelError: when it is not a sweep, or too large.
-        """
+        """The inverse of `to_json`; a `TunnelError` when it is not a sweep, or too large."""
         where, remedy = "the sweep as JSON", "start the sweep again"
         document = parse_json(text, where, remedy)
         with as_described("is not a sweep", where, remedy):
@@ -254,11 +246,7 @@ class Sweep:
         return map(self.case, range(start, min(start + self.cases_per_shard, self.size)))
 
     def case(self, index: int) -> SweepCase:
-        """A case, which is the same in any sweep of the same seed that contains it.
-
-        Args:
-            index: in the order of the product, from 0.
-        """
+        """A case by its place in the product, from 0; it is the same in any sweep of its seed that has it."""
         point, replicate = divmod(index, self.document.replicates)
         places = np.unravel_index(point, tuple(map(len, self.axes)))
         rig, conditions, sensor, truth, effects = (
@@ -285,14 +273,11 @@ class Sweep:
 
 
 def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
-    """The seed of a case: it depends on the contents of the case, not on its place in the product.
+    """A seed from 0 to 2⁶³ − 1: it depends on the contents of the case, not on its place in the product.
 
     Args:
         physics: everything that the records of the case depend on besides the noise, as plain values.
         replicate: number of the repetition, from 0.
-
-    Returns:
-        A number from 0 to 2⁶³ − 1, as a campaign description's ``seed``.
     """
     digest = hashlib.sha256(json.dumps(physics, sort_keys=True, allow_nan=False).encode()).digest()
     words = tuple(np.frombuffer(digest, dtype="<u4").tolist())
@@ -321,11 +306,7 @@ def axis_lengths(document: SweepDocument) -> dict[str, int]:
 
 
 def check_sweep_size(document: SweepDocument, where: str) -> None:
-    """Refuse a sweep that is too large before it is expanded.
-
-    Raises:
-        TunnelError: too many values of an axis, cases, shards, runs or samples, with their number and the limit.
-    """
+    """Refuse a sweep that is too large before it is expanded, with what is too many and the limit."""
     lengths = axis_lengths(document)
     for name, length in lengths.items():
         check_count(length, limits.SWEEP_AXIS, "values", f"{where}, {name}", "shorten a list")

@@ -106,10 +106,7 @@ def _share(name: str, share: Proportion | None) -> dict[str, float | None]:
 
 
 def summarise(store: Store) -> list[Line]:
-    """Score the finished part of a sweep.
-
-    Args:
-        store: at least one shard finished.
+    """Score the finished part of a sweep, of at least one shard.
 
     Returns:
         Lines: of all cases, then along each axis that has two values or more, by estimator and quantity.
@@ -140,11 +137,7 @@ def summarise(store: Store) -> list[Line]:
 
 
 def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
-    """The lines of one quantity of an estimator: of all cases, then along each axis.
-
-    Args:
-        data: rows of the results, with the columns of `summarise`.
-    """
+    """The lines of a quantity of an estimator, from columns of `summarise`: of all cases, then along each axis."""
     import polars as pl
 
     plain = data.filter(pl.col("effect") == NO_EFFECT)
@@ -188,11 +181,7 @@ def _score(data: pl.DataFrame) -> Score:
 
 
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
-    """Lines grouped by figure.
-
-    Returns:
-        Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
-    """
+    """Lines by the name of their figure, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``."""
     by_name: dict[str, list[Line]] = {}
     for line in lines:
         if line.axis != OVERALL:
@@ -204,9 +193,6 @@ def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
 @styled
 def error_figure(lines: Sequence[Line]) -> Figure | None:
     """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
-
-    Args:
-        lines: of one axis, and of one effect where that is severity.
 
     Returns:
         The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
@@ -296,11 +282,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
 
 
 def axis_table(lines: Sequence[Line]) -> Table:
-    """RMSE along one axis, a column for each quantity that has a panel in the figures.
-
-    Args:
-        lines: of one axis, and of one effect where that is severity.
-    """
+    """RMSE along one axis, a column for each quantity that has a panel in the figures."""
     label, at_unit = _label(lines[0]), lines[0].at_unit
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
     heads = [f"RMSE {NAMES[name]}" for name in quantities]
@@ -316,14 +298,7 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
 
 def pace_table(store: Store) -> Table:
-    """Times of the steps of a sweep per run; they are not comparable under different machine load.
-
-    Args:
-        store: at least one shard finished.
-
-    Raises:
-        TunnelError: when the timings are damaged.
-    """
+    """Times of the steps of a sweep per run; they are not comparable under different machine load."""
     import polars as pl
 
     each = pl.col("seconds") / pl.col("runs")

@@ -57,13 +57,7 @@ _GREATEST_GRADIENT = 5.0
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """Everything that a training depends on.
-
-    Args:
-        seed: of all random numbers.
-        shards: of training samples, two hundred campaigns each.
-        steps: number of batches of each network.
-    """
+    """Everything that a training depends on: shards of two hundred campaigns each, and batches of each network."""
 
     seed: int = 1
     shards: int = 15
@@ -85,7 +79,6 @@ def train(
     """Simulate what is missing, and fit both networks; finished work in the folder is kept and used.
 
     Args:
-        folder: of shards and checkpoints.
         jobs: processes that simulate; the result does not depend on their number.
         progress: called with what is done, how much of it is finished, and of how much.
 
@@ -278,12 +271,7 @@ def fit(
     progress: Callable[[int, float], None] = lambda _step, _loss: None,
     until: int | None = None,
 ) -> State:
-    """Continue a fit.
-
-    Args:
-        progress: called with the step and its loss.
-        until: step to stop at; the last one where None.
-    """
+    """Continue a fit until a step, the last one where None; progress is called with the step and its loss."""
     import torch
 
     torch.set_num_threads(1)
@@ -325,10 +313,7 @@ def fit(
 
 
 def losses(xp: Any, weights: Mapping[str, Any], batch: Mapping[str, Any]) -> tuple[Any, Any]:
-    """What the fit lowers, means over the samples.
-
-    Args:
-        xp: numpy or torch.
+    """What the fit lowers, means over the samples, in numpy or torch.
 
     Returns:
         The negative logarithm of the posterior's density at the truth, per quantity, and the cross entropy of the

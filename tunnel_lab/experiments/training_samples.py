@@ -47,11 +47,7 @@ _ROUNDS = 3
 
 @dataclass(frozen=True)
 class ShardSpec:
-    """What a shard depends on.
-
-    Args:
-        part: one of `PARTS`.
-    """
+    """What a shard depends on; its part is one of `PARTS`."""
 
     seed: int
     part: str
@@ -65,11 +61,7 @@ class ShardSpec:
 
 
 def write_shard(spec: ShardSpec, folder: Path) -> Path:
-    """Draw, simulate and reduce the campaigns of a shard, and write their samples.
-
-    Returns:
-        The file. Names begin with ``c.`` in the sample of a campaign, with ``r.`` in that of a record.
-    """
+    """Write the samples of a shard: names begin with ``c.`` for campaigns, with ``r.`` for records."""
     samples = [
         sample
         for campaign, conditions, families, number in readings_of(spec)
@@ -90,11 +82,10 @@ def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
 
 
 def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[str], int]]:
-    """Draw and simulate the campaigns of a shard.
+    """Draw and simulate the campaigns of a shard: each reading of each campaign.
 
     Yields:
-        Each reading of a campaign with its true conditions, the families of its effects and its number among the
-        readings of that campaign.
+        A reading with its true conditions, the families of its effects and its number in the campaign.
     """
     root = np.random.SeedSequence([spec.seed, PARTS.index(spec.part), spec.number])
     rngs = [np.random.default_rng(child) for child in root.spawn(CAMPAIGNS)]
@@ -217,11 +208,7 @@ def _sample(kind: str, features: Features, truth: Array, labels: Array) -> dict[
 
 
 def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> CampaignDraw:
-    """Draw one campaign.
-
-    Args:
-        sizes: magnitude of every form's parameter at the unit excess, by `label`.
-    """
+    """Draw one campaign; sizes are the magnitude of every form's parameter at the unit excess, by `label`."""
     kind = str(rng.choice(np.array(list(KINDS)), p=list(KINDS.values())))
     draw = draw_campaign(rng, kind=kind, mixture=_MIXTURE)
     while any(e.form.family == ROD for e in draw.effects) and len(draw.effects) > 1:
@@ -324,11 +311,7 @@ def _clipped(form: Form, value: float) -> float:
 
 
 def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
-    """Integrate campaigns together; those with a flexible rod, which act alone, in closed form.
-
-    Args:
-        substeps: Runge–Kutta steps per sample.
-    """
+    """Integrate campaigns together; those with a flexible rod, which act alone, in closed form."""
     bound = [bind_effects(draw) for draw in draws]
     rigid = [place for place, (c, _) in enumerate(bound) if c.rod is None]
     terms = [[term for term in bound[place][1] if isinstance(term, Term)] for place in rigid]

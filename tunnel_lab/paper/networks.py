@@ -242,11 +242,7 @@ def _closer(distances: Mapping[str, Closeness]) -> str:
 
 @styled
 def error_figure(errors: HeldOutErrors) -> Figure:
-    """Fig. 3: the error of ζ against ζ and of ωn against ωn.
-
-    Args:
-        errors: in %, on responses that were not trained on.
-    """
+    """Fig. 3: the error of ζ against ζ and of ωn against ωn, in %, on responses that were not trained on."""
     fig = figure(WIDTH, 2.9)
     left, right = fig.subplots(1, 2)
     left.plot(errors.zeta, errors.zeta_percent, ".", ms=1.5, color=BLUE)
@@ -262,11 +258,7 @@ def error_figure(errors: HeldOutErrors) -> Figure:
 
 @styled
 def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[WindowEstimate]]) -> Figure:
-    """Table III beside windows of simulated runs.
-
-    Returns:
-        The figure: ζ on the left, ωn on the right, against the window's number; 95 % intervals.
-    """
+    """Table III beside windows of simulated runs: ζ and ωn against the window's number, with 95 % intervals."""
     fig = figure(WIDTH, 3.4)
     panels = fig.subplots(1, 2)
     number = np.array([row.number for row in rows])
@@ -300,12 +292,7 @@ def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[Window
 def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple[float, float]) -> Figure:
     """Figs 4 to 6: the record and the responses regenerated from each method's ζ and ωn.
 
-    Args:
-        run: the record; its id is looked up in the estimates.
-        magnified: stretch shown large, from and to, s.
-
-    Returns:
-        The figure: the whole record above, the stretch in the middle, what is left of it below.
+    The whole record is above, a stretch of it (from and to, s) in the middle, what is left of it below.
     """
     fig = figure(WIDTH, 6.4)
     whole, part, residual = fig.subplots(3, 1)

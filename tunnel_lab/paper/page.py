@@ -42,19 +42,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """What one table or figure of the paper says, and what is found here.
-
-    Args:
-        title: such as ``Table II``.
-        about: what it is of.
-        theirs: the paper's result in a line.
-        ours: ours in a line.
-        outcome: whether the paper's result is found here too.
-        words: paragraphs.
-        headings: of the table's columns; none where there is no table.
-        rows: cells as text.
-        pictures: below the table.
-    """
+    """What a table or figure of the paper says and what is found here: theirs and ours in a line each."""
 
     __pydantic_config__ = _STRICT
 
@@ -108,9 +96,6 @@ def write_paper(
         names: parts to compute where they are not finished; finished ones stay in the page.
         progress: called with the number finished, of how many, and the next part's name.
 
-    Returns:
-        The page, and its sections by name.
-
     Raises:
         TunnelError: when the folder cannot be written to, or a kept part is damaged.
     """
@@ -148,11 +133,7 @@ def _finished(path: Path, folder: Path) -> Section | None:
 
 
 def render(sections: Mapping[str, Section]) -> str:
-    """The page as HTML; its pictures stand beside it.
-
-    Args:
-        sections: by name, in order.
-    """
+    """The page as HTML; its pictures stand beside it."""
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(

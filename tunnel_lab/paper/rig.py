@@ -121,11 +121,7 @@ def table_2(folder: Path) -> Section:
 
 
 def springs_plan(stiffness: list[float]) -> CampaignPlan:
-    """A wind-off run of every spring.
-
-    Args:
-        stiffness: N m/rad.
-    """
+    """A wind-off run of every spring, whose stiffness is in N m/rad."""
     plan = paper_plan()
     off = next(condition for condition in plan.conditions if condition.wind_speed == 0.0)
     conditions = tuple(

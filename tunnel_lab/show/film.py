@@ -117,12 +117,7 @@ class ShownRun:
 
 
 def shown_run(request: Request) -> ShownRun:
-    """Prepare a run.
-
-    Raises:
-        TunnelError: for a plan that cannot be read, an unknown run, spring or effect, or a number that is out
-            of range.
-    """
+    """Prepare a run; a `TunnelError` for a bad plan, an unknown run, spring or effect, or a number out of range."""
     from tunnel_sim.effects import EffectChain
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
@@ -196,11 +191,10 @@ def _number(option: str, given: float | None, plan: float, low: float, high: flo
 
 
 def backends() -> tuple[str, ...]:
-    """The OpenGL back ends to try, best first.
+    """The OpenGL back ends to try, best first: values for ``MUJOCO_GL``.
 
-    Returns:
-        Values for ``MUJOCO_GL``; only the user's own choice where that variable is set, and an empty
-        string (MuJoCo's default) where the platform has only one.
+    Only the user's own choice where that variable is set, and an empty string (MuJoCo's default) where the platform
+    has only one.
     """
     chosen = os.environ.get("MUJOCO_GL")
     if chosen:
@@ -211,11 +205,7 @@ def backends() -> tuple[str, ...]:
 
 
 def checked_camera(name: str) -> str:
-    """Check the name of a camera.
-
-    Raises:
-        TunnelError: when the rig has no such camera.
-    """
+    """A name of a camera; a `TunnelError` with the closest name when the rig has no such camera."""
     if name not in CAMERAS:
         raise TunnelError(
             f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
@@ -244,14 +234,7 @@ class Look:
     trace: bool = True
 
     def frame_times(self, duration: float) -> NDArray[np.float64]:
-        """When the frames are, in the run's own time.
-
-        Args:
-            duration: of the run, s.
-
-        Returns:
-            s from the release, shape (frames,).
-        """
+        """Times of the frames of a run of so many seconds, s from its release, shape (frames,)."""
         return np.arange(max(1, int(duration * self.fps / self.speed))) * self.speed / self.fps
 
 
@@ -261,7 +244,6 @@ def write_film(
     """Write a run as MP4 (H.264), completely or not at all.
 
     Args:
-        path: the file; replaced when it exists.
         progress: called with (frames done, frames in all).
 
     Raises:
@@ -274,7 +256,6 @@ def write_still(request: Request, look: Look, path: Path, at: float) -> None:
     """Write one frame of the film as PNG, completely or not at all.
 
     Args:
-        path: the file; replaced when it exists.
         at: s from the release.
 
     Raises:
@@ -399,14 +380,7 @@ class Trace:
     bottom: int
 
     def at(self, time: float) -> Image:
-        """The trace up to a time.
-
-        Args:
-            time: s from the release.
-
-        Returns:
-            RGB, shape (height, width, 3).
-        """
+        """The trace up to a time in s from the release, RGB, shape (height, width, 3)."""
         picture = self.faint.copy()
         column = round(float(np.interp(time, self.time, self.columns)))
         row = round(float(np.interp(time, self.time, self.rows)))
@@ -418,12 +392,7 @@ class Trace:
 
 
 def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
-    """Draw a record's axes once.
-
-    Args:
-        width: pixels.
-        height: pixels.
-    """
+    """Draw a record's axes once; width and height in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -67,11 +67,7 @@ class LiveRun:
         self._record()
 
     def advance(self, seconds: float) -> None:
-        """Advance; a run that is over is released again.
-
-        Args:
-            seconds: of the run, s.
-        """
+        """Advance by seconds of the run; a run that is over is released again."""
 
         def step() -> None:
             steps, apart = self._steps(seconds), self._steps(self.history.interval) or 1
@@ -82,11 +78,7 @@ class LiveRun:
         self.advance_by(step)
 
     def advance_by(self, step: Callable[[], object]) -> None:
-        """Advance by an external clock; a run that is over is released again.
-
-        Args:
-            step: advances ``data``, or leaves it unchanged.
-        """
+        """Advance by an external clock, which steps ``data`` or leaves it; a run that is over is released again."""
         if self.data.time >= self.run.settings.duration:
             self.release()
         step()
@@ -203,22 +195,14 @@ class Controls:
         self.released = False
 
     def key(self, code: int) -> None:
-        """Record a key; called from the viewer's thread, so it only sets a flag.
-
-        Args:
-            code: of the key, a GLFW number (count).
-        """
+        """Record a GLFW key; called from the viewer's thread, so it only sets a flag."""
         if code == _KEY_SPACE:
             self.paused = not self.paused
         elif code == _KEY_R:
             self.released = True
 
     def advance(self, seconds: float) -> None:
-        """Advance by the clock, as the keys demand.
-
-        Args:
-            seconds: since the last call, s.
-        """
+        """Advance by the seconds since the last call, as the keys demand."""
         if self.released:
             self.released = False
             self._live.release()

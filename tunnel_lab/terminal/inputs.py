@@ -31,13 +31,9 @@ _FORM = "write NAME:PARAMETER=VALUE, with a comma before each further PARAMETER=
 
 
 def given_campaign(path: Path) -> Campaign:
-    """Read what a command is given.
+    """Read a campaign's folder, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
 
-    Args:
-        path: the folder of a campaign, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
-
-    Returns:
-        The campaign. What was made of a file of a data logger is printed on standard error.
+    What was made of a file of a data logger is printed on standard error.
 
     Raises:
         TunnelError: for the first fault.
@@ -66,10 +62,7 @@ def given_campaign(path: Path) -> Campaign:
 
 
 def file_hashes(path: Path) -> dict[str, str]:
-    """SHA-256 of the files that a campaign was read from.
-
-    Args:
-        path: as for `given_campaign`, which has read it.
+    """SHA-256 of the files that a campaign was read from, as for `given_campaign`, which has read it.
 
     Returns:
         Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
@@ -90,10 +83,7 @@ def file_hashes(path: Path) -> dict[str, str]:
 
 
 def parse_effect(text: str) -> EffectSetting:
-    """Read the value of ``--effect``.
-
-    Args:
-        text: such as ``coulomb_friction:friction_moment=0.004``.
+    """Read the value of ``--effect``, such as ``coulomb_friction:friction_moment=0.004``.
 
     Returns:
         Name and parameters; the registry checks whether they exist and are in range.
@@ -155,11 +145,7 @@ def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def known_estimator(name: str) -> None:
-    """Refuse an unknown estimator.
-
-    Raises:
-        TunnelError: when there is no such estimator; it suggests the closest name.
-    """
+    """Refuse an unknown estimator with a `TunnelError` that suggests the closest name."""
     from identification.estimators import known_estimators
 
     known = known_estimators()
@@ -170,11 +156,7 @@ def known_estimator(name: str) -> None:
 
 
 def refuse_unwritable_files(*paths: Path | None) -> None:
-    """Refuse files that cannot be written before the work is done; None is left out.
-
-    Raises:
-        TunnelError: for the first of them.
-    """
+    """Refuse the first file that cannot be written before the work is done; None is left out."""
     from tunnel_sim.files.writing import refuse_unwritable
 
     for path in filter(None, paths):

@@ -64,18 +64,14 @@ _sets_every: float | None = None
 
 
 def print_sets(every: float) -> None:
-    """From now on, print the sets of effects that are tried too where no terminal shows them.
-
-    Args:
-        every: least time between two of them, s.
-    """
+    """From now on, print tried sets of effects too where no terminal shows them, at most one in so many seconds."""
     global _sets_every
     _sets_every = every
 
 
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step, the effect tried and the time; one line per step where no terminal shows it.
+    """A spinner with the step, the effect tried and the time, or one line per step where no terminal shows it.
 
     Yields:
         The function to call with each step.

@@ -51,20 +51,12 @@ class _Console(Console):
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console without highlighting and markup: text is printed unchanged, or not at all with ``--quiet``.
-
-    Args:
-        stderr: print to standard error, where progress and status lines go.
-    """
+    """A console that prints text unchanged, without highlighting and markup, or not at all with ``--quiet``."""
     return _Console(stderr=stderr, quiet=quiet.get(), highlight=False, markup=False, emoji=False)
 
 
 def say(line: str, *, stderr: bool = False) -> None:
-    """Print one line unchanged: no markup and no wrapping, so that paths can be copied.
-
-    Args:
-        stderr: print to standard error, as is done where tables are not text.
-    """
+    """Print one line unchanged, so that paths can be copied; on standard error where tables are not text."""
     console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
 
 
@@ -75,12 +67,9 @@ def say_written(*paths: Path | None) -> None:
 
 
 def show_tables(*tables: Table) -> None:
-    """Print tables, each followed by an empty line, in the format of ``--format``.
+    """Print tables that have rows, each followed by an empty line, in the format of ``--format``.
 
     A table of text that is wider than the terminal is printed row by row.
-
-    Args:
-        tables: those without rows are left out.
     """
     out = console()
     for table in tables:
@@ -97,11 +86,7 @@ def show_tables(*tables: Table) -> None:
 
 
 def rendered(table: Table, kind: TableFormat) -> str:
-    """A table of texts in another format than text.
-
-    Returns:
-        Lines with a final line feed. Cells are as printed; JSON has numbers where a cell is one.
-    """
+    """A table of texts as CSV, Markdown or JSON, which has numbers where a cell is one; with a final line feed."""
     heads = [_plain(column.header) for column in table.columns]
     rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
     title = _plain(table.title or "")
@@ -132,12 +117,7 @@ def _value(cell: str) -> str | float:
 
 
 def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
-    """An empty table in the common style.
-
-    Args:
-        columns: headings, units included.
-        right: those headings whose columns are aligned to the right.
-    """
+    """An empty table in the common style: headings have units, those of ``right`` align to the right."""
     result = Table(
         title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
     )
@@ -186,11 +166,7 @@ def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Ta
 
 
 def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
-    """Natural frequency and damping ratio of every run.
-
-    Args:
-        estimate: its estimate, runs in the same order.
-    """
+    """Natural frequency and damping ratio of every run."""
     result = table(
         f"Runs of {campaign.name}",
         *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
@@ -209,11 +185,7 @@ def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
 
 
 def windows_table(run: RunEstimate) -> Table:
-    """Estimates of consecutive windows of a run, as in the paper's Table III.
-
-    Returns:
-        A table with a row for each window, the largest amplitude first.
-    """
+    """Estimates of consecutive windows of a run, the largest amplitude first, as in the paper's Table III."""
     cycles = run.windows[0].cycles if run.windows else 0
     result = table(
         f"{run.id}: windows of {cycles} cycle{'s' if cycles > 1 else ''}",
@@ -242,11 +214,7 @@ def _status(status: Status) -> str:
 
 
 def is_too_wide(table: Table, width: int) -> bool:
-    """Whether cells other than sentences, or words of a heading, would be broken.
-
-    Args:
-        width: of the terminal, columns (count).
-    """
+    """Whether cells other than sentences, or words of a heading, would be broken in so many columns."""
     needed = sum(_least_width(column) + _PADDING for column in table.columns)
     return needed + _BETWEEN * (len(table.columns) - 1) > width
 
@@ -269,8 +237,7 @@ def _least_width(column: Column) -> int:
 def stacked(table: Table, width: int) -> str:
     """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
 
-    Args:
-        width: of the terminal, columns (count); sentences are wrapped, words are never broken.
+    Sentences are wrapped to the width of the terminal; words are never broken.
     """
     heads = [" ".join(str(column.header).split()) for column in table.columns]
     lines = [str(table.title or "")]
@@ -314,11 +281,7 @@ def show_estimate(
 
 
 def parts_table(imported: Imported) -> TextTable:
-    """The runs of an import, a row for each.
-
-    Returns:
-        The file where there are several, samples, rate, the stretch of the record, the swing and the conditions.
-    """
+    """The runs of an import: file where there are several, samples, rate, stretch, swing and conditions."""
     swing = f"swing\n[{imported.campaign.sensor.unit}]"
     headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, "V\n[m/s]", "Kr\n[N m/rad]")
     several = len(imported.sources) > 1
@@ -340,11 +303,9 @@ def parts_table(imported: Imported) -> TextTable:
 
 
 def budget_table(budget: Document) -> TextTable:
-    """Standard uncertainties, source by source.
+    """Standard uncertainties, a row for each source and one for all of them, in the quantities' units.
 
-    Returns:
-        A row for each source and one for all of them, in the quantities' units; a negative value is the
-        reduction by a correlation.
+    A negative value is the reduction by a correlation.
     """
     from identification.estimate import UNITS
 
