@@ -24,7 +24,6 @@ from tunnel_lab.commands import (
     files,
     identify,
     paper,
-    plot,
     show,
     simulate,
 )
@@ -113,7 +112,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "identify": identify.run,
     "diagnose": diagnose.diagnose,
     "compare": diagnose.compare,
-    "plot": plot.run,
+    "plot": show.plot,
     "export": files.export,
     "springs": paper.springs,
     "effects": effects.run,

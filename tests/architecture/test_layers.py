@@ -75,7 +75,7 @@ def test_the_import_contracts_hold() -> None:
         ("identification/estimate.py", "import mujoco"),
         ("identification/estimate.py", "import tunnel_sim.engine.model"),
         ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
-        ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
+        ("identification/estimate.py", "import tunnel_lab.terminal.outputs"),
         ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
         ("identification/statistics.py", "import identification.signal.peaks"),
         ("diagnosis/result.py", "import diagnosis.search.investigate"),

@@ -33,7 +33,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
     from identification import identify
     from identification.estimate import Estimate
     from identification.estimators import ALL_ESTIMATORS
-    from tunnel_lab.terminal.tables import show_estimate
+    from tunnel_lab.terminal.outputs import show_estimate
     from tunnel_sim.files.writing import json_text
 
     campaign = accepted_campaign(folder, rng)
@@ -49,7 +49,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
 
 def draw(campaign: Campaign, found: Any, folder: Path) -> None:
     """The figures of ``tunnel plot``."""
-    from tunnel_lab.commands.plot import spread
+    from tunnel_lab.commands.show import spread
     from tunnel_lab.plotting import runs, style
     from tunnel_lab.plotting.runs import windows_figure
 

@@ -18,7 +18,7 @@ from identification.printing import SYMBOLS, TextTable, unit, with_std
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
-from tunnel_lab.terminal.tables import budget_lines, budget_table
+from tunnel_lab.terminal.outputs import budget_lines, budget_table
 from tunnel_sim.files.toml_input import load_toml
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -134,7 +134,7 @@ class _Records:
         with self._drawn:
             self._draw(imported)
         with self._table:
-            from tunnel_lab.terminal.tables import parts_table
+            from tunnel_lab.terminal.outputs import parts_table
 
             show_parts([parts_table(imported)])
             with ui.element("ul").classes("notes"):

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.tables import say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, library, shown
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")

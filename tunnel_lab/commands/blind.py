@@ -16,8 +16,7 @@ from tunnel_lab.terminal.inputs import (
     with_format,
     with_quiet,
 )
-from tunnel_lab.terminal.progress import bar
-from tunnel_lab.terminal.tables import console, rich_table, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import bar, console, rich_table, say, say_written, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.

@@ -21,8 +21,7 @@ from tunnel_lab.terminal.inputs import (
     refuse_unwritable_files,
     split_names,
 )
-from tunnel_lab.terminal.progress import step_display
-from tunnel_lab.terminal.tables import rich_table, say, say_written, show_tables
+from tunnel_lab.terminal.outputs import rich_table, say, say_written, show_tables, step_display
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from typer import Argument, Option
 
 from identification.printing import unit_mark
 from tunnel_lab.terminal.inputs import EffectsFileOption, refuse_unwritable_files
-from tunnel_lab.terminal.tables import say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import known_estimator, refuse_unwritable_files
-from tunnel_lab.terminal.progress import bar
-from tunnel_lab.terminal.tables import console, say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -122,10 +121,8 @@ def sweep(
     estimates = plan.size * len(plan.document.estimators)
     say(f"Written: {out} ({plan.size} cases, {plan.runs} runs, {estimates} estimates)")
     if outcome.crashes:
-        say(
-            f"{outcome.crashes} estimates raised an exception: see status 'raised' in the results",
-            stderr=True,
-        )
+        crashes = f"{outcome.crashes} estimates raised an exception"
+        say(f"{crashes}: see status 'raised' in the results", stderr=True)
         raise typer.Exit(1)
 
 
@@ -142,9 +139,8 @@ def _summarise(folder: Path) -> None:
     lines = sweep_summary.summarise(store)
     grouped = sweep_summary.groups(lines)
     target = output_folder(folder / "summary")
-    written = [
-        write_encoded(target / "summary.csv", pl.DataFrame([line.to_row() for line in lines]).write_csv)
-    ]
+    frame = pl.DataFrame([line.to_row() for line in lines])
+    written = [write_encoded(target / "summary.csv", frame.write_csv)]
     for name, part in grouped.items():
         drawn = sweep_summary.error_figure(part)
         if drawn is not None:
@@ -152,11 +148,8 @@ def _summarise(folder: Path) -> None:
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
         say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")
-    show_tables(
-        sweep_summary.overall_table(lines),
-        *map(sweep_summary.axis_table, grouped.values()),
-        sweep_summary.pace_table(store),
-    )
+    along = map(sweep_summary.axis_table, grouped.values())
+    show_tables(sweep_summary.overall_table(lines), *along, sweep_summary.pace_table(store))
     say(sweep_summary.BRACKETS)
     say(f"Written to {target}: {', '.join(path.name for path in written)}")
 
@@ -241,8 +234,7 @@ def score(
     for name in names:
         known_estimator(name)
     names = names or ALL_ESTIMATORS
-    if breakdown:
-        # It has its own conditions.
+    if breakdown:  # it has its own conditions
         for name, value in {"GRID": grid, "--check": check, "--write-baseline": write_baseline}.items():
             if value is not None:
                 raise TunnelError(
@@ -328,9 +320,8 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
 
-    terminal = console(stderr=True).is_terminal
+    terminal, parts = console(stderr=True).is_terminal, None if out is None else out / "parts"
     cases = breakdown.make_cases(seed, realisations=trials or breakdown.REALISATIONS, show_steps=terminal)
-    parts = None if out is None else out / "parts"
     with bar("scoring") as progress:
         rows = breakdown.break_down(cases, names, seed, jobs=jobs, parts=parts, progress=progress)
     biases = breakdown.biases(rows)

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.tables import parts_table, rich_table, say, show_tables
+from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError
 
 _column = partial(Option, rich_help_panel="Columns")

@@ -16,7 +16,7 @@ from typer import Argument, Option
 from identification.estimators import SUMMARIES, make_estimator
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, known_estimator, refuse_unwritable_files
-from tunnel_lab.terminal.tables import (
+from tunnel_lab.terminal.outputs import (
     budget_lines,
     budget_table,
     console,

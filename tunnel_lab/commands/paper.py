@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.progress import bar
-from tunnel_lab.terminal.tables import (
+from tunnel_lab.terminal.outputs import (
+    bar,
     console,
     say,
     say_written,
@@ -143,7 +143,7 @@ def _draw(
     """Draw the figures and the rig; return why there is no picture of the rig, or an empty text."""
     from tunnel_lab.plotting import runs
     from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.show.film import Look, Request, write_still
+    from tunnel_lab.show.film import Look, Request, write_film
 
     # The first wind-off run with wind-on runs of its spring, and that at the highest speed.
     off, on = next(
@@ -158,7 +158,7 @@ def _draw(
     save_both(runs.truth_figure(estimates, vars(plan.truth)), folder / "estimates.png")
     with console(stderr=True).status("rendering the rig"):
         try:
-            write_still(Request(), Look(height=800, trace=False), folder / "rig.png", 0.0)
+            write_film(Request(), Look(height=800, trace=False), folder / "rig.png", at=0.0)
         except TunnelError as error:
             return str(error)
     return ""

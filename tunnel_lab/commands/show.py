@@ -1,15 +1,20 @@
-"""``tunnel view`` and ``tunnel render``: the rig in a window or a browser, and as a film or a picture."""
+"""``tunnel plot``, ``view`` and ``render``: figures of a campaign; the rig in a window, a browser or a film."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
+import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.progress import bar
-from tunnel_lab.terminal.tables import say_written
-from tunnel_sim.vocabulary.errors import TunnelError, library
+from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import given_campaign, split_names
+from tunnel_lab.terminal.outputs import bar, say, say_written
+from tunnel_sim.vocabulary.errors import TunnelError, library, shown
+
+if TYPE_CHECKING:
+    from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 _DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
 PlanArgument = Annotated[
@@ -28,6 +33,85 @@ EffectOption = Annotated[
         help="Add an effect to the nominal model. May be repeated; tunnel effects lists them.",
     ),
 ]
+
+
+def plot(
+    campaign: Annotated[
+        Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its fit.")
+    ],
+    out: Annotated[
+        Path, Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder.")
+    ] = Path("tunnel-output"),
+    runs: Annotated[
+        list[str] | None, Option("--run", metavar="ID", help="Runs of a diagnosis to draw. Default: all.")
+    ] = None,
+) -> None:
+    """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
+
+    Writes traces-1 (twelve runs to a page), spectrum and windows, each as a
+    picture (PNG) and for print (PDF), into FOLDER/<name of the campaign's
+    folder>. Angles in rad, times in s, spectral density in rad²/Hz.
+
+    Of a diagnosis it writes fit-1 and so on, two runs to a page: what was
+    measured, what the nominal model and the model with the causes predict, and
+    their residuals in degrees, in the cycles where the models differ most.
+
+    [bold]Examples[/bold]
+      tunnel plot my-campaign
+      tunnel plot my-campaign --out figures
+      tunnel plot answer.json --run r02
+
+    [bold]Exit status[/bold]
+      0 drawn, 1 no run could be identified (windows is left out), 2 bad
+      input.
+    """
+    from identification import identify
+    from tunnel_lab.plotting import runs as figures
+    from tunnel_lab.plotting.style import save_both
+    from tunnel_lab.report.diagnosis_file import read_document
+    from tunnel_lab.report.fit import fit_pages
+    from tunnel_sim.files.writing import output_folder
+
+    failure = ""
+    if campaign.suffix.lower() == ".json":
+        pages = fit_pages(read_document(campaign), split_names(runs))
+        if not pages:
+            remedy = "diagnose the campaign again"
+            raise TunnelError("has no curves to draw", where=shown(campaign), remedy=remedy)
+        drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
+        folder = output_folder(out / campaign.stem)
+    else:
+        if runs:
+            raise TunnelError("--run is for the file of a diagnosis", remedy="leave it out for a campaign")
+        data = given_campaign(campaign)
+        folder = output_folder(out / campaign.resolve().name)
+        drawn = {f"traces-{number}": page for number, page in enumerate(figures.trace_pages(data), 1)}
+        drawn["spectrum"] = figures.spectrum_figure(spread(data))
+        estimate = identify(data, "output_error", throw=False)
+        if any(run.windows for run in estimate.runs):
+            drawn["windows"] = figures.windows_figure(estimate)
+        failure = estimate.status.value if estimate.status.failed else ""
+    written = [save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
+    say_written(*(path for pair in written for path in pair))
+    if failure:
+        say(f"Note: {failure}", stderr=True)
+        raise typer.Exit(1)
+
+
+def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
+    """A few runs that differ in spring and wind, to keep a plot readable.
+
+    Args:
+        count: at most this many runs (a count).
+
+    Returns:
+        The first runs of distinct spring and wind speed; the first runs where conditions are not stated.
+    """
+    chosen: dict[object, Run] = {}
+    for run in campaign.runs:
+        stated = (run.spring_stiffness, run.wind_speed)
+        chosen.setdefault(run.id if run.spring_stiffness is None else stated, run)
+    return tuple(chosen.values())[:count]
 
 
 def view(
@@ -78,13 +162,13 @@ def view(
     if not web and (port or browser):
         raise TunnelError("needs --web", where="--port" if port else "--browser", remedy="add --web")
     name = checked_camera(camera)
-    shown = shown_run(request)
+    run = shown_run(request)
     from tunnel_lab.show.live import view_in_browser, view_in_window  # refusals need no engine
 
     if web:
-        view_in_browser(shown, port=port, camera=name, open_browser=browser)
+        view_in_browser(run, port=port, camera=name, open_browser=browser)
     else:
-        view_in_window(shown, camera=name, speed=speed)
+        view_in_window(run, camera=name, speed=speed)
 
 
 def render(
@@ -123,7 +207,7 @@ def render(
     [bold]Exit status[/bold]
       0 written, 2 bad input or no way to render here; nothing is written then.
     """
-    from tunnel_lab.show.film import Look, Request, checked_camera, shown_run, write_film, write_still
+    from tunnel_lab.show.film import Look, Request, checked_camera, shown_run, write_film
     from tunnel_sim.files.writing import output_folder
 
     targets = out or list(_DEFAULT)
@@ -145,7 +229,7 @@ def render(
     length = shown_run(request).settings.duration  # refuses bad input before anything is drawn
     for path in targets:
         if path.suffix.lower() == ".png":
-            write_still(request, look, path, min(at, length) if out is None else at)
+            write_film(request, look, path, at=min(at, length) if out is None else at)
         else:
             with bar("drawing frames") as progress:
                 write_film(request, look, path, progress)

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import EffectsFileOption, parse_effect, refuse_unwritable_files
-from tunnel_lab.terminal.progress import bar
-from tunnel_lab.terminal.tables import say, say_written, show_tables, table
+from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 if TYPE_CHECKING:
@@ -197,8 +196,10 @@ def plan_drive(
     import tomli_w
 
     from identification.uncertainty.drive_design import Limits, peak_response, plan_bound, propose_drive
+    from tunnel_lab.envs.menu import Costs
+    from tunnel_sim.effects import ALL_EFFECTS
     from tunnel_sim.engine.virtual_campaign import plan_effects
-    from tunnel_sim.files.plan_file import check_size, plan_from, read_plan, run_count
+    from tunnel_sim.files.plan_file import EffectTable, check_size, plan_from, read_plan, run_count
     from tunnel_sim.files.rig_file import load_rig
     from tunnel_sim.files.writing import write_whole
 
@@ -217,15 +218,30 @@ def plan_drive(
         raise TunnelError("is the plan itself", where=f"--out {out}", remedy="name another file")
     refuse_unwritable_files(out)
     document, rig, where = read_plan(plan), load_rig(), shown(plan)
-    if buffeting is not None:
-        document = _with_buffeting(document, buffeting)
+    if buffeting is not None:  # of the bandwidth that the plan states
+        kind = next(kind for kind in ALL_EFFECTS if kind.random == "broad_band")
+        stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
+        kept = [effect for effect in document.effects if effect.name != kind.name]
+        if buffeting:
+            parameters = {**stated, kind.parameters()[0].name: buffeting}
+            kept.append(EffectTable(name=kind.name, parameters=parameters))
+        document = document.model_copy(update={"effects": kept})
     if document.drive is not None:
         raise TunnelError("has a [drive] already", where=where, remedy="give a plan of free decays alone")
     loaded = plan_from(document, rig, where)
     plan_effects(loaded)  # refuses what cannot be simulated
     spent = rig_time(document)
-    duration = _duration(document, spent if minutes is None else 60.0 * minutes)
+    changes, setup = _changes(document), Costs().setup
     cells = len(document.wind_speeds) * (len(document.springs) + len(document.spring_stiffness))
+    left = ((spent if minutes is None else 60.0 * minutes) - changes) / cells - setup
+    if left < 1.0:
+        least = (changes + cells * (setup + 1.0)) / 60.0
+        raise TunnelError(
+            f"leaves no time for records: starts and changes take {least:.3g} min",
+            where="--minutes",
+            remedy="give more, or fewer springs and wind_speeds",
+        )
+    duration = floor(10.0 * left + 1e-6) / 10.0
     check_size(cells, duration, document.sample_rate, where)
     free = plan_bound(loaded, rig)
     with bar("comparing inputs") as progress:
@@ -241,7 +257,6 @@ def plan_drive(
     found = plan_from(best, rig, where)
     driven = plan_bound(found, rig)
     write_whole(out, tomli_w.dumps(best.model_dump(exclude_none=True, exclude_defaults=True)).encode())
-    changes = _changes(document)
     bounds = _bounds(
         (rig_time(best) - changes) / (spent - changes),
         ("free decays", run_count(document), document.duration, spent, free),
@@ -260,18 +275,6 @@ def plan_drive(
     say_written(out)
 
 
-def _with_buffeting(document: PlanDocument, intensity: float) -> PlanDocument:
-    """A plan with buffeting of this intensity, of the bandwidth that it states."""
-    from tunnel_sim.effects import ALL_EFFECTS
-    from tunnel_sim.files.plan_file import EffectTable
-
-    kind = next(kind for kind in ALL_EFFECTS if kind.random == "broad_band")
-    stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
-    others = [effect for effect in document.effects if effect.name != kind.name]
-    added = EffectTable(name=kind.name, parameters={**stated, kind.parameters()[0].name: intensity})
-    return document.model_copy(update={"effects": [*others, added] if intensity else others})
-
-
 def rig_time(document: PlanDocument) -> float:
     """Rig time of a plan, s: records, releases or starts, and changes of spring and speed."""
     from tunnel_lab.envs.menu import Costs
@@ -286,22 +289,6 @@ def _changes(document: PlanDocument) -> float:
 
     springs, costs = len(document.springs) + len(document.spring_stiffness), Costs()
     return springs * (costs.spring_change + len(document.wind_speeds) * costs.speed_change)
-
-
-def _duration(document: PlanDocument, spent: float) -> float:
-    """Length of the record of one run per spring and speed in a rig time (s), in tenths of a second."""
-    from tunnel_lab.envs.menu import Costs
-
-    cells = len(document.wind_speeds) * (len(document.springs) + len(document.spring_stiffness))
-    left = (spent - _changes(document)) / cells - Costs().setup
-    if left < 1.0:
-        least = (_changes(document) + cells * (Costs().setup + 1.0)) / 60.0
-        raise TunnelError(
-            f"leaves no time for records: starts and changes take {least:.3g} min",
-            where="--minutes",
-            remedy="give more, or fewer springs and wind_speeds",
-        )
-    return floor(10.0 * left + 1e-6) / 10.0
 
 
 def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) -> Table:

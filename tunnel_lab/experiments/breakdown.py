@@ -24,7 +24,7 @@ from tunnel_lab.experiments.runner import Progress
 from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, outcome, rows_of
 from tunnel_lab.experiments.score_view import NAMES
 from tunnel_lab.plotting.style import figure, styled
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.outputs import table
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of

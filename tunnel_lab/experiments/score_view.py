@@ -29,7 +29,7 @@ from tunnel_lab.experiments.score_grid import Cell
 from tunnel_lab.experiments.score_trials import Key, Results, describe, groups_of
 from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.outputs import table
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -305,7 +305,7 @@ def verdict_lines(verdict: Verdict) -> list[str]:
 def score_figure(results: Results) -> Figure:
     """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
 
-    For each kind of cell there are two rows of panels, one panel for each estimator. Cells are in rows, in the order of
+    Each kind of cell has two rows of panels, one panel for each estimator. Cells are in rows, in the order of
     the grid, so that reading across compares the estimators; quantities differ in colour and marker.
     """
     kinds = [cell.kind for cell in results.grid.cells]

@@ -19,7 +19,7 @@ from identification.statistics import Proportion
 from tunnel_lab.experiments.sweep import TIMINGS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.outputs import table
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, shown

@@ -101,6 +101,11 @@ def table_3(folder: Path) -> Section:
     campaigns = dict(zip(plans, simulate_campaigns(list(plans.values())), strict=True))
     windows = {name: identify(c, NETWORK).runs[1].windows for name, c in campaigns.items()}
     save_both(table3_figure(paper_windows(), windows), folder / "windows.png")
+    inference = "; ".join(
+        f"spring {springs.spring} needs {springs.wind_speed:.1f} m/s "
+        f"and Cr {signed(springs.mechanical_damping, 4)} N m s/rad"
+        for springs in infer_springs()[:2]
+    )
     rows = tuple(
         (
             str(row.number), f"{row.zeta:.4f}", f"{row.omega_n_rad_per_s:.4f}",
@@ -116,7 +121,8 @@ def table_3(folder: Path) -> Section:
         outcome="in part",
         words=(
             "The run behind the table is not named, and its record is not published, so the numbers cannot be "
-            "computed again. Spring 5 at about 10 m/s is an inference: " + _inference(),
+            f"computed again. Spring 5 at about 10 m/s is an inference: {inference}, which is impossible, and "
+            "so are the stiffer ones.",
             "The paper takes the drift for the rig's nonlinearity, and it is right: on a linear rig the "
             "networks give constant columns within their noise. A spring that softens with the amplitude "
             "and a damping that grows with it make them drift as the paper's do. Other pairs of effects do so as "
@@ -134,15 +140,6 @@ def table_3(folder: Path) -> Section:
             Picture(file="windows.png", caption="Table III, and the networks on simulated runs; 95 % intervals."),
         ),
     )  # fmt: skip
-
-
-def _inference() -> str:
-    parts = [
-        f"spring {springs.spring} needs {springs.wind_speed:.1f} m/s "
-        f"and Cr {signed(springs.mechanical_damping, 4)} N m s/rad"
-        for springs in infer_springs()[:2]
-    ]
-    return "; ".join(parts) + ", which is impossible, and so are the stiffer ones."
 
 
 def table_4(_: Path) -> Section:
@@ -177,7 +174,13 @@ def table_4(_: Path) -> Section:
     spring = infer_springs()[0]
     beta = paper_derivatives()[0].cn_beta_per_rad * (spring.wind_speed / _SPEED) ** 2
     again = (f"from Table III's mean ωn, spring {spring.spring} at {_SPEED:g} m/s", f"{beta:.3f}", "–", "–")
-    linear, soft = (_closer(closeness_of[name]) for name in ("linear, noise", "softening, noise"))
+    closer = []  # which of the paper's two methods has the smaller error of Cnβ
+    for name in ("linear, noise", "softening, noise"):
+        found = closeness_of[name]
+        errors = {method: abs(found[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in found}
+        least = min(errors, key=errors.__getitem__)
+        closer.append("network" if least == NETWORK else "conventional method")
+    linear, soft = closer
     return Section(
         title="Table IV",
         about="Cnβ and Cnr of both methods",
@@ -230,14 +233,6 @@ def figures_4_to_6(folder: Path) -> Section:
             ),
         ),
     )
-
-
-def _closer(distances: Mapping[str, Closeness]) -> str:
-    """Which of the paper's two methods has the smaller error of Cnβ."""
-    errors = {
-        method: abs(distances[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in distances
-    }
-    return "network" if min(errors, key=errors.__getitem__) == NETWORK else "conventional method"
 
 
 @styled

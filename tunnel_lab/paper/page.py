@@ -105,7 +105,16 @@ def write_paper(
     sections: dict[str, Section] = {}
     for name, part in parts.items():
         path = kept / f"{name}.json"
-        section = _finished(path, folder)
+        section = None
+        document = read_json(path, remedy=_REMEDY) if path.exists() else {}
+        if document.get("version") == version(_PACKAGE):
+            try:
+                section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
+            except ValidationError as error:
+                what = f"is not a part of the page ({error.errors()[0]['msg']})"
+                raise TunnelError(what, where=str(path), remedy=_REMEDY) from None
+            if not all((folder / picture.file).is_file() for picture in section.pictures):
+                section = None
         if section is None and name in names:
             progress(len([finished for finished in names if finished in sections]), len(names), name)
             section = part(folder)
@@ -115,21 +124,6 @@ def write_paper(
     progress(len(names), len(names), "")
     page = write_encoded(folder / PAGE, lambda stream: stream.write(render(sections).encode()))
     return page, sections
-
-
-def _finished(path: Path, folder: Path) -> Section | None:
-    """A part of this version that is kept with all its pictures."""
-    if not path.exists():
-        return None
-    document = read_json(path, remedy=_REMEDY)
-    if document.get("version") != version(_PACKAGE):
-        return None
-    try:
-        section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
-    except ValidationError as error:
-        reason = error.errors()[0]["msg"]
-        raise TunnelError(f"is not a part of the page ({reason})", where=str(path), remedy=_REMEDY) from None
-    return section if all((folder / picture.file).is_file() for picture in section.pictures) else None
 
 
 def render(sections: Mapping[str, Section]) -> str:

@@ -201,7 +201,7 @@ def windows_figure(estimate: Estimate) -> Figure:
     """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
 
     A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks. Runs past the sixth
-    and those with fewer than two windows are left out. Where the runs differ in frequency, each quantity is shown as
+    and those with fewer than two windows are left out. Where the runs differ in frequency, a quantity is shown as
     its deviation from the weighted mean of its run, so that only its change with the amplitude is seen.
     """
     runs = [run for run in estimate.runs if len(run.windows) > 1][:RUNS_PER_PLOT]

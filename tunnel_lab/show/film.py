@@ -239,38 +239,27 @@ class Look:
 
 
 def write_film(
-    request: Request, look: Look, path: Path, progress: Callable[[int, int], None] | None = None
+    request: Request,
+    look: Look,
+    path: Path,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    at: float | None = None,
 ) -> None:
-    """Write a run as MP4 (H.264), completely or not at all.
+    """Write a run as MP4 (H.264), or one frame of it as PNG, completely or not at all.
+
+    A child process draws into a temporary folder; the result is then moved to its place.
 
     Args:
         progress: called with (frames done, frames in all).
+        at: the frame, s from the release; None for the film.
 
     Raises:
-        TunnelError: when the machine cannot render off-screen, or the file cannot be written.
-    """
-    _draw_elsewhere(request, look, path, None, progress)
-
-
-def write_still(request: Request, look: Look, path: Path, at: float) -> None:
-    """Write one frame of the film as PNG, completely or not at all.
-
-    Args:
-        at: s from the release.
-
-    Raises:
-        TunnelError: as `write_film`; also when the run is shorter.
+        TunnelError: when the machine cannot render off-screen, the file cannot be written, or the run is shorter.
     """
     duration = shown_run(request).settings.duration
-    if not 0.0 <= at <= duration:
+    if at is not None and not 0.0 <= at <= duration:
         raise TunnelError(f"{at:g} s is not in the run", where="--at", remedy=f"give 0 to {duration:g} s")
-    _draw_elsewhere(request, look, path, at, None)
-
-
-def _draw_elsewhere(
-    request: Request, look: Look, path: Path, at: float | None, progress: Callable[[int, int], None] | None
-) -> None:
-    """Draw in a child process into a temporary folder, then move the result to its place."""
     order = {"request": asdict(request), "look": asdict(look), "at": at}
     reasons = []
     with tempfile.TemporaryDirectory() as folder:

@@ -17,7 +17,7 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
 from tunnel_lab.show.film import ShownRun
-from tunnel_lab.terminal.tables import say
+from tunnel_lab.terminal.outputs import say
 from tunnel_sim.engine.model import build_model, build_spec
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -359,7 +359,9 @@ class Overlay(plugin.ViewerPlugin):  # type: ignore[misc]  # mujoco is untyped
         imgui.SetNextWindowPos(place, imgui.Cond.Always, corner)
         imgui.SetNextWindowSize(imgui.Vec2(_WIDTH, 0.0), imgui.Cond.Always)
         imgui.Begin("Run")
-        for line in (*self._head, readings(time, angle, self._wind), f"served at {self._address}"):
+        wind = f"{self._wind:.1f} m/s" if self._wind > 0.0 else "off"
+        readings = f"time {time:5.2f} s   angle {degrees(angle):+6.2f} deg   wind {wind}"
+        for line in (*self._head, readings, f"served at {self._address}"):
             imgui.TextUnformatted(line)
         if implot.BeginPlot("##angle against time", imgui.Vec2(-1.0, _PLOT)):
             points, span = self._history.points, self._history.span
@@ -369,15 +371,3 @@ class Overlay(plugin.ViewerPlugin):  # type: ignore[misc]  # mujoco is untyped
             implot.PlotLine("", points[:, 0].tolist(), [degrees(value) for value in points[:, 1]])
             implot.EndPlot()
         imgui.End()
-
-
-def readings(time: float, angle: float, wind_speed: float) -> str:
-    """Time, angle and wind speed in one line.
-
-    Args:
-        time: s.
-        angle: rad.
-        wind_speed: m/s.
-    """
-    wind = f"{wind_speed:.1f} m/s" if wind_speed > 0.0 else "off"
-    return f"time {time:5.2f} s   angle {degrees(angle):+6.2f} deg   wind {wind}"

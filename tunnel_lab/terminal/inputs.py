@@ -38,7 +38,7 @@ def given_campaign(path: Path) -> Campaign:
     Raises:
         TunnelError: for the first fault.
     """
-    from tunnel_lab.terminal.tables import say
+    from tunnel_lab.terminal.outputs import say
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:
