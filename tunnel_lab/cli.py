@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
-from typing import Annotated, Any, cast
+from functools import cache, partial
+from typing import Annotated, cast
 
 import typer
 
@@ -136,6 +136,9 @@ for _name, _command in COMMANDS.items():
 app.add_typer(blind.app, name="blind")
 
 
+_whole = cache(partial(typer.main.get_command, app))  # built once however often a process calls `main`
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``tunnel`` and turn whatever ends it into an exit status.
 
@@ -172,12 +175,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if status == INTERRUPTED:
         print("tunnel: interrupted; no file is left half written", file=sys.stderr)
     return status if isinstance(status, int) else 0
-
-
-@cache
-def _whole() -> Any:
-    """``tunnel`` with all its commands and options, built once however often a process calls `main`."""
-    return typer.main.get_command(app)
 
 
 def _flush() -> None:

@@ -142,10 +142,8 @@ def diagnose(
 
         find_browser()
     if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir)):
-        raise TunnelError(
-            "--model and --joint belong together, and --free, --patch and --asset-dir to them",
-            remedy="give both",
-        )
+        what = "--model and --joint belong together, and --free, --patch and --asset-dir to them"
+        raise TunnelError(what, remedy="give both")
     data = given_campaign(campaign)
     hashes = file_hashes(campaign)
     own_model = None

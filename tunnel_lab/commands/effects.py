@@ -119,8 +119,16 @@ def run(
         say("Details of one effect: tunnel effects NAME")
         return
     (kind,) = kinds
-    for line in lines(kind):
-        say(line)
+    say(f"{kind.name}: {summary(kind)}\n")
+    say(f"channel:    {kind.channel}")
+    say(f"condition:  {kind.condition}")
+    say(f"equation:   {kind.equation}")
+    say(f"signature:  {kind.signature}")
+    if kind.random == "broad_band":
+        say("drawn:      a random moment, different in every run")
+    for reference in kind.references:
+        say(f"reference:  {reference}")
+    say("")
     right = ("typical", "from", "to", "default")
     parameters = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
     for info in kind.parameters():
@@ -185,22 +193,6 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
         cells = (kind.name, kind.channel, kind.condition, "\n".join([kind.equation, *parameters]))
         result.add_row(*map(Text, cells), end_section=True)
     return result
-
-
-def lines(kind: type[Effect]) -> list[str]:
-    """The description of one effect without its parameters."""
-    drawn = ["drawn:      a random moment, different in every run"] if kind.random == "broad_band" else []
-    return [
-        f"{kind.name}: {summary(kind)}",
-        "",
-        f"channel:    {kind.channel}",
-        f"condition:  {kind.condition}",
-        f"equation:   {kind.equation}",
-        f"signature:  {kind.signature}",
-        *drawn,
-        *(f"reference:  {reference}" for reference in kind.references),
-        "",
-    ]
 
 
 def example(kind: type[Effect]) -> str:

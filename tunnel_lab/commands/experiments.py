@@ -98,11 +98,8 @@ def sweep(
             f"{missing} is missing", where="sweep", remedy="give FILE --out FOLDER, or --summary FOLDER"
         )
     if workers is not None and scheduler not in (None, "local"):
-        raise TunnelError(
-            "its workers are started on their own machines",
-            where=f"--scheduler {scheduler}",
-            remedy="leave out --workers",
-        )
+        what = "its workers are started on their own machines"
+        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --workers")
     from tunnel_lab.experiments.runner import available_processors, lasting_processes, on_cluster
     from tunnel_lab.experiments.sweep import run_sweep
     from tunnel_lab.experiments.sweep_cases import read_sweep
@@ -290,11 +287,9 @@ def _baseline(text: str, names: tuple[str, ...], *, everything: bool) -> Results
     baseline = packaged_baseline() if text == PACKAGED else read_trials(Path(text))
     gone = [name for name in baseline.estimators if name not in names]
     if everything and gone:
-        raise TunnelError(
-            f"the baseline has {', '.join(gone)}, which the registry does not have",
-            where="--check",
-            remedy="write a new baseline with --write-baseline, or name what to score with --estimator",
-        )
+        what = f"the baseline has {', '.join(gone)}, which the registry does not have"
+        remedy = "write a new baseline with --write-baseline, or name what to score with --estimator"
+        raise TunnelError(what, where="--check", remedy=remedy)
     return baseline
 
 
@@ -407,11 +402,8 @@ def train(
         return
     for option, (low, high), most in (("--zeta", zeta, 0.95), ("--omega", omega, 1e4)):
         if not 0.0 < low < high < most:
-            raise TunnelError(
-                f"{low:g} {high:g} is not a range",
-                where=option,
-                remedy=f"give LOW HIGH between 0 and {most:g}",
-            )
+            remedy = f"give LOW HIGH between 0 and {most:g}"
+            raise TunnelError(f"{low:g} {high:g} is not a range", where=option, remedy=remedy)
     data = DataSpec(zeta_range=zeta, omega_range=omega)
     _train_network(out, TrainingSpec(seed, data, starts, steps or 400, steps or 3000), restart=restart)
 

@@ -145,13 +145,9 @@ def _draw(
     from tunnel_lab.plotting.style import save_both
     from tunnel_lab.show.film import Look, Request, write_film
 
-    # The first wind-off run with wind-on runs of its spring, and that at the highest speed.
-    off, on = next(
-        (off, max(pairs, key=lambda run: run.wind_speed))
-        for off in campaign.runs
-        if not off.wind_on
-        and (pairs := [r for r in campaign.runs if r.wind_on and r.spring_stiffness == off.spring_stiffness])
-    )
+    off = next(run for run in campaign.runs if not run.wind_on)
+    pairs = [run for run in campaign.runs if run.wind_on and run.spring_stiffness == off.spring_stiffness]
+    on = max(pairs, key=lambda run: run.wind_speed)
     save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
     save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")
     save_both(runs.windows_figure(measured), folder / "windows.png")
@@ -236,13 +232,7 @@ def show_springs(springs: SpringTable, source: str) -> None:
 
 @dataclass(frozen=True)
 class SpringTable:
-    """Springs and the wind-off frequencies measured with them.
-
-    Args:
-        names: of the springs, n of them.
-        stiffness: Kr of each, N m/rad, above zero.
-        frequency_hz: wind-off frequency of each, Hz, above zero.
-    """
+    """Names of springs, their stiffness Kr (N m/rad) and their wind-off frequency (Hz), both above zero."""
 
     names: tuple[str, ...]
     stiffness: tuple[float, ...]
@@ -284,22 +274,20 @@ def read_spring_table(path: Path) -> SpringTable:
         if header.count(name) != 1:
             raise TunnelError(f"needs one column {name}", where=str(path), remedy=REMEDY)
     columns = {name: header.index(name) for name in known if name in header}
-    table = [_spring(row, columns, where) for where, row in rows[1:]]
-    if len(table) < 3:
-        raise TunnelError(f"has {len(table)} springs", where=str(path), remedy="give three or more")
-    names = tuple(name or str(number) for number, (name, _, _) in enumerate(table, 1))
-    return SpringTable(names, tuple(row[1] for row in table), tuple(row[2] for row in table))
-
-
-def _spring(row: list[str], columns: dict[str, int], where: str) -> tuple[str, float, float]:
-    """Name (may be empty), stiffness and frequency of one line."""
-    if len(row) <= max(columns.values()):
-        raise TunnelError(f"has {len(row)} values", where=where, remedy="give one for each column")
-    name = row[columns[SPRING]].strip() if SPRING in columns else ""
-    if len(name) > limits.NAME_CHARACTERS:
-        what = f"the spring's name has {len(name)} characters"
-        raise TunnelError(what, where=where, remedy=f"give it {limits.NAME_CHARACTERS} at most")
-    return name, _positive(row[columns[STIFFNESS]], where), _positive(row[columns[FREQUENCY]], where)
+    names, stiffness, frequency = [], [], []
+    for number, (where, row) in enumerate(rows[1:], 1):
+        if len(row) <= max(columns.values()):
+            raise TunnelError(f"has {len(row)} values", where=where, remedy="give one for each column")
+        name = row[columns[SPRING]].strip() if SPRING in columns else ""
+        if len(name) > limits.NAME_CHARACTERS:
+            what = f"the spring's name has {len(name)} characters"
+            raise TunnelError(what, where=where, remedy=f"give it {limits.NAME_CHARACTERS} at most")
+        names.append(name or str(number))
+        stiffness.append(_positive(row[columns[STIFFNESS]], where))
+        frequency.append(_positive(row[columns[FREQUENCY]], where))
+    if len(names) < 3:
+        raise TunnelError(f"has {len(names)} springs", where=str(path), remedy="give three or more")
+    return SpringTable(tuple(names), tuple(stiffness), tuple(frequency))
 
 
 def _positive(text: str, where: str) -> float:

@@ -223,7 +223,7 @@ def render(
     if not cross or any(n % 2 or not 160 <= n <= 3840 for n in pixels):
         remedy = "give two even numbers from 160 to 3840, such as 1280x720"
         raise TunnelError(f"{size!r} is not a size", where="--size", remedy=remedy)
-    look = Look(*pixels, fps=fps, speed=speed, camera=checked_camera(camera))
+    look = Look(pixels[0], pixels[1], fps=fps, speed=speed, camera=checked_camera(camera))
     file, effects = None if plan is None else str(plan), tuple(effect or ())
     request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
     length = shown_run(request).settings.duration  # refuses bad input before anything is drawn
@@ -239,11 +239,8 @@ def render(
 def _check_target(path: Path) -> None:
     """Refuse a file that cannot be written before the work is done."""
     if path.suffix.lower() not in (".mp4", ".png"):
-        raise TunnelError(
-            "is neither .mp4 nor .png",
-            where=f"--out {path}",
-            remedy="name a file that ends in one of these",
-        )
+        remedy = "name a file that ends in one of these"
+        raise TunnelError("is neither .mp4 nor .png", where=f"--out {path}", remedy=remedy)
     if path.suffix.lower() == ".mp4":
         library("imageio_ffmpeg", "a film", "film", f"--out {path}")
     if path.is_dir():

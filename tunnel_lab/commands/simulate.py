@@ -127,13 +127,11 @@ def simulate(
     )
     say(f"Written: {folder} ({len(campaign.runs)} runs)")
     if picture is not None:
-        pages = enumerate(trace_pages(campaign), 1)
-        say_written(
-            *[
-                save(page, picture if i == 1 else picture.with_stem(f"{picture.stem}-{i}"))
-                for i, page in pages
-            ]
-        )
+        written = []
+        for i, page in enumerate(trace_pages(campaign), 1):
+            path = picture if i == 1 else picture.with_stem(f"{picture.stem}-{i}")
+            written.append(save(page, path))
+        say_written(*written)
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
@@ -236,11 +234,8 @@ def plan_drive(
     left = ((spent if minutes is None else 60.0 * minutes) - changes) / cells - setup
     if left < 1.0:
         least = (changes + cells * (setup + 1.0)) / 60.0
-        raise TunnelError(
-            f"leaves no time for records: starts and changes take {least:.3g} min",
-            where="--minutes",
-            remedy="give more, or fewer springs and wind_speeds",
-        )
+        what = f"leaves no time for records: starts and changes take {least:.3g} min"
+        raise TunnelError(what, where="--minutes", remedy="give more, or fewer springs and wind_speeds")
     duration = floor(10.0 * left + 1e-6) / 10.0
     check_size(cells, duration, document.sample_rate, where)
     free = plan_bound(loaded, rig)

@@ -108,10 +108,9 @@ def lasting_processes(jobs: int, say: Say) -> Workers:
             except BrokenProcessPool:
                 broken += 1
                 if broken >= PATIENCE:
-                    raise TunnelError(
-                        f"worker processes died {PATIENCE} times without finishing a shard",
-                        remedy="check the memory and give fewer --workers; finished shards are kept",
-                    ) from None
+                    what = f"worker processes died {PATIENCE} times without finishing a shard"
+                    remedy = "check the memory and give fewer --workers; finished shards are kept"
+                    raise TunnelError(what, remedy=remedy) from None
                 say("a worker process was lost; its shards are repeated")
 
     return workers
@@ -163,11 +162,9 @@ def _client(address: str, workers: int) -> Iterator[Client]:
     try:
         client = make_client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError, ImportError) as error:
-        raise TunnelError(
-            f"no scheduler answers ({one_line(error, 80)})",
-            where=f"--scheduler {address}",
-            remedy="start one with: dask scheduler",
-        ) from None
+        what = f"no scheduler answers ({one_line(error, 80)})"
+        remedy = "start one with: dask scheduler"
+        raise TunnelError(what, where=f"--scheduler {address}", remedy=remedy) from None
     with client:
         yield client
 
@@ -204,17 +201,14 @@ def _work_of(
             try:
                 result: ResultT = future.result()
             except (ImportError, RuntimeError) as error:
-                raise TunnelError(
-                    f"a worker cannot do a shard ({one_line(error)})",
-                    remedy="give scheduler and workers the same environment as here",
-                ) from None
+                remedy = "give scheduler and workers the same environment as here"
+                raise TunnelError(f"a worker cannot do a shard ({one_line(error)})", remedy=remedy) from None
             except KilledWorker:
                 attempts[task] += 1
                 if attempts[task] > ATTEMPTS:
-                    raise TunnelError(
-                        f"shard {task} lost every worker it was given to",
-                        remedy="check the memory of the workers; finished shards are kept",
-                    ) from None
+                    what = f"shard {task} lost every worker it was given to"
+                    remedy = "check the memory of the workers; finished shards are kept"
+                    raise TunnelError(what, remedy=remedy) from None
                 submit(task)
                 continue
             finally:

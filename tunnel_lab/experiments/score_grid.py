@@ -196,14 +196,6 @@ class Grid:
 _GRID = TypeAdapter(Grid)
 
 
-def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
-    """Refuse more trials than a table can hold before any is drawn, with the number of rows and the limit."""
-    quantities = sum(len(cell.quantities) for cell in grid.cells)
-    rows = quantities * sum(grid.trials_for(name) for name in estimators)
-    what = "rows (trials × estimators × quantities)"
-    check_count(rows, limits.SCORE_ROWS, what, where, "give fewer trials, cells or estimators")
-
-
 def load_grid(path: Path) -> Grid:
     """Read a grid, a TOML file like the packaged ``score-grid.toml``.
 
@@ -270,13 +262,7 @@ def packaged_grid() -> Grid:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One campaign of known truth.
-
-    Args:
-        campaign: input of the estimators; it does not state the noise.
-        truth: value of each scored quantity, by name, SI.
-        bound: the Cramér–Rao bound of each, by name, SI; of the nominal model, with or without an effect.
-    """
+    """A campaign, which does not state its noise, with truth and nominal Cramér–Rao bound by quantity, SI."""
 
     campaign: Campaign
     truth: Mapping[str, float]

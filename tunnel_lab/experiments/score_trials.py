@@ -22,10 +22,11 @@ import polars as pl
 from identification.estimate import UNITS, Quantity
 from identification.scoring import ScoredEstimate, Trials, collect
 from tunnel_lab.experiments.runner import Progress, processes, run_tasks
-from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
+from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.files.reading import (
     as_described,
+    check_count,
     frame_schema,
     parse_json,
     read_frame,
@@ -80,15 +81,6 @@ class Unit:
     def name(self) -> str:
         """Name of its file."""
         return f"c{self.cell:04d}-t{self.first:05d}"
-
-
-def units_of(grid: Grid) -> tuple[Unit, ...]:
-    """The grid in units of a few trials, ordered across cells so that the time left can be estimated early."""
-    return tuple(
-        Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
-        for first in range(0, grid.trials, UNIT_TRIALS)
-        for cell in range(len(grid.cells))
-    )
 
 
 def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> list[Row]:
@@ -182,8 +174,16 @@ def score_grid(
     Raises:
         TunnelError: more trials than a table can hold.
     """
-    check_trials(grid, estimators, "score")
-    units = units_of(grid)
+    quantities = sum(len(cell.quantities) for cell in grid.cells)
+    count = quantities * sum(grid.trials_for(name) for name in estimators)
+    what = "rows (trials × estimators × quantities)"
+    check_count(count, limits.SCORE_ROWS, what, "score", "give fewer trials, cells or estimators")
+    # Ordered across cells, so that the time left can be estimated early.
+    units = [
+        Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+        for first in range(0, grid.trials, UNIT_TRIALS)
+        for cell in range(len(grid.cells))
+    ]
     rows = rows_of(
         partial(score_unit, grid, tuple(estimators)),
         units,
@@ -264,21 +264,6 @@ def _code() -> str:
                 digest.update(path.relative_to(root).as_posix().encode())
                 digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def describe(cell: Cell) -> Row:
-    """A cell's conditions as columns of a table, units in their names."""
-    return {
-        "cell": cell.label,
-        "kind": cell.kind,
-        "zeta": cell.zeta or None,
-        "frequency_hz": cell.frequency or None,
-        "wind_speed_m_per_s": cell.wind_speed or None,
-        "effect": cell.effect,
-        "noise_over_amplitude": cell.noise,
-        "duration_s": cell.duration,
-        "runs": cell.runs,
-    }
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from identification.scoring import (
 )
 from identification.statistics import Proportion
 from tunnel_lab.experiments.score_grid import Cell
-from tunnel_lab.experiments.score_trials import Key, Results, describe, groups_of
+from tunnel_lab.experiments.score_trials import Key, Results, groups_of
 from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.outputs import table
@@ -102,17 +102,12 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
     estimators = [name for name in baseline.estimators if name in now.estimators]
     for known in baseline.grid.cells:
         if known not in now.grid.cells:
-            raise TunnelError(
-                f"the baseline's cell {known.label!r} is not in the grid",
-                where="--check",
-                remedy="leave the grid out: the baseline's own grid is then used",
-            )
+            what = f"the baseline's cell {known.label!r} is not in the grid"
+            remedy = "leave the grid out: the baseline's own grid is then used"
+            raise TunnelError(what, where="--check", remedy=remedy)
     if not estimators:
-        raise TunnelError(
-            "the baseline has none of the estimators",
-            where="--check",
-            remedy=f"score one of {', '.join(baseline.estimators)}",
-        )
+        remedy = f"score one of {', '.join(baseline.estimators)}"
+        raise TunnelError("the baseline has none of the estimators", where="--check", remedy=remedy)
     places = [now.grid.cells.index(cell) for cell in baseline.grid.cells]
     before, after = baseline.trials(), now.trials()
     tested: list[tuple[str, str, str, Change]] = []
@@ -150,7 +145,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
 
     rows = []
     for (estimator, index, quantity), trials in results.trials().items():
-        judged = score(trials)
+        cell, judged = results.grid.cells[index], score(trials)
         figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
         for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
             found: Quantity | None = getattr(judged, name)
@@ -164,7 +159,15 @@ def scores_frame(results: Results) -> pl.DataFrame:
         rows.append(
             {
                 "estimator": estimator,
-                **describe(results.grid.cells[index]),
+                "cell": cell.label,
+                "kind": cell.kind,
+                "zeta": cell.zeta or None,
+                "frequency_hz": cell.frequency or None,
+                "wind_speed_m_per_s": cell.wind_speed or None,
+                "effect": cell.effect,
+                "noise_over_amplitude": cell.noise,
+                "duration_s": cell.duration,
+                "runs": cell.runs,
                 "quantity": quantity,
                 "unit": trials.unit,
                 **figures,

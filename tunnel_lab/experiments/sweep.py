@@ -89,14 +89,10 @@ _READ_TIMINGS = ("step", "runs", "seconds")
 
 @dataclass(frozen=True)
 class Finished:
-    """A finished shard, ready to be written.
+    """A finished shard, ready to be written: Parquet files, versions, and the number of estimates that raised.
 
-    Args:
-        results: a Parquet file's bytes; they do not depend on where or when the shard is done.
-        records: those of the records; None where they are not stored.
-        timings: those of the times, which differ every time.
-        made_with: what the bits of the results depend on besides the sweep.
-        crashes: number of estimates that raised an exception.
+    Results and records (None where they are not stored) do not depend on where or when the shard is done; the times
+    differ every time.
     """
 
     index: int
@@ -307,11 +303,9 @@ class Store:
         wanted = {**self.made_with, "threads": "1"}
         odd = _first_difference(wanted, {name: shard.made_with.get(name) for name in wanted})
         if odd:
-            raise TunnelError(
-                f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep uses {wanted[odd]}",
-                where=shown(self.folder),
-                remedy="give every worker the same environment (threads: OMP_NUM_THREADS=1)",
-            )
+            what = f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep uses {wanted[odd]}"
+            remedy = "give every worker the same environment (threads: OMP_NUM_THREADS=1)"
+            raise TunnelError(what, where=shown(self.folder), remedy=remedy)
         lines = self._line(RESULTS, shard.index, shard.results)
         if shard.records is not None:
             write_whole(self._file(RECORDS, shard.index), shard.records)
@@ -346,11 +340,8 @@ class Store:
         """
         parts = [self._file(dataset, index) for index in self.finished()]
         if not parts or not all(path.exists() for path in parts):
-            raise TunnelError(
-                f"there are no {dataset}",
-                where=shown(self.folder),
-                remedy="run the sweep first" if not parts else "set records = true in the sweep file",
-            )
+            remedy = "run the sweep first" if not parts else "set records = true in the sweep file"
+            raise TunnelError(f"there are no {dataset}", where=shown(self.folder), remedy=remedy)
         return pl.scan_parquet(parts)
 
 

@@ -258,7 +258,11 @@ class Sweep:
             "truth": truth,
             "effects": effects,
         }
-        seed = case_seed(self.document.seed, {"rig": self.rigs[rig], **physics}, replicate)
+        # The seed depends on what the case holds, not on its place in the product; from 0 to 2⁶³ − 1.
+        contents = json.dumps({"rig": self.rigs[rig], **physics}, sort_keys=True, allow_nan=False)
+        words = np.frombuffer(hashlib.sha256(contents.encode()).digest(), dtype="<u4").tolist()
+        sequence = np.random.SeedSequence(self.document.seed, spawn_key=(*words, replicate))
+        seed = int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
         document = {"name": f"{self.document.name}-{index}", "seed": seed, **physics}
         plan = plan_from(PlanDocument.model_validate(document), self._parsed[rig], self.document.name)
         return SweepCase(
@@ -270,19 +274,6 @@ class Sweep:
     def _parsed(self) -> tuple[Rig, ...]:
         named = zip(self.document.rig, self.rigs, strict=True)
         return tuple(parse_rig(sections, f"rig '{table.name}'") for table, sections in named)
-
-
-def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
-    """A seed from 0 to 2⁶³ − 1: it depends on the contents of the case, not on its place in the product.
-
-    Args:
-        physics: everything that the records of the case depend on besides the noise, as plain values.
-        replicate: number of the repetition, from 0.
-    """
-    digest = hashlib.sha256(json.dumps(physics, sort_keys=True, allow_nan=False).encode()).digest()
-    words = tuple(np.frombuffer(digest, dtype="<u4").tolist())
-    sequence = np.random.SeedSequence(seed, spawn_key=(*words, replicate))
-    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
@@ -382,11 +373,8 @@ def _check_names(document: SweepDocument, where: str) -> None:
                 f"unknown estimator '{name}'", where=where, remedy=did_you_mean(name, ALL_ESTIMATORS)
             )
     if not document.estimators and not document.records:
-        raise TunnelError(
-            "neither estimators nor records: there would be no result",
-            where=where,
-            remedy="name an estimator, or set records = true",
-        )
+        what = "neither estimators nor records: there would be no result"
+        raise TunnelError(what, where=where, remedy="name an estimator, or set records = true")
     for key, names in (
         ("estimators", document.estimators),
         ("rig", [table.name for table in document.rig]),
@@ -397,11 +385,8 @@ def _check_names(document: SweepDocument, where: str) -> None:
             raise TunnelError(f"{key} has '{twice}' twice", where=where, remedy="give each its own name")
     for entry in document.effects:
         if entry.name == NO_EFFECT and (entry.parameters or entry.together_with):
-            raise TunnelError(
-                f"'{NO_EFFECT}' takes no other key",
-                where=f"{where}, effects",
-                remedy="name an effect, or give the name only",
-            )
+            remedy = "name an effect, or give the name only"
+            raise TunnelError(f"'{NO_EFFECT}' takes no other key", where=f"{where}, effects", remedy=remedy)
         for name in (entry.name, *(other.name for other in entry.together_with)):
             if name != NO_EFFECT or entry.together_with:
                 with _in(where):
@@ -420,11 +405,8 @@ def _check_cases(sweep: Sweep, where: str) -> None:
             physics = {k: v for k, v in value.items() if k != "name"} if name == "conditions" else value
             text = json.dumps(physics, sort_keys=True)
             if text in seen:
-                raise TunnelError(
-                    f"{name} holds a value twice",
-                    where=where,
-                    remedy="remove one, and use replicates for more runs",
-                )
+                remedy = "remove one, and use replicates for more runs"
+                raise TunnelError(f"{name} holds a value twice", where=where, remedy=remedy)
             seen.add(text)
     for axis in ("sensor", "effects"):  # each of their values with every rig and conditions
         for rig, conditions, value in np.ndindex(lengths["rig"], lengths["conditions"], lengths[axis]):

@@ -27,7 +27,6 @@ from tunnel_sim.vocabulary.record import read_only
 
 if TYPE_CHECKING:
     import polars as pl
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from rich.table import Table
 
@@ -204,19 +203,29 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
     panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
     first, values = lines[0], [line.at for line in lines if line.at is not None]
-    spread = first.axis in _LOGARITHMIC and min(values) > 0.0 and max(values) / min(values) >= _WIDE
+    logarithmic = first.axis in _LOGARITHMIC and min(values) > 0.0 and max(values) / min(values) >= _WIDE
     for name, (errors, biases) in zip(quantities, panels, strict=True):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
         for place, estimator in enumerate(estimators):
             drawn = [line for line in mine if line.estimator == estimator and line.at is not None]
+            if not drawn:
+                continue
             at = [float(line.at) for line in drawn if line.at is not None]
             aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE  # intervals must not hide each other
-            if spread:
+            if logarithmic:
                 at = [x * (max(at) / min(at)) ** aside for x in at]
             else:
                 at = [x + aside * (max(at) - min(at)) for x in at]
-            _errorbars(errors, at, [line.score.rmse for line in drawn], place, estimator)
-            _errorbars(biases, at, [line.score.bias for line in drawn], place, estimator)
+            for axes, figures in (
+                (errors, [line.score.rmse for line in drawn]),
+                (biases, [line.score.bias for line in drawn]),
+            ):
+                axes.errorbar(
+                    at, [found.value for found in figures if found],
+                    yerr=[INTERVAL * found.std for found in figures if found],
+                    color=COLOURS[place % len(COLOURS)], marker=MARKERS[place % len(MARKERS)], markersize=4.0,
+                    linewidth=1.0, label=estimator.replace("_", " "),
+                )  # fmt: skip
         scale = mine[0].score.rmse.unit if mine[0].score.rmse else ""
         per = "% of truth" if scale == "%" else scale
         log_axis(errors, "y")
@@ -226,7 +235,7 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
         for axes in (errors, biases):
             grid(axes)
     for axes in panels[-1]:
-        if spread:
+        if logarithmic:
             log_axis(axes, "x")
         else:
             axes.locator_params(axis="x", nbins=_TICKS)
@@ -240,24 +249,6 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
 
 def _label(line: Line) -> str:
     return line.effect.replace("_", " ") if line.axis == SEVERITY else AXES[line.axis][0]
-
-
-def _errorbars(
-    axes: Axes, at: Sequence[float], figures: Sequence[Quantity | None], place: int, label: str
-) -> None:
-    pairs = [(x, quantity) for x, quantity in zip(at, figures, strict=True) if quantity is not None]
-    if not pairs:
-        return
-    axes.errorbar(
-        [x for x, _ in pairs],
-        [quantity.value for _, quantity in pairs],
-        yerr=[INTERVAL * quantity.std for _, quantity in pairs],
-        color=COLOURS[place % len(COLOURS)],
-        marker=MARKERS[place % len(MARKERS)],
-        markersize=4.0,
-        linewidth=1.0,
-        label=label.replace("_", " "),
-    )
 
 
 def overall_table(lines: Iterable[Line]) -> Table:

@@ -67,11 +67,6 @@ class TrainingSpec:
         """Number of shards of a part."""
         return self.shards if part == PARTS[0] else max(1, self.shards // 10)
 
-    @property
-    def fit(self) -> FitSpec:
-        """How each network is fitted."""
-        return FitSpec(self.seed, self.steps)
-
 
 def train(
     spec: TrainingSpec, folder: Path, *, jobs: int, progress: Progress = lambda _what, _done, _all: None
@@ -132,14 +127,15 @@ def _fitted(
             header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])["__metadata__"]
             if header["mark"] == mark:
                 tensors, step = load(content), int(header["step"])
-                state = State(
-                    *({n[2:]: v for n, v in tensors.items() if n[:2] == o} for o in ("w/", "m/")), step
-                )
+                weights = {n[2:]: v for n, v in tensors.items() if n.startswith("w/")}
+                moments = {n[2:]: v for n, v in tensors.items() if n.startswith("m/")}
+                state = State(weights, moments, step)
         except (SafetensorError, ValueError, LookupError, TypeError):
             state = None
-    state = state or start_state(samples, spec.fit)
+    fitting = FitSpec(spec.seed, spec.steps)
+    state = state or start_state(samples, fitting)
     while state.step < spec.steps:
-        state = fit(samples, spec.fit, state, until=state.step + _KEPT_EVERY)
+        state = fit(samples, fitting, state, until=state.step + _KEPT_EVERY)
         tensors = {f"w/{n}": v for n, v in state.weights.items()}
         tensors |= {f"m/{n}": v for n, v in state.moments.items()}
         write_whole(path, save(tensors, {"mark": mark, "step": str(state.step)}))
@@ -220,13 +216,7 @@ class FitSpec:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Progress of a fit: everything that the next step depends on.
-
-    Args:
-        weights: as `weight_shapes`, and the scalings.
-        moments: first and second moments of the gradients by Adam, by name.
-        step: number of finished steps.
-    """
+    """Progress of a fit, on which the next step depends: weights, moments of the gradients by Adam, steps done."""
 
     weights: dict[str, Array]
     moments: dict[str, Array]

@@ -27,12 +27,7 @@ Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of the page.
-
-    Args:
-        file: its name in the page's folder, a PNG; a PDF of that name stands beside figures.
-        caption: what it shows.
-    """
+    """A PNG in the page's folder, beside which a PDF stands for figures, and its caption."""
 
     __pydantic_config__ = _STRICT
 

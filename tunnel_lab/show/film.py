@@ -96,7 +96,7 @@ class ShownRun:
     chain: EffectChain
     sensor: SensorModel
     title: str
-    request: Request
+    seed: int
 
     @cached_property
     def settings(self) -> RunSettings:
@@ -111,9 +111,8 @@ class ShownRun:
         from tunnel_sim.engine.model import build_model
         from tunnel_sim.engine.simulate import simulate_motion
 
-        plan, _ = _plan_and_condition(self.request, self.rig)
         motion = simulate_motion(build_model(self.rig, self.settings), self.sensor.sample_rate)
-        return read_motion(motion, self.sensor, np.random.default_rng([plan.seed, 1]), self.chain)
+        return read_motion(motion, self.sensor, np.random.default_rng([self.seed, 1]), self.chain)
 
 
 def shown_run(request: Request) -> ShownRun:
@@ -122,7 +121,8 @@ def shown_run(request: Request) -> ShownRun:
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     rig = load_rig()
-    plan, condition = _plan_and_condition(request, rig)
+    plan = _plan_of(request, rig)
+    (condition,) = plan.conditions
     stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
     effects = plan_effects(plan)
     chain = EffectChain.draw(stated, effects, np.random.default_rng([plan.seed, 0]))
@@ -130,11 +130,11 @@ def shown_run(request: Request) -> ShownRun:
     names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
     start = "driven" if condition.drive else f"released at {degrees(condition.release_angle):.3g}°"
     title = f"{condition.spring_stiffness:g} N m/rad, {wind}, {start}{names}"
-    return ShownRun(rig, chain, plan.sensor, title, request)
+    return ShownRun(rig, chain, plan.sensor, title, plan.seed)
 
 
-def _plan_and_condition(request: Request, rig: Rig) -> tuple[CampaignPlan, Condition]:
-    """The plan with the request's effects and seed, and the condition of the run."""
+def _plan_of(request: Request, rig: Rig) -> CampaignPlan:
+    """The plan with the request's effects and seed, and with the one run that is shown."""
     if request.plan is None:
         dynamics = rig.dynamics
         condition = Condition(
@@ -177,7 +177,7 @@ def _plan_and_condition(request: Request, rig: Rig) -> tuple[CampaignPlan, Condi
         spring_stiffness=condition.spring_stiffness if request.spring is None else rig.spring(request.spring),
     )
     # Keep only this run, so that effects are checked against its spring alone.
-    return replace(plan, effects=plan.effects + added, conditions=(condition,)), condition
+    return replace(plan, effects=plan.effects + added, conditions=(condition,))
 
 
 def _number(option: str, given: float | None, plan: float, low: float, high: float, unit: str) -> float:
@@ -232,10 +232,6 @@ class Look:
     speed: float = 1.0
     camera: str = "overview"
     trace: bool = True
-
-    def frame_times(self, duration: float) -> NDArray[np.float64]:
-        """Times of the frames of a run of so many seconds, s from its release, shape (frames,)."""
-        return np.arange(max(1, int(duration * self.fps / self.speed))) * self.speed / self.fps
 
 
 def write_film(
@@ -429,7 +425,8 @@ def _draw(order: dict[str, Any]) -> None:
         return
     import imageio.v2 as imageio
 
-    times = look.frame_times(run.settings.duration)
+    count = max(1, int(run.settings.duration * look.fps / look.speed))
+    times = np.arange(count) * look.speed / look.fps
     writer: Any = imageio.get_writer(
         path, format="FFMPEG", mode="I", fps=look.fps, codec="libx264", quality=7, macro_block_size=2
     )

@@ -44,11 +44,8 @@ def given_campaign(path: Path) -> Campaign:
     if not path.is_file() or path.name == CAMPAIGN_FILE:
         return read_campaign(path)
     if path.suffix.lower() == ".toml":
-        raise TunnelError(
-            f"is neither a record nor a {CAMPAIGN_FILE}",
-            where=shown(path),
-            remedy=f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER",
-        )
+        remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
+        raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)
     from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
 
     try:
