@@ -59,7 +59,7 @@ def bare(file: Path, threads: int) -> dict[str, float]:
     import numpy as np
     from mujoco import batch as mujoco_batch
 
-    from tunnel_lab.experiments.sweep import read_sweep
+    from tunnel_lab.experiments.sweep_cases import read_sweep
     from tunnel_sim.effects import EffectChain
     from tunnel_sim.engine.model import build_model
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
@@ -95,7 +95,8 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
     """Seconds per run and peak memory of a sweep: by processes, or by one whose simulation has threads."""
     wall, cpu = time.perf_counter(), time.process_time()
     from tunnel_lab.experiments.runner import lasting_processes
-    from tunnel_lab.experiments.sweep import read_sweep, run_sweep
+    from tunnel_lab.experiments.sweep import run_sweep
+    from tunnel_lab.experiments.sweep_cases import read_sweep
 
     def by_threads(work, shards):
         for index in shards:

@@ -8,37 +8,26 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
-from functools import cache
-from typing import Annotated, Any, cast
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import Annotated, cast
 
 import typer
 
 from tunnel_lab.commands import (
+    about,
     bench,
     blind,
-    compare,
-    demo,
     diagnose,
-    docs,
-    doctor,
     effects,
-    export,
+    experiments,
+    files,
     identify,
-    importing,
     paper,
-    plan,
-    plot,
-    render,
-    schema,
-    score,
+    show,
     simulate,
-    springs,
-    sweep,
-    train,
-    view,
 )
-from tunnel_lab.terminal.options import with_format, with_quiet
+from tunnel_lab.terminal.inputs import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
 BAD_INPUT = 2
@@ -115,37 +104,39 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-COMMANDS = (
-    demo,
-    plan,
-    simulate,
-    importing,
-    identify,
-    diagnose,
-    compare,
-    plot,
-    export,
-    springs,
-    effects,
-    score,
-    sweep,
-    view,
-    render,
-    train,
-    paper,
-    docs,
-    doctor,
-    schema,
-    bench,
-)
-"""Every command that is one function, in the order of the help."""
+COMMANDS: dict[str, Callable[..., None]] = {
+    "demo": paper.demo,
+    "plan": simulate.plan_drive,
+    "simulate": simulate.simulate,
+    "import": files.import_files,
+    "identify": identify.run,
+    "diagnose": diagnose.diagnose,
+    "compare": diagnose.compare,
+    "plot": show.plot,
+    "export": files.export,
+    "springs": paper.springs,
+    "effects": effects.run,
+    "score": experiments.score,
+    "sweep": experiments.sweep,
+    "view": show.view,
+    "render": show.render,
+    "train": experiments.train,
+    "paper": paper.paper,
+    "docs": about.docs,
+    "doctor": about.doctor,
+    "schema": about.schema,
+    "bench": bench.run,
+}
+"""Every command that is one function by its name, in the order of the help."""
+_WITHOUT_TABLES = {"simulate", "plot", "export", "view", "render", "docs", "schema", "bench"}
 
-WITHOUT_TABLES = (simulate, plot, export, view, render, docs, schema, bench)
+for _name, _command in COMMANDS.items():
+    _wider = with_quiet if _name in _WITHOUT_TABLES else with_format
+    app.command(_name)(_wider(_command))
+app.add_typer(blind.app, name="blind")
 
-for _command in COMMANDS:
-    _wider = with_quiet if _command in WITHOUT_TABLES else with_format
-    app.command(_command.NAME)(_wider(_command.run))
-app.add_typer(blind.app, name=blind.NAME)
+
+_whole = cache(partial(typer.main.get_command, app))  # built once however often a process calls `main`
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -184,12 +175,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if status == INTERRUPTED:
         print("tunnel: interrupted; no file is left half written", file=sys.stderr)
     return status if isinstance(status, int) else 0
-
-
-@cache
-def _whole() -> Any:
-    """``tunnel`` with all its commands and options, built once however often a process calls `main`."""
-    return typer.main.get_command(app)
 
 
 def _flush() -> None:

@@ -75,7 +75,7 @@ def test_the_import_contracts_hold() -> None:
         ("identification/estimate.py", "import mujoco"),
         ("identification/estimate.py", "import tunnel_sim.engine.model"),
         ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
-        ("identification/estimate.py", "import tunnel_lab.terminal.tables"),
+        ("identification/estimate.py", "import tunnel_lab.terminal.outputs"),
         ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
         ("identification/statistics.py", "import identification.signal.frequency"),
         ("diagnosis/result.py", "import diagnosis.search.investigate"),
@@ -116,7 +116,7 @@ def test_mujoco_is_imported_only_where_the_engine_runs() -> None:
     assert "tunnel_sim.engine.simulate" in importers
     outside = {name for name in importers if not name.startswith("tunnel_sim.")}
     # Inside functions, in a process of their own where they draw; live, the engine runs in front of the user.
-    shown = {f"tunnel_lab.show.{name}" for name in ("film", "live", "overlay", "stepper", "web", "window")}
+    shown = {f"tunnel_lab.show.{name}" for name in ("film", "live")}
     # A model of one's own, with the causes written into it, is simulated by the engine itself.
     assert outside <= shown | {"diagnosis.patched", "diagnosis.patch.patched_model"}
 

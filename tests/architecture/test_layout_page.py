@@ -72,6 +72,6 @@ def test_the_reader_reads() -> None:
 
 def test_the_command_counts() -> None:
     app = typer.Typer()
-    app.command()(run("command")["run"])  # type: ignore[type-var]
+    app.command()(run("command")["count"])  # type: ignore[type-var]
     done = CliRunner().invoke(app, [str(layout.ROOT / "identification/data/measured/rotary-pendulum")])
     assert (done.exit_code, done.output) == (0, f"{len(measured_campaign('rotary-pendulum').runs)} runs\n")

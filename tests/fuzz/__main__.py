@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(given: argparse.Namespace, shares: dict[str, float], outcomes: list[Outcome]) -> None:
     from tests.fuzz.workers import run_trials
-    from tunnel_lab.terminal.progress import bar
+    from tunnel_lab.terminal.outputs import bar
 
     with bar("fuzzing", given.count) as advance:
         advance(0, given.count, "")

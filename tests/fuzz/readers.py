@@ -164,11 +164,11 @@ def spring_table(folder: Path, rng: Rng) -> None:
     """A table of springs changed, and fitted and shown where it is accepted."""
     import typer
 
-    from tunnel_lab.commands.springs import read_spring_table, show
+    from tunnel_lab.commands.paper import read_spring_table, show_springs
 
     table = read_spring_table(_written(folder / "springs.csv", changed_csv(seeds.springs_csv(), rng), rng))
     try:
-        show(table, "springs.csv")
+        show_springs(table, "springs.csv")
     except typer.Exit:  # how the command says that there is no inertia
         return
 
@@ -293,7 +293,8 @@ def _answer(folder: Path, changed: str, rng: Rng) -> None:
 
 def sweep_file(folder: Path, rng: Rng) -> None:
     """A sweep file changed, and its folder begun where it is accepted."""
-    from tunnel_lab.experiments.sweep import begin, read_sweep
+    from tunnel_lab.experiments.sweep import begin
+    from tunnel_lab.experiments.sweep_cases import read_sweep
 
     sweep = read_sweep(_written(folder / "sweep.toml", _toml(seeds.SMALL.encode(), rng), rng))
     begin(sweep, folder / "out")
@@ -302,7 +303,7 @@ def sweep_file(folder: Path, rng: Rng) -> None:
 def sweep_folder(folder: Path, rng: Rng) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
     from tunnel_lab.experiments.sweep import open_store
-    from tunnel_lab.experiments.sweep_summary import overall_table, pace_table, paces, summarise
+    from tunnel_lab.experiments.sweep_summary import overall_table, pace_table, summarise
 
     files = dict(seeds.sweep_folder())
     names = [name for name in files if name.startswith(("results", "timings"))]
@@ -320,7 +321,7 @@ def sweep_folder(folder: Path, rng: Rng) -> None:
     store = open_store(folder)
     store.finished()
     overall_table(summarise(store))
-    pace_table(paces(store))
+    pace_table(store)
 
 
 def score_grid(folder: Path, rng: Rng) -> None:

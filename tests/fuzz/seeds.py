@@ -147,7 +147,7 @@ def regression(name: str) -> Path:
 @cache
 def springs_csv() -> bytes:
     """The paper's springs as a table a user would write."""
-    from tunnel_lab.commands.springs import paper_table
+    from tunnel_lab.commands.paper import paper_table
 
     table = paper_table()
     rows = zip(table.names, table.stiffness, table.frequency_hz, strict=True)
@@ -159,9 +159,8 @@ def springs_csv() -> bytes:
 @cache
 def sweep_folder() -> dict[str, bytes]:
     """The files of a sweep of which three shards of twelve are finished."""
-    from tunnel_lab.experiments.sweep import begin, read_sweep
-    from tunnel_lab.experiments.sweep_cases import Sweep
-    from tunnel_lab.experiments.sweep_shards import run_shard
+    from tunnel_lab.experiments.sweep import begin, run_shard
+    from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 
     with tempfile.TemporaryDirectory() as name:
         file = Path(name) / "sweep.toml"

@@ -49,7 +49,7 @@ def identify_campaign(folder: Path, rng: Rng) -> None:
 
 def draw(campaign: Campaign, found: Any, folder: Path) -> None:
     """The figures of ``tunnel plot``."""
-    from tunnel_lab.commands.plot import spread
+    from tunnel_lab.commands.show import spread
     from tunnel_lab.plotting import runs, style
     from tunnel_lab.plotting.runs import windows_figure
 

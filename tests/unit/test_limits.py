@@ -17,8 +17,7 @@ import pytest
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.experiments.score_grid import load_grid, packaged_grid
 from tunnel_lab.experiments.score_trials import score_grid
-from tunnel_lab.experiments.sweep import read_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_sim.engine.virtual_campaign import run_settings
 from tunnel_sim.files.plan_file import first_twice, load_plan, paper_plan
 from tunnel_sim.physics.run_settings import sampling
@@ -252,10 +251,10 @@ def test_the_pages_links_lead_somewhere() -> None:
 
 
 def test_networks_are_warned_of_where_they_are_used() -> None:
-    from tunnel_lab.commands import sweep, view
+    from tunnel_lab.commands import experiments, show
     from tunnel_lab.show import live
 
-    for text in (live.WARNING, view.run.__doc__, PAGE.read_text(encoding="utf-8")):
+    for text in (live.WARNING, show.view.__doc__, PAGE.read_text(encoding="utf-8")):
         assert "password" in text
         assert "Origin" in text
-    assert "no password" in str(sweep.run.__doc__)
+    assert "no password" in str(experiments.sweep.__doc__)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tunnel_lab.commands.springs import read_spring_table
+from tunnel_lab.commands.paper import read_spring_table
 from tunnel_sim.vocabulary.errors import TunnelError
 
 HEADER = "spring,stiffness_N_m_per_rad,frequency_Hz\n"

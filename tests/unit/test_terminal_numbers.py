@@ -20,7 +20,7 @@ from identification.printing import TextTable, coefficients_table, status_lines
 from identification.status import Status
 from tests.unit.diagnosis_document import CONDITIONS, IDS, campaign, document
 from tests.unit.shown_numbers import assert_shows
-from tunnel_lab.terminal import tables
+from tunnel_lab.terminal import outputs
 
 Document = dict[str, Any]
 Y_UNIT = re.compile(r"\[[^\]]*\]|N m s²/rad²|N m/rad|m/s|N m|1/rad")
@@ -33,7 +33,7 @@ def given() -> Document:
 
 def rows(table: Table | TextTable) -> list[list[str]]:
     """The cells of a table, units and brackets of units left out."""
-    plain = tables.rich_table(table) if isinstance(table, TextTable) else table
+    plain = outputs.rich_table(table) if isinstance(table, TextTable) else table
     columns = [[str(cell) for cell in column.cells] for column in plain.columns]
     return [[Y_UNIT.sub("", cell) for cell in row] for row in zip(*columns, strict=True)]
 
@@ -239,7 +239,7 @@ def test_coefficients_of_an_estimate() -> None:
 
 def test_errors_against_the_truth() -> None:
     found, truth = estimate(), {"cn_beta": 0.5, "cn_r": -0.25, "yaw_inertia": 0.12}
-    head, *cells = rows(tables.truth_table([found], truth))
+    head, *cells = rows(outputs.truth_table([found], truth))
     assert head[0] == "own"
     for row, (name, value) in zip(cells, truth.items(), strict=True):
         own = getattr(found, name)
@@ -254,7 +254,7 @@ def test_errors_against_the_truth() -> None:
 def test_runs_of_an_estimate() -> None:
     found = estimate()
     for cells, run, (spring, speed, *_) in zip(
-        rows(tables.runs_table(campaign(), found)), found.runs, CONDITIONS, strict=True
+        rows(outputs.runs_table(campaign(), found)), found.runs, CONDITIONS, strict=True
     ):
         assert cells[0] == run.id
         assert_shows(cells[1], [] if spring is None else [spring])
@@ -266,7 +266,7 @@ def test_runs_of_an_estimate() -> None:
 
 def test_windows_of_a_run() -> None:
     run = estimate().runs[0]
-    table = tables.windows_table(run)
+    table = outputs.windows_table(run)
     assert "3 cycles" in str(table.title)
     for cells, window in zip(rows(table), run.windows, strict=True):
         assert_shows(cells[0], [window.start_s])

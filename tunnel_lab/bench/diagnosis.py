@@ -16,7 +16,7 @@ from diagnosis.decision import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
 from tunnel_lab.bench.workspace import Session, is_current, read_result
-from tunnel_lab.terminal.progress import STEPS
+from tunnel_lab.terminal.outputs import STEPS
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from tunnel_lab.bench.workspace import (
     read_result,
     sessions,
 )
-from tunnel_lab.terminal.tables import say
+from tunnel_lab.terminal.outputs import say
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 

@@ -1,4 +1,4 @@
-"""The commands of ``tunnel``, one file each: ``NAME`` and ``run``, whose docstring is the help text.
+"""The commands of ``tunnel``, kindred ones in one file; the docstring of a command's function is its help text.
 
-What a command needs it imports inside ``run``, so that the command line starts at once.
+What a command needs it imports inside the function, so that the command line starts at once.
 """

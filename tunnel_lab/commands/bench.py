@@ -5,19 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-NAME = "bench"
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def run(
-    folder: Annotated[Path, typer.Argument(help="Folder of campaigns, or a campaign to open.")] = Path(),
+    folder: Annotated[Path, Argument(help="Folder of campaigns, or a campaign to open.")] = Path(),
     port: Annotated[
-        int, typer.Option("--port", metavar="N", min=0, max=65535, help="TCP port; 0 takes a free one.")
+        int, Option("--port", metavar="N", min=0, max=65535, help="TCP port; 0 takes a free one.")
     ] = 0,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
-    ] = True,
+    browser: Annotated[bool, Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
     r"""Go from a logger's files to a report in the browser.
 
@@ -40,7 +38,6 @@ def run(
 
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE
     from tunnel_sim.files.writing import output_folder
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     if find_spec("nicegui") is None:
         remedy = "pip install 'virtual-wind-tunnel[bench]'"

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
-from tunnel_lab.terminal.options import EffectsFileOption, split_names, with_format, with_quiet
+from tunnel_lab.terminal.inputs import (
+    EffectsFileOption,
+    refuse_unwritable_files,
+    split_names,
+    with_format,
+    with_quiet,
+)
+from tunnel_lab.terminal.outputs import bar, console, rich_table, say, say_written, show_tables
+from tunnel_sim.vocabulary.errors import TunnelError
 
-if TYPE_CHECKING:
-    from diagnosis.blind import Score
-
-NAME = "blind"
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
 
 Campaigns are drawn and simulated by the reference simulator, whose integrator
@@ -28,40 +33,36 @@ to a separate key, whose salted SHA-256 is published with the data.
 
 app = typer.Typer(help=HELP, rich_markup_mode="rich", no_args_is_help=True)
 
-Folder = Annotated[Path, typer.Argument(help="Folder of the set.")]
+Folder = Annotated[Path, Argument(help="Folder of the set.")]
 Excluded = Annotated[
     list[str] | None,
-    typer.Option("--exclude", metavar="EFFECT", help="Leave effects out of the vocabulary; their campaigns "
+    Option("--exclude", metavar="EFFECT", help="Leave effects out of the vocabulary; their campaigns "
                  "then count as unknown."),
 ]  # fmt: skip
 KeyFile = Annotated[
-    Path | None, typer.Option("--key", metavar="FILE", help="The key. Default: key.json in the set.")
+    Path | None, Option("--key", metavar="FILE", help="The key. Default: key.json in the set.")
 ]
 
 
 @app.command("make")
 @with_quiet
 def make(
-    out: Annotated[Path, typer.Argument(help="Folder to make.")],
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything drawn.")],
-    count: Annotated[int, typer.Option("--count", min=1, help="Number of campaigns.")] = 200,
+    out: Annotated[Path, Argument(help="Folder to make.")],
+    seed: Annotated[int, Option("--seed", min=0, help="Seed of everything drawn.")],
+    count: Annotated[int, Option("--count", min=1, help="Number of campaigns.")] = 200,
     kinds: Annotated[
         str | None,
-        typer.Option(
+        Option(
             "--kinds",
             metavar="KIND:WEIGHT,…",
             help="single, pair, three, four, none, outside, law, with weights.",
         ),
     ] = None,
-    textbook: Annotated[
-        float, typer.Option("--textbook", min=0, max=1, help="Share of textbook forms.")
-    ] = 0.5,
-    rare: Annotated[
-        float, typer.Option("--rare", min=0, max=1, help="Share of rare forms in the rest.")
-    ] = 0.5,
+    textbook: Annotated[float, Option("--textbook", min=0, max=1, help="Share of textbook forms.")] = 0.5,
+    rare: Annotated[float, Option("--rare", min=0, max=1, help="Share of rare forms in the rest.")] = 0.5,
     variety: Annotated[
         float,
-        typer.Option(
+        Option(
             "--variety",
             min=0,
             max=1,
@@ -70,8 +71,7 @@ def make(
         ),
     ] = 0.25,
     small: Annotated[
-        float,
-        typer.Option("--small", min=0, max=1, help="Share with a small effect beside those that matter."),
+        float, Option("--small", min=0, max=1, help="Share with a small effect beside those that matter.")
     ] = 0.25,
     key: KeyFile = None,
 ) -> None:
@@ -94,9 +94,6 @@ def make(
     """
     from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
     from diagnosis.blind.sets import SEAL, read_document
-    from tunnel_lab.terminal.options import refuse_unwritable_files
-    from tunnel_lab.terminal.progress import bar
-    from tunnel_lab.terminal.tables import console, say
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     refuse_unwritable_files(key)
@@ -114,9 +111,7 @@ def make(
 def diagnose(
     folder: Folder,
     exclude: Excluded = None,
-    jobs: Annotated[
-        int, typer.Option("--jobs", min=1, help="Number of campaigns diagnosed at the same time.")
-    ] = 1,
+    jobs: Annotated[int, Option("--jobs", min=1, help="Number of campaigns diagnosed at the same time.")] = 1,
     effects_file: EffectsFileOption = None,
 ) -> None:
     """Diagnose every campaign of a set; continue where an interrupted run ended.
@@ -129,8 +124,6 @@ def diagnose(
       0 all answered, 2 bad input, 130 interrupted (finished answers are kept).
     """
     from diagnosis.blind import answer_set, answers_folder
-    from tunnel_lab.terminal.progress import bar
-    from tunnel_lab.terminal.tables import say
 
     names = split_names(exclude)
     with bar("diagnosing", None) as progress:
@@ -146,14 +139,14 @@ def score(
     exclude: Excluded = None,
     key: KeyFile = None,
     markdown: Annotated[
-        Path | None, typer.Option("--markdown", metavar="FILE", help="Also write the score as a page.")
+        Path | None, Option("--markdown", metavar="FILE", help="Also write the score as a page.")
     ] = None,
     json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Also write all figures and cases as JSON.")
+        Path | None, Option("--json", metavar="FILE", help="Also write all figures and cases as JSON.")
     ] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--figure",
             metavar="FILE.png",
             help="Also draw the calibration, and the confusion beside it; PDF too.",
@@ -175,11 +168,9 @@ def score(
     """
     from diagnosis import vocabulary
     from diagnosis.blind import score_set
+    from tunnel_lab.plotting.style import save_both
     from tunnel_lab.report import blind
-    from tunnel_lab.terminal.options import refuse_unwritable_files
-    from tunnel_lab.terminal.tables import say_written
     from tunnel_sim.files.writing import write_json, write_whole
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     names = split_names(exclude)
     vocabulary(exclude=names)
@@ -187,21 +178,16 @@ def score(
     if figure is not None and figure.suffix != ".png":
         raise TunnelError("is not a .png", where=f"--figure {figure}", remedy="name a file that ends in .png")
     result = score_set(folder, excluded=names, key=key, effects_file=effects_file)
-    drawn = () if figure is None else _draw(result, figure)
+    drawn: tuple[Path, ...] = ()
+    if figure is not None:
+        beside = figure.with_name(f"{figure.stem}-confusion.png")
+        drawn = save_both(blind.calibration_figure(result), figure)
+        drawn += save_both(blind.confusion_figure(result), beside)
     if markdown is not None:
         addresses = [os.path.relpath(path, markdown.parent) for path in drawn[::2]] or ("", "")
         write_whole(markdown, blind.markdown(result, str(folder), addresses).encode())
     if json is not None:
         write_json(json, result.to_json_dict())
-    _show(result)
-    say_written(markdown, json, *drawn)
-
-
-def _show(result: Score) -> None:
-    """Print the score."""
-    from tunnel_lab.report import blind
-    from tunnel_lab.terminal.tables import rich_table, say, show_tables
-
     for line in blind.origin_lines(result):
         say(line)
     say("")
@@ -209,12 +195,4 @@ def _show(result: Score) -> None:
         show_tables(rich_table(section))
         if section.note:
             say(section.note + "\n")
-
-
-def _draw(result: Score, path: Path) -> tuple[Path, ...]:
-    """Draw the calibration and the confusion, each as a picture and for print."""
-    from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.report.blind import calibration_figure, confusion_figure
-
-    beside = path.with_name(f"{path.stem}-confusion.png")
-    return (*save_both(calibration_figure(result), path), *save_both(confusion_figure(result), beside))
+    say_written(markdown, json, *drawn)

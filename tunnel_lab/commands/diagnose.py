@@ -1,15 +1,28 @@
-"""``tunnel diagnose``: where the nominal model does not fit, and which effect explains it."""
+"""``tunnel diagnose`` and ``compare``: where the nominal model does not fit, and which effect explains it."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
+from identification.printing import TextTable, coefficient_label, estimated, in_stds, unit_mark, with_std
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
-from tunnel_lab.terminal.options import EffectsFileOption
+from tunnel_lab.terminal.inputs import (
+    EffectsFileOption,
+    file_hashes,
+    given_campaign,
+    refuse_unwritable_files,
+    split_names,
+)
+from tunnel_lab.terminal.outputs import rich_table, say, say_written, show_tables, step_display
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
 if TYPE_CHECKING:
     from diagnosis.result import Diagnosis
@@ -17,115 +30,77 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
     from tunnel_sim.vocabulary.campaign import Campaign
 
-NAME = "diagnose"
-OUTPUT, CAUSES, MODEL = "Output", "Effects", "A model of your own"
+Document = Mapping[str, Any]
+_NONE = "–"
+_output = partial(Option, rich_help_panel="Output")
+_causes = partial(Option, rich_help_panel="Effects")
+_model = partial(Option, rich_help_panel="A model of your own")
 
 
-def run(
-    campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
+def diagnose(
+    campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
     json: Annotated[
         Path | None,
-        typer.Option(
-            "--json",
-            metavar="FILE",
-            rich_help_panel=OUTPUT,
-            help="Write the answer as JSON; - for standard output.",
-        ),
+        _output("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
     ] = None,
     report: Annotated[
-        Path | None,
-        typer.Option(
-            "--report", metavar="FILE.html", rich_help_panel=OUTPUT, help="Write a report, one HTML page."
-        ),
+        Path | None, _output("--report", metavar="FILE.html", help="Write a report, one HTML page.")
     ] = None,
     summary: Annotated[
         Path | None,
-        typer.Option(
+        _output(
             "--summary",
             metavar="FILE.pdf",
-            rich_help_panel=OUTPUT,
             help="Write the report's summary, one printed page; needs Chromium.",
         ),
     ] = None,
     author: Annotated[
-        str,
-        typer.Option(
-            "--author", metavar="NAME", rich_help_panel=OUTPUT, help="Who made the diagnosis, for the report."
-        ),
+        str, _output("--author", metavar="NAME", help="Who made the diagnosis, for the report.")
     ] = "",
-    notes: Annotated[
-        str,
-        typer.Option(
-            "--notes", metavar="TEXT", rich_help_panel=OUTPUT, help="Notes for the head of the report."
-        ),
-    ] = "",
+    notes: Annotated[str, _output("--notes", metavar="TEXT", help="Notes for the head of the report.")] = "",
     effects: Annotated[
-        list[str] | None,
-        typer.Option("--effects", metavar="A,B", rich_help_panel=CAUSES, help="Consider these effects only."),
+        list[str] | None, _causes("--effects", metavar="A,B", help="Consider these effects only.")
     ] = None,
     exclude: Annotated[
         list[str] | None,
-        typer.Option(
-            "--exclude",
-            metavar="C",
-            rich_help_panel=CAUSES,
-            help="Leave these effects out; tunnel effects lists all.",
-        ),
+        _causes("--exclude", metavar="C", help="Leave these effects out; tunnel effects lists all."),
     ] = None,
     effects_file: EffectsFileOption = None,
     model: Annotated[
         Path | None,
-        typer.Option(
-            "--model",
-            metavar="FILE.xml",
-            rich_help_panel=MODEL,
-            help="A model of your own, MJCF or URDF, as the nominal model.",
+        _model(
+            "--model", metavar="FILE.xml", help="A model of your own, MJCF or URDF, as the nominal model."
         ),
     ] = None,
     joint: Annotated[
         str | None,
-        typer.Option(
-            "--joint",
-            metavar="NAME",
-            rich_help_panel=MODEL,
-            help="Joint of the model that was recorded; for --model.",
-        ),
+        _model("--joint", metavar="NAME", help="Joint of the model that was recorded; for --model."),
     ] = None,
     free: Annotated[
         list[str] | None,
-        typer.Option(
+        _model(
             "--free",
             metavar="A,B",
-            rich_help_panel=MODEL,
             help="Parameters of the model to fit: inertia, damping, stiffness, rest. Default: those that the "
             "runs can determine.",
         ),
     ] = None,
     asset_dir: Annotated[
         Path | None,
-        typer.Option(
+        _model(
             "--asset-dir",
             metavar="DIR",
-            rich_help_panel=MODEL,
             help="Folder of the model's includes and meshes, where they are not in or below its own.",
         ),
     ] = None,
     patch: Annotated[
         Path | None,
-        typer.Option(
-            "--patch",
-            metavar="OUT.xml",
-            rich_help_panel=MODEL,
-            help="Write the model with the causes in it; for --model.",
-        ),
+        _model("--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."),
     ] = None,
     propose: Annotated[
         Path | None,
-        typer.Option(
-            "--propose",
-            metavar="LAW.toml",
-            rich_help_panel=OUTPUT,
-            help="Write the formula proposed for what no effect explains.",
+        _output(
+            "--propose", metavar="LAW.toml", help="Write the formula proposed for what no effect explains."
         ),
     ] = None,
 ) -> None:
@@ -156,11 +131,7 @@ def run(
       written completely or not at all.
     """
     from diagnosis import read_model, vocabulary
-    from tunnel_lab.terminal.inputs import file_hashes, given_campaign
-    from tunnel_lab.terminal.options import refuse_unwritable_files, split_names
-    from tunnel_lab.terminal.tables import say, say_written
     from tunnel_sim.files.writing import json_text, write_json
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     del effects_file  # its effects are known already
     kinds = vocabulary(split_names(effects), split_names(exclude))
@@ -171,10 +142,8 @@ def run(
 
         find_browser()
     if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir)):
-        raise TunnelError(
-            "--model and --joint belong together, and --free, --patch and --asset-dir to them",
-            remedy="give both",
-        )
+        what = "--model and --joint belong together, and --free, --patch and --asset-dir to them"
+        raise TunnelError(what, remedy="give both")
     data = given_campaign(campaign)
     hashes = file_hashes(campaign)
     own_model = None
@@ -192,7 +161,15 @@ def run(
         write_json(json, document)
     if patch is not None:
         write_patch(answer, patch)
-    write_pages(answer, document, (report, summary), (author, notes), patch)
+    if (report or summary) and answer.data is not None:
+        from tunnel_lab.report import Byline, write_report, write_summary
+
+        today = datetime.now().astimezone().date().isoformat()
+        byline = Byline(today, author, notes, "" if patch is None else patch.name)
+        if report is not None:
+            write_report(document, answer.data, report, byline)
+        if summary is not None:
+            write_summary(document, answer.data, summary, byline)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
         typer.echo(json_text(document), nl=False)
@@ -204,38 +181,8 @@ def run(
     say_written(json, report, summary, patch, proposed)
 
 
-def write_pages(
-    answer: Diagnosis,
-    document: dict[str, Any],
-    paths: tuple[Path | None, Path | None],
-    said: tuple[str, str],
-    patch: Path | None,
-) -> None:
-    """Write the report and its summary, where a file is given for them.
-
-    Args:
-        document: of the answer.
-        paths: of the report and of the summary.
-        said: author and notes for their head.
-        patch: the file of the patched model, which the report names.
-    """
-    if not any(paths) or answer.data is None:
-        return
-    from tunnel_lab.report import Byline, write_report, write_summary
-
-    today = datetime.now().astimezone().date().isoformat()
-    byline = Byline(today, *said, "" if patch is None else patch.name)
-    for path, write in zip(paths, (write_report, write_summary), strict=True):
-        if path is not None:
-            write(document, answer.data, path, byline)
-
-
 def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
-    """Write the formula proposed as an effects file.
-
-    Returns:
-        The file; None where no formula is proposed, and nothing is written.
-    """
+    """Write the formula proposed as an effects file; None where no formula is proposed."""
     import tomli_w
 
     from tunnel_sim.files.writing import write_whole
@@ -249,29 +196,16 @@ def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
 def diagnose_with_progress(
     campaign: Campaign, kinds: tuple[type[Effect], ...], model: JointModel | None = None
 ) -> Diagnosis:
-    """Diagnose, with step and effect on standard error where that is a terminal.
-
-    Args:
-        model: the nominal model; None: spring and damper.
-    """
-    from diagnosis import diagnose
-    from tunnel_lab.terminal.progress import step_display
+    """Diagnose, with step and effect on standard error where that is a terminal."""
+    import diagnosis
 
     with step_display() as show_step:
-        return diagnose(campaign, kinds=kinds, progress=show_step, model=model)
+        return diagnosis.diagnose(campaign, kinds=kinds, progress=show_step, model=model)
 
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
-    """Write the patched model of an answer.
-
-    Args:
-        path: of the MJCF file.
-
-    Raises:
-        TunnelError: when the answer has none, with the reason.
-    """
+    """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when it has none."""
     from diagnosis.patched import UNPATCHED
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
         reason = next(
@@ -286,7 +220,6 @@ def show(document: dict[str, Any]) -> None:
     from diagnosis import printing as parts
     from diagnosis.closure import closable_table, closable_words
     from diagnosis.patched import patch_lines, patch_table
-    from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])
     for line in (parts.where_line(document), *parts.rival_lines(document)):
@@ -303,3 +236,108 @@ def show(document: dict[str, Any]) -> None:
     show_tables(*(rich_table(table(document)) for table in shown))
     for line in (*patch_lines(document), *parts.closing_lines(document)):
         say(line)
+
+
+def compare(
+    documents: Annotated[
+        list[Path], Argument(metavar="DIAGNOSIS.json", help="Written by tunnel diagnose --json.")
+    ],
+) -> None:
+    """Compare diagnoses, such as before and after a repair of the rig.
+
+    For each diagnosis: the gap (noise powers) before and with the causes, the causes
+    with their parameters, and the coefficients with standard deviations. Then the
+    difference of each coefficient from the first diagnosis, for campaigns that are
+    independent of each other.
+
+    [bold]Examples[/bold]
+      tunnel compare before.json after.json
+      tunnel compare may.json june.json july.json --format csv
+
+    [bold]Exit status[/bold]
+      0 compared, 2 bad input.
+    """
+    from tunnel_lab.report.diagnosis_file import read_diagnosis
+
+    if len(documents) < 2:
+        raise TunnelError("only one diagnosis", where=shown(documents[0]), remedy="name two files or more")
+    diagnoses = [read_diagnosis(path) for path in documents]
+    # The campaign's name; the file's where campaigns share a name; else a number too.
+    names, stems = [str(d["campaign"]) for d in diagnoses], [one_line(path.stem) for path in documents]
+    if len(set(names)) < len(names):
+        names = stems
+    if len(set(names)) < len(names):
+        names = [f"{place}: {stem}" for place, stem in enumerate(stems, 1)]
+    show_tables(*(rich_table(table) for table in comparison_tables(names, diagnoses)))
+
+
+def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> list[TextTable]:
+    """All tables of a comparison: gap and answer, parameters, coefficients, and their differences from the first.
+
+    Args:
+        names: of the documents, each different.
+        documents: of diagnoses, the reference first.
+    """
+    from diagnosis.decision import probability
+    from diagnosis.printing import excess_std, share
+
+    def excess(document: Document, key: str) -> str:
+        """With its standard deviation by chance, where the document has the noise of its runs."""
+        value, std = document["gap"][key], excess_std(document)
+        return f"{value:.4g}" if std is None else with_std(value, std)
+
+    explained = [document["causes"] not in ([], ["unknown"]) for document in documents]
+    pairs = list(zip(documents, explained, strict=True))
+    answers = (
+        ("gap [noise powers]", *(excess(d, "excess_before") for d in documents)),
+        ("left [noise powers]", *(excess(d, "excess_after") if known else _NONE for d, known in pairs)),
+        ("share closed", *(share(d["gap"]["closed"]) if known else _NONE for d, known in pairs)),
+        ("causes", *(",\n".join(d["causes"]) or "none" for d in documents)),
+        ("decided", *("yes" if d["decided"] else "no" for d in documents)),
+        ("or", *(",\n".join(d["ambiguous_with"]) or _NONE for d in documents)),
+        ("probability", *(probability(d["candidates"][0]["probability"]) for d in documents)),
+    )
+    parameters = []  # of each answer, by effect and name
+    for document in documents:
+        answer, texts = document["candidates"][0], {}
+        for full, given in answer["parameters"].items():
+            owner, _, name = full.rpartition(".")
+            mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
+            texts[owner or answer["effect"], name] = estimated(given, mark)
+        parameters.append(texts)
+    labels = {
+        name: coefficient_label(name, given["unit"])
+        for document in documents
+        for name, given in document["coefficients"]["after"].items()
+    }
+    coefficients = []
+    for name, label in labels.items():
+        for key in ("before", "after"):
+            found = [document["coefficients"][key].get(name) for document in documents]
+            cells = (_NONE if given is None else estimated(given) for given in found)
+            coefficients.append((f"{label} {key}", *cells))
+    first, *others = (document["coefficients"]["after"] for document in documents)
+    differences = tuple(
+        (label, *(_difference(first.get(name), other.get(name)) for other in others))
+        for name, label in labels.items()
+    )
+    keys = dict.fromkeys(key for texts in parameters for key in texts)
+    rows = tuple((*key, *(texts.get(key, _NONE) for texts in parameters)) for key in keys)
+    quantity, parameter = ("quantity",), ("effect", "parameter")
+    change = f"Coefficients with the causes: difference from {names[0]}"
+    return [
+        TextTable("Gap and answer", (*quantity, *names), answers),
+        TextTable("Parameters ± one standard deviation", (*parameter, *names), rows),
+        TextTable("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
+        TextTable(change, (*quantity, *names[1:]), differences),
+    ]
+
+
+def _difference(first: Document | None, second: Document | None) -> str:
+    """The second estimate minus the first, taken as independent of each other."""
+    if first is None or second is None or first["unit"] != second["unit"]:
+        return _NONE
+    if first["std"] is None or second["std"] is None:
+        return _NONE
+    change, std = second["value"] - first["value"], math.hypot(first["std"], second["std"])
+    return f"{with_std(change, std)} ({in_stds(change, std)})"

@@ -9,17 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.table import Table
+from rich.text import Text
+from typer import Argument, Option
 
 from identification.printing import unit_mark
-from tunnel_lab.terminal.options import EffectsFileOption
+from tunnel_lab.terminal.inputs import EffectsFileOption, refuse_unwritable_files
+from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from tunnel_sim.effects import Effect
 
 
-NAME = "effects"
 SCHEMA_VERSION = 1
 ABOUT_DIRECTIONS = (
     "Moments stand on the right-hand side of Izz β̈ + Cr β̇ + Kr β = Ka β + Ca β̇, with Ka = ½ρV²Al Cnβ and "
@@ -57,18 +59,16 @@ about them see [what no free decay can show](../theory/what-no-free-decay-can-sh
 def run(
     name: Annotated[
         str | None,
-        typer.Argument(
+        Argument(
             metavar="[NAME | check NAME]",
             help="An effect to show in full, or to check. Default: a list of all.",
             show_default=False,
         ),
     ] = None,
-    checked: Annotated[str | None, typer.Argument(hidden=True)] = None,
-    json: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the effects as JSON.")
-    ] = None,
+    checked: Annotated[str | None, Argument(hidden=True)] = None,
+    json: Annotated[Path | None, Option("--json", metavar="FILE", help="Write the effects as JSON.")] = None,
     markdown: Annotated[
-        Path | None, typer.Option("--markdown", metavar="FILE", help="Write the effects as a reference page.")
+        Path | None, Option("--markdown", metavar="FILE", help="Write the effects as a reference page.")
     ] = None,
     effects_file: EffectsFileOption = None,
 ) -> None:
@@ -91,11 +91,8 @@ def run(
     [bold]Exit status[/bold]
       0 shown, 1 a law is violated, 2 bad input.
     """
-    from tunnel_lab.terminal import tables
-    from tunnel_lab.terminal.options import refuse_unwritable_files
     from tunnel_sim.effects import effect_class, known_effects
     from tunnel_sim.files.writing import write_json, write_whole
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     del effects_file  # its effects are known already
     if name == "check":
@@ -110,29 +107,41 @@ def run(
     kinds = known_effects() if name is None else (effect_class(name),)
     if json is not None or markdown is not None:
         refuse_unwritable_files(json, markdown)
-        written = []
         if json is not None:
-            written.append(write_json(json, document(kinds)))
+            write_json(json, document(kinds))
         if markdown is not None:
-            written.append(write_whole(markdown, reference_page(kinds).encode()))
-        tables.say_written(*written)
+            write_whole(markdown, reference_page(kinds).encode())
+        say_written(json, markdown)
         return
     if name is None:
-        tables.show_tables(listing(kinds))
-        tables.say(ABOUT_DIRECTIONS)
-        tables.say("Details of one effect: tunnel effects NAME")
+        show_tables(listing(kinds))
+        say(ABOUT_DIRECTIONS)
+        say("Details of one effect: tunnel effects NAME")
         return
-    for line in lines(kinds[0]):
-        tables.say(line)
-    tables.show_tables(parameter_table(kinds[0]))
-    tables.say(ABOUT_DIRECTIONS)
-    tables.say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kinds[0])}")
+    (kind,) = kinds
+    say(f"{kind.name}: {summary(kind)}\n")
+    say(f"channel:    {kind.channel}")
+    say(f"condition:  {kind.condition}")
+    say(f"equation:   {kind.equation}")
+    say(f"signature:  {kind.signature}")
+    if kind.random == "broad_band":
+        say("drawn:      a random moment, different in every run")
+    for reference in kind.references:
+        say(f"reference:  {reference}")
+    say("")
+    right = ("typical", "from", "to", "default")
+    parameters = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
+    for info in kind.parameters():
+        numbers = (f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default))
+        parameters.add_row(*map(Text, (info.name, info.symbol, unit_mark(info.unit), info.meaning, *numbers)))
+    show_tables(parameters)
+    say(ABOUT_DIRECTIONS)
+    say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
 
 
 def _check(name: str) -> None:
     """Print which laws an effect obeys; exit with 1 where it violates one."""
     from diagnosis.identifiability import identifiability
-    from tunnel_lab.terminal.tables import say
     from tunnel_sim.effects import effect_class
     from tunnel_sim.engine.effect_laws import check
 
@@ -153,11 +162,7 @@ def summary(kind: type[Effect]) -> str:
 
 
 def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
-    """The full description of effects, in JSON's types.
-
-    Returns:
-        ``{"schema_version", "effects": [...]}`` in the order given.
-    """
+    """The full description of effects, in JSON's types and in the order given."""
     return {
         "schema_version": SCHEMA_VERSION,
         "effects": [
@@ -179,10 +184,6 @@ def document(kinds: Sequence[type[Effect]]) -> dict[str, Any]:
 
 def listing(kinds: Sequence[type[Effect]]) -> Table:
     """Effects with equation and parameters, one row each."""
-    from rich.text import Text
-
-    from tunnel_lab.terminal.tables import table
-
     last = "equation, then parameters [unit]"
     result = table("Effects beyond the nominal model", "effect", "channel", "condition", last)
     for column in result.columns[:3]:  # names are to be copied, so never folded
@@ -194,36 +195,6 @@ def listing(kinds: Sequence[type[Effect]]) -> Table:
     return result
 
 
-def parameter_table(kind: type[Effect]) -> Table:
-    """The parameters of one effect."""
-    from rich.text import Text
-
-    from tunnel_lab.terminal.tables import table
-
-    right = ("typical", "from", "to", "default")
-    result = table("Parameters", "name", "symbol", "unit", "meaning", *right, right=right)
-    for info in kind.parameters():
-        numbers = (f"{value:g}" for value in (info.scale, info.lower, info.upper, info.default))
-        result.add_row(*map(Text, (info.name, info.symbol, unit_mark(info.unit), info.meaning, *numbers)))
-    return result
-
-
-def lines(kind: type[Effect]) -> list[str]:
-    """The description of one effect without its parameters."""
-    drawn = ["drawn:      a random moment, different in every run"] if kind.random == "broad_band" else []
-    return [
-        f"{kind.name}: {summary(kind)}",
-        "",
-        f"channel:    {kind.channel}",
-        f"condition:  {kind.condition}",
-        f"equation:   {kind.equation}",
-        f"signature:  {kind.signature}",
-        *drawn,
-        *(f"reference:  {reference}" for reference in kind.references),
-        "",
-    ]
-
-
 def example(kind: type[Effect]) -> str:
     """The option of ``tunnel simulate`` that injects an effect of typical size."""
     values = ",".join(f"{info.name}={info.default or info.scale:g}" for info in kind.parameters())
@@ -232,23 +203,14 @@ def example(kind: type[Effect]) -> str:
 
 def reference_page(kinds: Sequence[type[Effect]]) -> str:
     """The reference page."""
-    overview = ["| effect | channel | condition | equation |", "|---|---|---|---|"]
-    overview += [
+    page = ["| effect | channel | condition | equation |", "|---|---|---|---|"]
+    page += [
         f"| [`{kind.name}`](#{kind.name}) | {kind.channel} | {kind.condition} | {_cell(kind.equation)} |"
         for kind in kinds
     ]
-    sections = [_section(kind) for kind in kinds]
-    return _PAGE_HEAD.format(directions=ABOUT_DIRECTIONS) + "\n".join(overview) + "\n\n" + "\n".join(sections)
-
-
-def _section(kind: type[Effect]) -> str:
-    rows = [
-        f"| `{info.name}` | {info.symbol} | {unit_mark(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
-        f"| {info.lower:g} | {info.upper:g} | {info.default:g} |"
-        for info in kind.parameters()
-    ]
-    return "\n".join(
-        [
+    for kind in kinds:
+        page += [
+            "",
             f"## {kind.name}",
             "",
             summary(kind),
@@ -260,10 +222,13 @@ def _section(kind: type[Effect]) -> str:
             "",
             "| parameter | symbol | unit | meaning | typical | from | to | default |",
             "|---|---|---|---|---|---|---|---|",
-            *rows,
-            "",
         ]
-    )
+        page += [
+            f"| `{info.name}` | {info.symbol} | {unit_mark(info.unit)} | {_cell(info.meaning)} | {info.scale:g} "
+            f"| {info.lower:g} | {info.upper:g} | {info.default:g} |"
+            for info in kind.parameters()
+        ]
+    return _PAGE_HEAD.format(directions=ABOUT_DIRECTIONS) + "\n".join(page) + "\n"
 
 
 def _cell(text: str) -> str:

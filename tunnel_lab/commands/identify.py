@@ -5,13 +5,28 @@ from __future__ import annotations
 import inspect
 import textwrap
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
+from rich.text import Text
+from typer import Argument, Option
 
-from identification.estimators import SUMMARIES
+from identification.estimators import SUMMARIES, make_estimator
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import given_campaign, known_estimator, refuse_unwritable_files
+from tunnel_lab.terminal.outputs import (
+    budget_lines,
+    budget_table,
+    console,
+    rich_table,
+    say,
+    say_written,
+    show_estimate,
+    show_tables,
+)
+from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -19,7 +34,6 @@ if TYPE_CHECKING:
     from identification.uncertainty.budget import Budget
     from tunnel_sim.vocabulary.campaign import Campaign
 
-NAME = "identify"
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
 ESTIMATORS = "  {estimators}"
@@ -29,34 +43,32 @@ WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
 
 def run(
-    campaign: Annotated[Path, typer.Argument(help=CAMPAIGN_HELP)],
+    campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
     estimator: Annotated[
-        str, typer.Option("--estimator", "-e", metavar="NAME", help="One of the estimators listed above.")
+        str, Option("--estimator", "-e", metavar="NAME", help="One of the estimators listed above.")
     ] = "output_error",
     json: Annotated[
         Path | None,
-        typer.Option("--json", metavar="FILE", help="Write the estimate as JSON; - for standard output."),
+        Option("--json", metavar="FILE", help="Write the estimate as JSON; - for standard output."),
     ] = None,
     weights: Annotated[
         Path | None,
-        typer.Option(
-            "--weights", metavar="FILE", help="Networks written by tunnel train, for the same estimator."
-        ),
+        Option("--weights", metavar="FILE", help="Networks written by tunnel train, for the same estimator."),
     ] = None,
     windows: Annotated[
         bool | None,
-        typer.Option(
+        Option(
             "--windows/--no-windows",
             help="Show ζ and ωn by windows of a few cycles. Default: for up to three runs.",
             show_default=False,
         ),
     ] = None,
     budget: Annotated[
-        bool, typer.Option("--budget", help="Add scatter and choice of model; show the dominant source.")
+        bool, Option("--budget", help="Add scatter and choice of model; show the dominant source.")
     ] = False,
     uncertainties: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--uncertainties",
             metavar="FILE",
             help="Uncertainties of Kr, V, ρ, A and l (TOML); implies --budget.",
@@ -64,7 +76,7 @@ def run(
     ] = None,
     models: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--model",
             metavar="NAME",
             help="Another estimator for the choice of model; with --budget. May be repeated.",
@@ -98,27 +110,27 @@ def run(
       0 identified, 1 nothing could be identified, 2 bad input.
     """
     from identification import identify
-    from tunnel_lab.terminal.inputs import given_campaign
-    from tunnel_lab.terminal.options import known_estimator
-    from tunnel_lab.terminal.outputs import show_estimate
-    from tunnel_lab.terminal.tables import say
-    from tunnel_sim.files.writing import json_text, refuse_unwritable, write_json
-    from tunnel_sim.vocabulary.errors import TunnelError
+    from tunnel_sim.files.writing import json_text, write_json
 
     for name in (estimator, *(models or ())):
         known_estimator(name)
     if models and not budget and uncertainties is None:
         raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
-    if json is not None and str(json) != "-":
-        refuse_unwritable(json)
+    to_stdout = json is not None and str(json) == "-"
+    refuse_unwritable_files(None if to_stdout else json)
     data = given_campaign(campaign)
-    chosen = with_weights(estimator, weights)
+    chosen: str | Estimator = estimator
+    if weights is not None:
+        if estimator not in WITH_WEIGHTS:
+            remedy = f"add --estimator {' or '.join(WITH_WEIGHTS)}, or leave it out"
+            raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
+        chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
     estimate = identify(data, chosen, throw=False)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
-        estimate, found = budgeted(data, estimate, chosen, uncertainties, models or [])
+        estimate, found = _budgeted(data, estimate, chosen, uncertainties, models or [])
     document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
-    if json is not None and str(json) == "-":
+    if to_stdout:
         typer.echo(json_text(document), nl=False)
     else:
         if json is not None:
@@ -126,9 +138,14 @@ def run(
         detailed = len(data.runs) <= FEW_RUNS if windows is None else windows
         show_estimate(data, estimate, windows=detailed, source=campaign)
         if found is not None:
-            show_budget(document["budget"])
-        if json is not None:
-            say(f"Written: {json}")
+            say("")
+            table = rich_table(budget_table(document["budget"]))
+            table.rows[-2].end_section = True
+            show_tables(table)
+            for line in budget_lines(document["budget"]):
+                say(line)
+            say("The standard deviations above are the combined ones.")
+        say_written(json)
     if estimate.status.failed:
         raise typer.Exit(1)
 
@@ -148,85 +165,31 @@ def with_estimators(text: str | None) -> str:
 run.__doc__ = with_estimators(run.__doc__)
 
 
-def budgeted(
+def _budgeted(
     campaign: Campaign,
     estimate: Estimate,
     chosen: str | Estimator,
     uncertainties: Path | None,
     models: list[str],
 ) -> tuple[Estimate, Budget]:
-    """The estimate with combined standard uncertainties, and their budget.
-
-    Args:
-        chosen: the estimator that made it, which is called again with changed campaigns.
-        uncertainties: file of the inputs' uncertainties; None takes them as exact.
-
-    Raises:
-        TunnelError: when the file is wrong, or there is no coefficient to budget.
-    """
-    from functools import partial
-
-    from rich.text import Text
-
+    """The estimate with combined standard uncertainties, and their budget."""
     from identification import identify
-    from identification.uncertainty.budget import (
-        InputUncertainties,
-        load_uncertainties,
-        make_budget,
-        with_budget,
-    )
-    from tunnel_lab.terminal.tables import console
+    from identification.uncertainty import budget
 
-    inputs = InputUncertainties() if uncertainties is None else load_uncertainties(uncertainties)
-    others = {
-        name: partial(identify, estimator=name, throw=False) for name in models if name != estimate.estimator
-    }
-    terminal = console(stderr=True)
-    with terminal.status("uncertainty budget") as status:
-        budget = make_budget(
+    inputs = budget.InputUncertainties()  # exact
+    if uncertainties is not None:
+        inputs = budget.load_uncertainties(uncertainties)
+    with console(stderr=True).status("uncertainty budget") as status:
+        made = budget.make_budget(
             campaign,
             estimate,
             partial(identify, estimator=chosen, throw=False),
             inputs,
-            others=others,
+            others={
+                name: partial(identify, estimator=name, throw=False)
+                for name in models
+                if name != estimate.estimator
+            },
             progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
         )
-    return with_budget(estimate, budget), budget
-
-
-def show_budget(budget: dict[str, Any]) -> None:
-    """Print a budget and what dominates.
-
-    Args:
-        budget: as in the JSON document.
-    """
-    from tunnel_lab.terminal import outputs, tables
-
-    tables.say("")
-    table = tables.rich_table(outputs.budget_table(budget))
-    table.rows[-2].end_section = True
-    tables.show_tables(table)
-    for line in outputs.budget_lines(budget):
-        tables.say(line)
-    tables.say("The standard deviations above are the combined ones.")
-
-
-def with_weights(name: str, weights: Path | None) -> str | Estimator:
-    """The estimator's name, or the network estimator with the given weights.
-
-    Args:
-        weights: a file written by ``tunnel train``; None for the packaged weights.
-
-    Raises:
-        TunnelError: when the estimator has no weights.
-    """
-    from tunnel_sim.vocabulary.errors import TunnelError
-
-    if weights is None:
-        return name
-    if name not in WITH_WEIGHTS:
-        remedy = f"add --estimator {' or '.join(WITH_WEIGHTS)}, or leave it out"
-        raise TunnelError(f"{name} has no weights", where="--weights", remedy=remedy)
-    from identification.estimators import make_estimator
-
-    return cast("Estimator", replace(cast("Any", make_estimator(name)), weights=weights))
+    return budget.with_budget(estimate, made), made

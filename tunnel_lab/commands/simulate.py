@@ -1,20 +1,26 @@
-"""``tunnel simulate``: simulate a campaign."""
+"""``tunnel simulate`` and ``tunnel plan``: a campaign from a plan, and the plan of the drive that tells most."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from enum import StrEnum
+from math import floor, inf, pi, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
-from tunnel_lab.terminal.options import EffectsFileOption
+from tunnel_lab.terminal.inputs import EffectsFileOption, parse_effect, refuse_unwritable_files
+from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 if TYPE_CHECKING:
-    from tunnel_sim.vocabulary.campaign import Campaign
+    from rich.table import Table
 
-NAME = "simulate"
+    from identification.uncertainty.cramer_rao import CampaignBound
+    from tunnel_sim.files.plan_file import PlanDocument
+
+_COEFFICIENTS = ("cn_beta", "cn_r")
 
 
 class RunFormat(StrEnum):
@@ -24,18 +30,23 @@ class RunFormat(StrEnum):
     CSV = "csv"
 
 
-def run(
-    plan: Annotated[Path, typer.Argument(help="Plan of the campaign, a TOML file.")],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
-    format: Annotated[
-        RunFormat, typer.Option("--format", help="Format of the run files.")
-    ] = RunFormat.PARQUET,
+class Goal(StrEnum):
+    """What the input is to make small."""
+
+    D = "d"
+    CN_R = "cn_r"
+
+
+def simulate(
+    plan: Annotated[Path, Argument(help="Plan of the campaign, a TOML file.")],
+    out: Annotated[Path, Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
+    format: Annotated[RunFormat, Option("--format", help="Format of the run files.")] = RunFormat.PARQUET,
     seed: Annotated[
-        int | None, typer.Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
+        int | None, Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
     effect: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--effect",
             metavar="NAME:PARAMETER=VALUE",
             help="Add an effect to the nominal model; separate further parameters by commas. May be repeated; "
@@ -43,11 +54,11 @@ def run(
         ),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a campaign that is already in the folder.")
+        bool, Option("--overwrite", help="Replace a campaign that is already in the folder.")
     ] = False,
     picture: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--picture",
             metavar="FILE.png",
             help="Draw the runs, input and response; more than twelve go on further pages, FILE-2.png and so on.",
@@ -91,14 +102,11 @@ def run(
     [bold]Exit status[/bold]
       0 written, 2 bad input; nothing is written then.
     """
-    from tunnel_lab.terminal.inputs import parse_effect
-    from tunnel_lab.terminal.progress import bar
-    from tunnel_lab.terminal.tables import say, say_written
+    from tunnel_lab.plotting.runs import trace_pages
+    from tunnel_lab.plotting.style import save
     from tunnel_sim.engine.virtual_campaign import plan_effects, simulate_campaign, truth_document
     from tunnel_sim.files.campaign_folder import write_campaign
     from tunnel_sim.files.plan_file import load_plan
-    from tunnel_sim.files.writing import refuse_unwritable
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     del effects_file  # its effects are known already
     added = tuple(parse_effect(text) for text in effect or ())
@@ -111,7 +119,7 @@ def run(
     if picture is not None:
         if picture.suffix.lower() != ".png":
             raise TunnelError("is not a .png", where=str(picture), remedy="name a file such as runs.png")
-        refuse_unwritable(picture)
+        refuse_unwritable_files(picture)
     with bar("simulating runs", len(loaded.conditions)) as progress:
         campaign = simulate_campaign(loaded, progress=progress)
     folder = write_campaign(
@@ -119,33 +127,176 @@ def run(
     )
     say(f"Written: {folder} ({len(campaign.runs)} runs)")
     if picture is not None:
-        say_written(*_draw(campaign, picture))
-
-
-def _draw(campaign: Campaign, path: Path) -> list[Path]:
-    """The pages of a campaign's runs."""
-    from tunnel_lab.plotting.runs import trace_pages
-    from tunnel_lab.plotting.style import save
-
-    pages = enumerate(trace_pages(campaign), 1)
-    return [save(page, path if i == 1 else path.with_stem(f"{path.stem}-{i}")) for i, page in pages]
+        written = []
+        for i, page in enumerate(trace_pages(campaign), 1):
+            path = picture if i == 1 else picture.with_stem(f"{picture.stem}-{i}")
+            written.append(save(page, path))
+        say_written(*written)
 
 
 def refuse_occupied(folder: Path, *, overwrite: bool) -> None:
-    """Refuse an unsuitable folder before the work is done.
-
-    Args:
-        folder: where the campaign is to go.
-        overwrite: whether what is there may be replaced.
-
-    Raises:
-        TunnelError: when it is a file, or exists and may not be replaced.
-    """
+    """Refuse a file, or a folder that may not be replaced, before the work is done."""
     from tunnel_sim.files.writing import clear_leftovers
-    from tunnel_sim.vocabulary.errors import TunnelError
 
     clear_leftovers(folder.resolve().parent)  # restore what a killed command had set aside
     if folder.exists() and not folder.is_dir():
         raise TunnelError("is a file, not a folder", where=str(folder), remedy="name another --out")
     if folder.exists() and not overwrite:
         raise TunnelError("exists already", where=str(folder), remedy="name another --out or add --overwrite")
+
+
+def plan_drive(
+    plan: Annotated[Path, Argument(help="Plan of free decays, a TOML file.")],
+    moment: Annotated[
+        float, Option("--moment", metavar="N_M", help="Largest moment of the drive, N m, peak.")
+    ],
+    amplitude: Annotated[
+        float, Option("--amplitude", metavar="RAD", help="Largest angle of the response, rad, peak.")
+    ],
+    out: Annotated[Path, Option("--out", "-o", metavar="FILE.toml", help="Where the driven plan goes.")],
+    drive: Annotated[bool, Option("--drive", help="Plan driven runs; the only kind so far.")] = False,
+    goal: Annotated[
+        Goal, Option("--goal", help="d: both coefficients, by the determinant; cn_r: Cnr alone.")
+    ] = Goal.D,
+    minutes: Annotated[
+        float | None, Option("--minutes", help="Rig time, minutes. Default: that of the free decays.")
+    ] = None,
+    buffeting: Annotated[
+        float | None,
+        Option(
+            "--buffeting",
+            metavar="S",
+            help="Intensity of the effect buffeting, dimensionless; overrides the plan's.",
+        ),
+    ] = None,
+) -> None:
+    r"""Plan the drive that tells most about Cnβ and Cnr.
+
+    From a plan of free decays it makes one of driven runs with the same springs,
+    speeds, sensor and rig time: one run of each spring and speed instead of
+    several releases, so that pauses become record. The truth of the plan is the
+    prior guess of the coefficients. The drive is the multisine, chirp, sine or
+    stepped sine with the lowest Cramér–Rao bound, as large as both limits allow.
+    The response keeps to its limit if the prior guess is right: leave a margin.
+
+    Rig time is the records, 60 s for each, 300 s for a spring and 60 s for a speed.
+    With buffeting the bound is that in a random moment; identify the runs with
+    filter_error then. Other effects of the plan do not count.
+
+    [bold]Examples[/bold]
+      tunnel plan free.toml --drive --moment 0.5 --amplitude 0.3 --out driven.toml
+      tunnel plan free.toml --drive --moment 0.5 --amplitude 0.3 --goal cn_r \
+        --minutes 60 --buffeting 0.02 --out driven.toml
+
+    [bold]Exit status[/bold]
+      0 written, 2 bad input; nothing is written then.
+    """
+    import tomli_w
+
+    from identification.uncertainty.drive_design import Limits, peak_response, plan_bound, propose_drive
+    from tunnel_lab.envs.menu import Costs
+    from tunnel_sim.effects import ALL_EFFECTS
+    from tunnel_sim.engine.virtual_campaign import plan_effects
+    from tunnel_sim.files.plan_file import EffectTable, check_size, plan_from, read_plan, run_count
+    from tunnel_sim.files.rig_file import load_rig
+    from tunnel_sim.files.writing import write_whole
+
+    if not drive:
+        raise TunnelError("nothing to plan", where="tunnel plan", remedy="add --drive")
+    for name, value, unit, most in (
+        ("--moment", moment, "N m", 1e6),
+        ("--amplitude", amplitude, "rad, at most π", pi),
+        ("--minutes", minutes, "minutes", inf),
+    ):
+        if value is not None and not (1e-9 <= value <= most and value < inf):
+            raise TunnelError(
+                f"{value:g} is out of range", where=name, remedy=f"give a number above 0 in {unit}"
+            )
+    if out.resolve() == plan.resolve():
+        raise TunnelError("is the plan itself", where=f"--out {out}", remedy="name another file")
+    refuse_unwritable_files(out)
+    document, rig, where = read_plan(plan), load_rig(), shown(plan)
+    if buffeting is not None:  # of the bandwidth that the plan states
+        kind = next(kind for kind in ALL_EFFECTS if kind.random == "broad_band")
+        stated = next((effect.parameters for effect in document.effects if effect.name == kind.name), {})
+        kept = [effect for effect in document.effects if effect.name != kind.name]
+        if buffeting:
+            parameters = {**stated, kind.parameters()[0].name: buffeting}
+            kept.append(EffectTable(name=kind.name, parameters=parameters))
+        document = document.model_copy(update={"effects": kept})
+    if document.drive is not None:
+        raise TunnelError("has a [drive] already", where=where, remedy="give a plan of free decays alone")
+    loaded = plan_from(document, rig, where)
+    plan_effects(loaded)  # refuses what cannot be simulated
+    spent = rig_time(document)
+    changes, setup = _changes(document), Costs().setup
+    cells = len(document.wind_speeds) * (len(document.springs) + len(document.spring_stiffness))
+    left = ((spent if minutes is None else 60.0 * minutes) - changes) / cells - setup
+    if left < 1.0:
+        least = (changes + cells * (setup + 1.0)) / 60.0
+        what = f"leaves no time for records: starts and changes take {least:.3g} min"
+        raise TunnelError(what, where="--minutes", remedy="give more, or fewer springs and wind_speeds")
+    duration = floor(10.0 * left + 1e-6) / 10.0
+    check_size(cells, duration, document.sample_rate, where)
+    free = plan_bound(loaded, rig)
+    with bar("comparing inputs") as progress:
+        tried = iter(range(1, 10**9))
+        best = propose_drive(
+            document,
+            rig,
+            Limits(moment, amplitude),
+            goal=goal.value,
+            duration=duration,
+            progress=lambda: progress(next(tried), None),
+        )
+    found = plan_from(best, rig, where)
+    driven = plan_bound(found, rig)
+    write_whole(out, tomli_w.dumps(best.model_dump(exclude_none=True, exclude_defaults=True)).encode())
+    bounds = _bounds(
+        (rig_time(best) - changes) / (spent - changes),
+        ("free decays", run_count(document), document.duration, spent, free),
+        ("planned drive", cells, duration, rig_time(best), driven),
+    )
+    show_tables(bounds)
+    if minutes is not None:
+        say("The last row is for free decays repeated to the same rig time.")
+    chosen = best.drive
+    assert chosen is not None
+    rates = chosen.frequencies_hz or [f for f in (chosen.frequency_hz, chosen.from_hz, chosen.to_hz) if f]
+    between = " to " if chosen.from_hz else ", "
+    hertz = between.join(f"{rate:g}" for rate in rates)
+    words = f"Drive: {chosen.kind.replace('_', ' ')}, {hertz} Hz, {chosen.amplitudes_nm[0]:g} N m peak"
+    say(f"{words}; response up to {peak_response(found, rig):.3g} rad")
+    say_written(out)
+
+
+def rig_time(document: PlanDocument) -> float:
+    """Rig time of a plan, s: records, releases or starts, and changes of spring and speed."""
+    from tunnel_lab.envs.menu import Costs
+    from tunnel_sim.files.plan_file import run_count
+
+    driven = 0 if document.drive is None else len(document.drive.amplitudes)
+    return run_count(document, driven) * (Costs().setup + document.duration) + _changes(document)
+
+
+def _changes(document: PlanDocument) -> float:
+    from tunnel_lab.envs.menu import Costs
+
+    springs, costs = len(document.springs) + len(document.spring_stiffness), Costs()
+    return springs * (costs.spring_change + len(document.wind_speeds) * costs.speed_change)
+
+
+def _bounds(longer: float, *rows: tuple[str, int, float, float, CampaignBound]) -> Table:
+    """The bounds of both plans, and their ratio with the first repeated ``longer`` times, to equal rig time."""
+    from identification.estimate import UNITS
+    from identification.printing import SYMBOLS, significant, unit
+
+    names = tuple(f"std {SYMBOLS[name]}\n{unit(UNITS[name])}" for name in _COEFFICIENTS)
+    heads = ("runs", "record\n[s]", "rig time\n[min]", *names)
+    result = table("Cramér–Rao bounds: the smallest standard deviations", "plan", *heads, right=heads)
+    for name, runs, record, spent, bound in rows:
+        deviations = (significant(bound.std(each), 3) for each in _COEFFICIENTS)
+        result.add_row(name, f"{runs}", f"{record:g}", f"{spent / 60.0:.1f}", *deviations)
+    found = (rows[0][-1].std(each) / rows[1][-1].std(each) / sqrt(longer) for each in _COEFFICIENTS)
+    result.add_row("free over planned", "", "", "", *(f"{ratio:.2f}" for ratio in found))
+    return result

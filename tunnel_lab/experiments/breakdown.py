@@ -13,7 +13,7 @@ from functools import partial
 from importlib import resources
 from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.text import Text
@@ -24,12 +24,12 @@ from tunnel_lab.experiments.runner import Progress
 from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, outcome, rows_of
 from tunnel_lab.experiments.score_view import NAMES
 from tunnel_lab.plotting.style import figure, styled
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.outputs import table
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.forms import forms_of
 from tunnel_reference.make import as_campaign
-from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_effects
+from tunnel_reference.severity import read_and_fit, simulate_motions, size_effects
 from tunnel_sim.effects import ALL_EFFECTS
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+    from identification.estimate import Quantity
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
@@ -122,17 +123,15 @@ def make_cases(
     """Size the effects and simulate their campaigns.
 
     Realisations differ in the noise, and in the forcing where it is random. Effects that have a sign are
-    positive.
+    positive. The campaign without effect comes first, then by effect, severity and realisation.
 
     Args:
-        realisations: number of campaigns for each effect and severity.
         severities: excess to leave after the nominal refit, in noise powers.
         duration: of every run, s.
         show_steps: show the progress of sizing on standard error.
-
-    Returns:
-        The campaign without effect, then by effect, severity and realisation.
     """
+    from identification.uncertainty.cramer_rao import campaign_bound
+
     conditions = conditions_of(seed, duration=duration)
     nothing = CampaignDraw("none", conditions, (), 0)
     sized = size_effects(
@@ -148,7 +147,21 @@ def make_cases(
     for i, draw in enumerate(several):
         if motion is None or i % realisations == 0 or _random(draw):
             motion = next(motions)
-        cases.append(_case(draw, read_and_fit(draw, motion), i % realisations))
+        simulated = read_and_fit(draw, motion)
+        campaign = as_campaign(simulated, "breakdown")
+        starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
+        noise = float(np.sqrt(draw.conditions.noise_power))
+        bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts, random_moments=None)
+        cases.append(
+            BiasCase(
+                effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
+                severity=draw.effects[0].target if draw.effects else 0.0,
+                reached=simulated.excess,
+                realisation=i % realisations,
+                campaign=campaign,
+                bound={name: bound.std(name) for name in QUANTITIES},
+            )
+        )
     return cases
 
 
@@ -182,23 +195,6 @@ def realised(draw: CampaignDraw, number: int, seed: int) -> CampaignDraw:
     return replace(draw, effects=effects, seed=noise)
 
 
-def _case(draw: CampaignDraw, simulated: Simulated, number: int) -> BiasCase:
-    from identification.uncertainty.cramer_rao import campaign_bound
-
-    campaign = as_campaign(simulated, "breakdown")
-    starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
-    noise = float(np.sqrt(draw.conditions.noise_power))
-    bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts, random_moments=None)
-    return BiasCase(
-        effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,
-        severity=draw.effects[0].target if draw.effects else 0.0,
-        reached=simulated.excess,
-        realisation=number,
-        campaign=campaign,
-        bound={name: bound.std(name) for name in QUANTITIES},
-    )
-
-
 def break_down(
     cases: Sequence[BiasCase],
     estimators: Sequence[str],
@@ -212,9 +208,7 @@ def break_down(
 
     Args:
         seed: the cases were made with.
-        jobs: number of processes; 0 works in this one.
         parts: folder for finished work, so that an interrupted score can be continued; None for none.
-        progress: called with the number of finished cases and of all cases.
     """
     mark = fingerprint({"breakdown": sorted(case.name for case in cases), "seed": seed}, estimators)
     work = partial(_estimate_case, tuple(estimators))
@@ -223,12 +217,7 @@ def break_down(
 
 
 def _estimate_case(estimators: Sequence[str], case: BiasCase) -> list[Row]:
-    about = {
-        "effect": case.effect,
-        "severity": case.severity,
-        "reached": case.reached,
-        "realisation": case.realisation,
-    }
+    about = {name: getattr(case, name) for name in ("effect", "severity", "reached", "realisation")}
     return [
         row for name in estimators for row in estimate_rows(name, case.campaign, TRUTH, case.bound, about)
     ]
@@ -271,42 +260,49 @@ def biases(rows: Sequence[Row]) -> list[Bias]:
 
 
 def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
-    """The map as a table.
-
-    Returns:
-        A row for each effect, severity, estimator and quantity; units in the columns' names.
-    """
+    """The map as a table: a row for each effect, severity, estimator and quantity; units in the columns' names."""
     import polars as pl
 
-    return pl.DataFrame([_record(bias) for bias in biases], infer_schema_length=None)
+    def value(quantity: Quantity | None) -> float | None:
+        return None if quantity is None else quantity.value
 
+    def std(quantity: Quantity | None) -> float | None:
+        return None if quantity is None else quantity.std
 
-def _record(bias: Bias) -> dict[str, Any]:
-    judged = bias.score
-    relative, in_stds = judged.relative_bias, judged.bias_in_stds
-    return {
-        "effect": bias.effect,
-        "severity_noise_powers": bias.severity,
-        "reached_noise_powers": bias.reached,
-        "estimator": bias.estimator,
-        "quantity": bias.quantity,
-        "realisations": judged.count,
-        "failures": judged.failures.count,
-        "bias_percent": None if relative is None else relative.value,
-        "bias_percent_std_error": None if relative is None else relative.std,
-        "bias_in_stds": None if in_stds is None else in_stds.value,
-        "bias_in_stds_std_error": None if in_stds is None else in_stds.std,
-        "rmse_over_bound": None if judged.rmse_over_bound is None else judged.rmse_over_bound.value,
-        "covered": None if judged.coverage is None else judged.coverage.count,
-        "model_departs_share": bias.departs,
-    }
+    rows = [
+        {
+            "effect": bias.effect,
+            "severity_noise_powers": bias.severity,
+            "reached_noise_powers": bias.reached,
+            "estimator": bias.estimator,
+            "quantity": bias.quantity,
+            "realisations": bias.score.count,
+            "failures": bias.score.failures.count,
+            "bias_percent": value(bias.score.relative_bias),
+            "bias_percent_std_error": std(bias.score.relative_bias),
+            "bias_in_stds": value(bias.score.bias_in_stds),
+            "bias_in_stds_std_error": std(bias.score.bias_in_stds),
+            "rmse_over_bound": value(bias.score.rmse_over_bound),
+            "covered": None if bias.score.coverage is None else bias.score.coverage.count,
+            "model_departs_share": bias.departs,
+        }
+        for bias in biases
+    ]
+    return pl.DataFrame(rows, infer_schema_length=None)
 
 
 def breakdown_tables(biases: Sequence[Bias], quantity: str) -> list[Table]:
     """The bias of one quantity, with effects in rows and estimators in columns, three to a table."""
     mine = [bias for bias in biases if bias.quantity == quantity]
     estimators = list(dict.fromkeys(bias.estimator for bias in mine))
-    cells = {(bias.effect, bias.severity, bias.estimator): _cell(bias) for bias in mine}
+    cells = {}
+    for bias in mine:
+        relative, in_stds = bias.score.relative_bias, bias.score.bias_in_stds
+        text = "failed" if bias.score.failures.count else "–"
+        if relative is not None:
+            deviations = "–" if in_stds is None else _compact(in_stds.value)
+            text = f"{_compact(relative.value)} ({deviations}σ)"
+        cells[bias.effect, bias.severity, bias.estimator] = text
     tables = []
     for first in range(0, len(estimators), _SIDE_BY_SIDE):
         some = estimators[first : first + _SIDE_BY_SIDE]
@@ -317,14 +313,6 @@ def breakdown_tables(biases: Sequence[Bias], quantity: str) -> list[Table]:
             one_table.add_row(Text(effect), f"{severity:g}" if severity else "", *row)
         tables.append(one_table)
     return tables
-
-
-def _cell(bias: Bias) -> str:
-    relative, in_stds = bias.score.relative_bias, bias.score.bias_in_stds
-    if relative is None:
-        return "failed" if bias.score.failures.count else "–"
-    deviations = "–" if in_stds is None else _compact(in_stds.value)
-    return f"{_compact(relative.value)} ({deviations}σ)"
 
 
 def _compact(value: float) -> str:
@@ -338,13 +326,8 @@ def _compact(value: float) -> str:
 def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
     """The biases of one quantity that exceed one reported standard deviation.
 
-    Args:
-        frame: of `breakdown_frame`.
-        quantity: ``cn_beta`` or another of the frame.
-
-    Returns:
-        Effects in rows and estimators in columns, each with its severities side by side. The colour is the bias
-        in reported standard deviations, the number the bias in %; smaller biases stay empty.
+    Effects are in rows and estimators in columns, each with its severities side by side. The colour is the bias in
+    reported standard deviations, the number the bias in %; smaller biases stay empty.
     """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -389,14 +372,10 @@ def breakdown_figure(frame: pl.DataFrame, quantity: str) -> Figure:
 
 
 def exceeding(frame: pl.DataFrame, quantity: str) -> dict[tuple[str, float, str], tuple[float, float]]:
-    """Biases that are larger than one reported standard deviation.
-
-    Args:
-        frame: of `breakdown_frame`.
+    """Biases that are larger than one reported standard deviation, by effect, severity and estimator.
 
     Returns:
-        By effect, severity in noise powers (a ratio) and estimator: the bias in % of the truth and in reported
-        standard deviations (a ratio).
+        The bias in % of the truth and in reported standard deviations; severities are in noise powers (ratios).
     """
     cells = {}
     for row in frame.filter(frame["quantity"] == quantity).iter_rows(named=True):

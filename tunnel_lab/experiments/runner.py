@@ -1,9 +1,7 @@
 """One runner of experiments: a task is data, the work on it a pure function; finished tasks are not done again.
 
-Sweeps, scores, breakdowns and training samples differ in their tasks, their work and the files of their results.
-They share this loop, its resumption and its progress. The workers are processes of this machine, or those of a Dask
-cluster, which repeats the tasks of a lost worker elsewhere; only this process keeps results, so that a task that is
-done twice is stored once. Nothing heavy is imported here, because worker processes start with this module.
+The workers are processes of this machine or of a Dask cluster; only this process keeps results, so that a task that
+is done twice is stored once. Nothing heavy is imported here, because worker processes start with this module.
 """
 
 from __future__ import annotations
@@ -13,8 +11,9 @@ import os
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
+from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
@@ -74,36 +73,24 @@ def run_tasks(
     waiting = [task for task in tasks if not finished(task)]
     total = sum(map(size, tasks))
     done = total - sum(map(size, waiting))
-    if progress is not None:
-        progress(done, total)
-    with closing(_results(work, waiting, workers)) as results:
-        for task, result in results:
+    show = progress or (lambda _done, _total: None)
+    show(done, total)
+
+    def results() -> Generator[tuple[TaskT, ResultT], None, None]:
+        if waiting:
+            yield from workers(work, waiting)
+
+    with closing(results()) as finishing:  # the workers end with the first error
+        for task, result in finishing:
             keep(task, result)
             done += size(task)
-            if progress is not None:
-                progress(done, total)
+            show(done, total)
     return len(tasks) - len(waiting)
 
 
-def _results(
-    work: Callable[[TaskT], ResultT], waiting: Sequence[TaskT], workers: Workers
-) -> Generator[tuple[TaskT, ResultT], None, None]:
-    """The work as a generator, which is always closed at the end."""
-    if waiting:
-        yield from workers(work, waiting)
-
-
 def processes(jobs: int) -> Workers:
-    """Processes of this machine.
-
-    Args:
-        jobs: how many; 0 works in this one.
-    """
-
-    def workers(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
-        return in_processes(work, tasks, jobs)
-
-    return workers
+    """Processes of this machine; no job works in this one."""
+    return partial(in_processes, jobs=jobs)
 
 
 def lasting_processes(jobs: int, say: Say) -> Workers:
@@ -121,10 +108,9 @@ def lasting_processes(jobs: int, say: Say) -> Workers:
             except BrokenProcessPool:
                 broken += 1
                 if broken >= PATIENCE:
-                    raise TunnelError(
-                        f"worker processes died {PATIENCE} times without finishing a shard",
-                        remedy="check the memory and give fewer --workers; finished shards are kept",
-                    ) from None
+                    what = f"worker processes died {PATIENCE} times without finishing a shard"
+                    remedy = "check the memory and give fewer --workers; finished shards are kept"
+                    raise TunnelError(what, remedy=remedy) from None
                 say("a worker process was lost; its shards are repeated")
 
     return workers
@@ -141,7 +127,6 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
     Args:
         address: of a scheduler, such as ``tcp://host:8786``, or ``local`` for a cluster that is started here.
         workers: number of workers of a local cluster.
-        say: called with each line for the user.
         poll_s: how long to wait for a shard before the workers are counted, s.
     """
 
@@ -150,7 +135,7 @@ def on_cluster(address: str, workers: int, say: Say, *, poll_s: float = POLL_S) 
         gone = distributed.CancelledError, distributed.comm.core.CommClosedError
         with _client(address, workers) as client:
             try:
-                yield from _Crew(client, work, say, poll_s).work(tasks)
+                yield from _work_of(client, work, tasks, say, poll_s)
             except gone:
                 raise _gone() from None
 
@@ -177,97 +162,73 @@ def _client(address: str, workers: int) -> Iterator[Client]:
     try:
         client = make_client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError, ImportError) as error:
-        raise TunnelError(
-            f"no scheduler answers ({one_line(error, 80)})",
-            where=f"--scheduler {address}",
-            remedy="start one with: dask scheduler",
-        ) from None
+        what = f"no scheduler answers ({one_line(error, 80)})"
+        remedy = "start one with: dask scheduler"
+        raise TunnelError(what, where=f"--scheduler {address}", remedy=remedy) from None
     with client:
         yield client
 
 
-class _Crew(Generic[TaskT, ResultT]):
-    """The workers of a cluster at one kind of work."""
+def _work_of(
+    client: Any, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], say: Say, poll_s: float
+) -> Iterator[tuple[TaskT, ResultT]]:
+    """Tasks with their results as they finish, few in flight at a time: two for each thread."""
+    from distributed import KilledWorker, wait
 
-    def __init__(self, client: Any, work: Callable[[TaskT], ResultT], say: Say, poll_s: float) -> None:
-        self._client = client
-        self._work = work
-        self._say = say
-        self._poll_s = poll_s
-        self._attempts: dict[TaskT, int] = {}
-        self._alone = False
+    wait_for: Any = wait
+    waiting = iter(tasks)
+    flying: dict[Any, TaskT] = {}
+    attempts: dict[TaskT, int] = {}
 
-    def work(self, tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
-        """Tasks with their results as they finish, few in flight at a time."""
-        import distributed
+    def submit(task: TaskT) -> None:
+        key = f"shard-{task}-{attempts.setdefault(task, 1)}-{id(attempts)}"
+        flying[client.submit(work, task, key=key, pure=False)] = task
 
-        wait: Any = distributed.wait
-        waiting = iter(tasks)
-        flying: dict[Any, TaskT] = {}
-        self._workers()
-        while True:
-            for task in islice(waiting, max(0, self._room() - len(flying))):
-                flying[self._submit(task)] = task
-            if not flying:
-                return
-            try:
-                landed = wait(list(flying), timeout=self._poll_s, return_when="FIRST_COMPLETED").done
-            except TimeoutError:
-                self._workers()
-                continue
-            for future in landed:
-                task = flying.pop(future)
-                result = self._result(future, task)
-                if result is None:
-                    flying[self._submit(task)] = task
-                else:
-                    self._alone = False
-                    yield task, result
-
-    def _submit(self, task: TaskT) -> Any:
-        attempt = self._attempts.setdefault(task, 1)
-        return self._client.submit(self._work, task, key=f"shard-{task}-{attempt}-{id(self)}", pure=False)
-
-    def _result(self, future: Any, task: TaskT) -> ResultT | None:
-        """The result of a task; None where its workers were lost and it must be submitted again."""
-        from distributed import KilledWorker
-
+    alone = _tell_of_workers(client, False, say)
+    while True:
+        threads = sum(int(count) for count in client.nthreads().values())
+        for task in islice(waiting, max(0, max(_FEWEST_IN_FLIGHT, 2 * threads) - len(flying))):
+            submit(task)
+        if not flying:
+            return
         try:
-            result: ResultT = future.result()
-        except (ImportError, RuntimeError) as error:
-            raise TunnelError(
-                f"a worker cannot do a shard ({one_line(error)})",
-                remedy="give scheduler and workers the same environment as here",
-            ) from None
-        except KilledWorker:
-            self._attempts[task] += 1
-            if self._attempts[task] > ATTEMPTS:
-                raise TunnelError(
-                    f"shard {task} lost every worker it was given to",
-                    remedy="check the memory of the workers; finished shards are kept",
-                ) from None
-            return None
-        finally:
-            future.release()
-        return result
+            landed = wait_for(list(flying), timeout=poll_s, return_when="FIRST_COMPLETED").done
+        except TimeoutError:
+            alone = _tell_of_workers(client, alone, say)
+            continue
+        for future in landed:
+            task = flying.pop(future)
+            try:
+                result: ResultT = future.result()
+            except (ImportError, RuntimeError) as error:
+                remedy = "give scheduler and workers the same environment as here"
+                raise TunnelError(f"a worker cannot do a shard ({one_line(error)})", remedy=remedy) from None
+            except KilledWorker:
+                attempts[task] += 1
+                if attempts[task] > ATTEMPTS:
+                    what = f"shard {task} lost every worker it was given to"
+                    remedy = "check the memory of the workers; finished shards are kept"
+                    raise TunnelError(what, remedy=remedy) from None
+                submit(task)
+                continue
+            finally:
+                future.release()
+            alone = False
+            yield task, result
 
-    def _workers(self) -> None:
-        """Report when no worker is connected, once each time."""
-        if self._client.status != "running":
-            raise _gone()
-        address = self._client.scheduler.address if self._client.scheduler else ""
-        if self._client.nthreads():
-            if self._alone:
-                self._say("workers are connected again")
-            self._alone = False
-        elif not self._alone:
-            self._alone = True
-            self._say(f"no worker is connected to {address}: start some with: dask worker {address}; waiting")
 
-    def _room(self) -> int:
-        """Number of shards in flight: two for each thread."""
-        threads = sum(int(count) for count in self._client.nthreads().values())
-        return max(_FEWEST_IN_FLIGHT, 2 * threads)
+def _tell_of_workers(client: Any, alone: bool, say: Say) -> bool:
+    """Whether no worker is connected, which is said once each time."""
+    if client.status != "running":
+        raise _gone()
+    address = client.scheduler.address if client.scheduler else ""
+    if client.nthreads():
+        if alone:
+            say("workers are connected again")
+        return False
+    if not alone:
+        say(f"no worker is connected to {address}: start some with: dask worker {address}; waiting")
+    return True
 
 
 def _gone() -> TunnelError:

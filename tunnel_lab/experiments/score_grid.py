@@ -18,6 +18,7 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field, TypeAdapter
 
+from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from
 from tunnel_sim.effects.base import read_motion
@@ -30,9 +31,8 @@ from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest, whole_steps
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel, Truth
-from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 
 DECAY_QUANTITIES = ("zeta", "omega_n")
@@ -44,7 +44,21 @@ _ZETA_SPREAD, _FREQUENCY_SPREAD, _RELEASE_SPREAD = 0.05, 0.02, 0.03
 _ZERO_STD = 0.004  # rad
 
 
-class DecaysTable(StrictModel):
+class _RecordsTable(StrictModel):
+    """Keys of all tables."""
+
+    noise: list[Positive] = Field(
+        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
+    )
+    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
+    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
+    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
+    resolution: Annotated[float, Field(ge=0.0)] = Field(
+        default=0.0, description="a number in rad, zero for none"
+    )
+
+
+class DecaysTable(_RecordsTable):
     """``[[decays]]``: single free decays with the wind off; every combination is a cell."""
 
     zeta: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(
@@ -53,35 +67,17 @@ class DecaysTable(StrictModel):
     frequency: list[Positive] = Field(
         min_length=1, description="a list of natural frequencies in Hz, such as [0.8, 4.0]"
     )
-    noise: list[Positive] = Field(
-        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
-    )
-    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
-    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
-    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
-    resolution: Annotated[float, Field(ge=0.0)] = Field(
-        default=0.0, description="a number in rad, zero for none"
-    )
 
 
-class CampaignsTable(StrictModel):
+class CampaignsTable(_RecordsTable):
     """``[[campaigns]]``: every spring with the wind off and at one speed; each speed, noise, … makes a cell."""
 
     springs: list[Positive] = Field(min_length=1, description="a list of stiffnesses in N m/rad")
     wind_speeds: list[Positive] = Field(min_length=1, description="a list of speeds in m/s, such as [10, 25]")
-    noise: list[Positive] = Field(
-        min_length=1, description="a list of noise levels over the amplitude, such as [0.001, 0.01]"
-    )
-    duration: list[Positive] = Field(min_length=1, description="a list of record lengths in s, such as [20]")
     effects: list[OneLine] = Field(
         default=[NO_EFFECT],
         min_length=1,
         description='a list such as ["none", "coulomb_friction:friction_moment=0.004"]',
-    )
-    amplitude: Positive = Field(default=0.35, description="the release angle, a positive number in rad")
-    sample_rate: SampleRate = Field(default=1000.0, description="a positive number in Hz")
-    resolution: Annotated[float, Field(ge=0.0)] = Field(
-        default=0.0, description="a number in rad, zero for none"
     )
 
 
@@ -155,13 +151,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Grid:
-    """What to score on.
-
-    Args:
-        trials: number of records, or campaigns, in each cell.
-        trials_of: the same for estimators that get fewer, by name.
-        cells: at least one, all different.
-    """
+    """What to score on: at least one cell, all different, and the number of records or campaigns in each."""
 
     name: str
     seed: int
@@ -185,19 +175,17 @@ class Grid:
 
     @classmethod
     def from_json_dict(cls, data: dict[str, Any]) -> Grid:
-        """The inverse of `to_json_dict`.
-
-        Args:
-            data: of one grid.
-
-        Raises:
-            TunnelError: when it is not a grid, or too large.
-        """
+        """The inverse of `to_json_dict`; a `TunnelError` when it is not a grid, or too large."""
         where, remedy = "the grid as JSON", "write it again"
         check_shape(data, where, remedy)
         with as_described("is not a grid", where, remedy):
             grid: Grid = _GRID.validate_python(data | {"trials_of": tuple(data["trials_of"].items())})
-            if not grid.cells or grid.trials < _LEAST_TRIALS or not all(map(_is_possible, grid.cells)):
+            possible = bool(grid.cells) and grid.trials >= _LEAST_TRIALS
+            for cell in grid.cells:
+                positive = (cell.noise, cell.duration, cell.amplitude, cell.sample_rate, *cell.springs)
+                possible &= min(positive) > 0.0 and min(cell.resolution, cell.wind_speed) >= 0.0
+                possible &= 0.0 <= cell.zeta < 1.0
+            if not possible:
                 raise ValueError("a cell or a number of trials is out of range")
         check_count(len(grid.cells), limits.SCORE_CELLS, "cells", where, "shorten a list")
         for cell in grid.cells:
@@ -208,29 +196,8 @@ class Grid:
 _GRID = TypeAdapter(Grid)
 
 
-def _is_possible(cell: Cell) -> bool:
-    """Whether the numbers of a cell are within the limits of the tables."""
-    positive = (cell.noise, cell.duration, cell.amplitude, cell.sample_rate, *cell.springs)
-    return min(positive) > 0.0 and min(cell.resolution, cell.wind_speed) >= 0.0 and 0.0 <= cell.zeta < 1.0
-
-
-def check_trials(grid: Grid, estimators: Sequence[str], where: str) -> None:
-    """Refuse more trials than a table can hold before any is drawn.
-
-    Raises:
-        TunnelError: with the number of rows and the limit.
-    """
-    quantities = sum(len(cell.quantities) for cell in grid.cells)
-    rows = quantities * sum(grid.trials_for(name) for name in estimators)
-    what = "rows (trials × estimators × quantities)"
-    check_count(rows, limits.SCORE_ROWS, what, where, "give fewer trials, cells or estimators")
-
-
 def load_grid(path: Path) -> Grid:
-    """Read a grid.
-
-    Args:
-        path: a TOML file like the packaged ``score-grid.toml``.
+    """Read a grid, a TOML file like the packaged ``score-grid.toml``.
 
     Returns:
         The grid; cells in the order of the tables, the last list of a table varies fastest.
@@ -241,18 +208,44 @@ def load_grid(path: Path) -> Grid:
     missing = "name a grid such as the packaged score-grid.toml, or leave it out"
     document = read_document(GridDocument, path, missing=missing)
     where = shown(path)
-    _check_effects(document, where)
-    _check_sizes(document, where)
-    cells = [cell for table in document.decays for cell in _decays(table)]
-    cells += [cell for table in document.campaigns for cell in _campaigns(table)]
+    for text in dict.fromkeys(text for table in document.campaigns for text in table.effects):
+        if text == NO_EFFECT:
+            continue
+        try:
+            setting = parse_effect(text)
+            null = effect_from(setting.name, setting.parameters).is_null
+        except TunnelError as error:
+            raise TunnelError(error.what, where=f"{where}, effect {text!r}", remedy=error.remedy) from error
+        if null:
+            remedy = f'give its severity, or write "{NO_EFFECT}"'
+            raise TunnelError(f"effect {text!r} does nothing", where=where, remedy=remedy)
+    count = 0  # from the lengths of the lists, before any cell is made
+    for decay in document.decays:
+        count += len(decay.zeta) * len(decay.frequency) * len(decay.noise) * len(decay.duration)
+        check_size(1, max(decay.duration), decay.sample_rate, f"{where}, decays")
+    for table in document.campaigns:
+        count += len(table.wind_speeds) * len(table.noise) * len(table.duration) * len(table.effects)
+        check_size(2 * len(table.springs), max(table.duration), table.sample_rate, f"{where}, campaigns")
+    check_count(count, limits.SCORE_CELLS, "cells", where, "shorten a list")
+    cells = []
+    for decay in document.decays:
+        sensor = (decay.amplitude, decay.sample_rate, decay.resolution)
+        for zeta, hertz, noise, duration in product(decay.zeta, decay.frequency, decay.noise, decay.duration):
+            cells.append(Cell("decay", noise, duration, *sensor, zeta=zeta, frequency=hertz))
+    for table in document.campaigns:
+        sensor, springs = (table.amplitude, table.sample_rate, table.resolution), tuple(table.springs)
+        for speed, noise, duration, effect in product(
+            table.wind_speeds, table.noise, table.duration, table.effects
+        ):
+            cell = Cell(
+                "campaign", noise, duration, *sensor, wind_speed=speed, springs=springs, effect=effect
+            )
+            cells.append(cell)
     if not cells:
         raise TunnelError("no cells", where=where, remedy="add a [[decays]] or [[campaigns]] table")
     twice = first_twice(cells)
     if twice is not None:
         raise TunnelError(f"the cell {twice.label!r} occurs twice", where=where, remedy="remove one")
-    from identification.estimators import ALL_ESTIMATORS
-    from tunnel_sim.vocabulary.errors import did_you_mean
-
     for name in document.trials_of:
         if name not in ALL_ESTIMATORS:
             remedy = did_you_mean(name, ALL_ESTIMATORS)
@@ -267,63 +260,9 @@ def packaged_grid() -> Grid:
         return load_grid(path)
 
 
-def _check_sizes(document: GridDocument, where: str) -> None:
-    """Count cells, runs and samples from the lengths of the lists, before any cell is made."""
-    cells = 0
-    for decay in document.decays:
-        cells += len(decay.zeta) * len(decay.frequency) * len(decay.noise) * len(decay.duration)
-        check_size(1, max(decay.duration), decay.sample_rate, f"{where}, decays")
-    for table in document.campaigns:
-        cells += len(table.wind_speeds) * len(table.noise) * len(table.duration) * len(table.effects)
-        check_size(2 * len(table.springs), max(table.duration), table.sample_rate, f"{where}, campaigns")
-    check_count(cells, limits.SCORE_CELLS, "cells", where, "shorten a list")
-
-
-def _check_effects(document: GridDocument, where: str) -> None:
-    texts = dict.fromkeys(text for table in document.campaigns for text in table.effects)
-    for text in texts:
-        if text == NO_EFFECT:
-            continue
-        try:
-            setting = parse_effect(text)
-            null = effect_from(setting.name, setting.parameters).is_null
-        except TunnelError as error:
-            raise TunnelError(error.what, where=f"{where}, effect {text!r}", remedy=error.remedy) from error
-        if null:
-            remedy = f'give its severity, or write "{NO_EFFECT}"'
-            raise TunnelError(f"effect {text!r} does nothing", where=where, remedy=remedy)
-
-
-def _decays(table: DecaysTable) -> list[Cell]:
-    common = (table.amplitude, table.sample_rate, table.resolution)
-    return [
-        Cell("decay", noise, duration, *common, zeta=zeta, frequency=frequency)
-        for zeta, frequency, noise, duration in product(
-            table.zeta, table.frequency, table.noise, table.duration
-        )
-    ]
-
-
-def _campaigns(table: CampaignsTable) -> list[Cell]:
-    common = (table.amplitude, table.sample_rate, table.resolution)
-    springs = tuple(table.springs)
-    return [
-        Cell("campaign", noise, duration, *common, wind_speed=speed, springs=springs, effect=effect)
-        for speed, noise, duration, effect in product(
-            table.wind_speeds, table.noise, table.duration, table.effects
-        )
-    ]
-
-
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One campaign of known truth.
-
-    Args:
-        campaign: input of the estimators; it does not state the noise.
-        truth: value of each scored quantity, by name, SI.
-        bound: the Cramér–Rao bound of each, by name, SI; of the nominal model, with or without an effect.
-    """
+    """A campaign, which does not state its noise, with truth and nominal Cramér–Rao bound by quantity, SI."""
 
     campaign: Campaign
     truth: Mapping[str, float]
@@ -331,31 +270,37 @@ class Trial:
 
 
 def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
-    """Make one trial.
-
-    Args:
-        number: of the trial in its cell, from 0.
-
-    Returns:
-        The trial; the same arguments give the same bits.
+    """Make one trial of a cell, which are numbered from 0; the same arguments give the same bits.
 
     Raises:
         TunnelError: when a run leaves the finite range.
     """
+    from identification.uncertainty.cramer_rao import campaign_bound, damped_sinusoid_bound
+
     rng = np.random.default_rng([seed, crc32(cell.label.encode()), number])
-    return _decay_trial(cell, rng) if cell.kind == "decay" else _campaign_trial(cell, rng)
-
-
-def _decay_trial(cell: Cell, rng: np.random.Generator) -> Trial:
-    from identification.uncertainty.cramer_rao import damped_sinusoid_bound
-
     rig = load_rig()
+    noise = float(np.hypot(cell.noise * cell.amplitude, cell.resolution / np.sqrt(12.0)))
+    if cell.kind == "campaign":
+        truth = Truth(
+            cn_beta=rng.uniform(0.25, 0.57),
+            cn_r=-rng.uniform(0.06, 0.24),
+            yaw_inertia=rng.uniform(0.098, 0.110),
+            mechanical_damping=rng.uniform(0.007, 0.020),
+        )
+        runs = [
+            (spring, speed, cell.amplitude * (1.0 + _RELEASE_SPREAD * rng.standard_normal()))
+            for spring in cell.springs
+            for speed in (0.0, cell.wind_speed)
+        ]
+        campaign = _campaign(cell, truth, runs, rig, rng)
+        states = [(release, 0.0) for _, _, release in runs]
+        bounds = campaign_bound(campaign, **vars(truth), noise_std=noise, initial_states=states)
+        return Trial(campaign, dict(vars(truth)), {name: bounds.std(name) for name in bounds.parameters})
     zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))
     omega = 2.0 * np.pi * cell.frequency * (1.0 + _FREQUENCY_SPREAD * rng.uniform(-1.0, 1.0))
     inertia = rig.dynamics.yaw_inertia
     truth = Truth(0.0, 0.0, inertia, 2.0 * zeta * omega * inertia)
-    runs = ((inertia * omega**2, 0.0, cell.amplitude),)
-    campaign = _campaign(cell, truth, runs, rig, rng, stated=False)
+    campaign = _campaign(cell, truth, [(inertia * omega**2, 0.0, cell.amplitude)], rig, rng)
     # Released at rest: A cos φ is the angle and A sin φ = −(decay rate)·angle/ωd.
     damped = omega * np.sqrt(1.0 - zeta**2)
     lag = -zeta * omega / damped
@@ -365,33 +310,9 @@ def _decay_trial(cell: Cell, rng: np.random.Generator) -> Trial:
         phase=float(np.arctan2(lag, 1.0)),
         frequency=float(damped) / (2.0 * np.pi),
         zeta=zeta,
-        noise_std=_noise(cell),
+        noise_std=noise,
     )
     return Trial(campaign, {"zeta": zeta, "omega_n": omega}, {"zeta": bound.zeta, "omega_n": bound.omega_n})
-
-
-def _campaign_trial(cell: Cell, rng: np.random.Generator) -> Trial:
-    from identification.uncertainty.cramer_rao import campaign_bound
-
-    truth = Truth(
-        cn_beta=rng.uniform(0.25, 0.57),
-        cn_r=-rng.uniform(0.06, 0.24),
-        yaw_inertia=rng.uniform(0.098, 0.110),
-        mechanical_damping=rng.uniform(0.007, 0.020),
-    )
-    runs = tuple(
-        (spring, speed, cell.amplitude * (1.0 + _RELEASE_SPREAD * rng.standard_normal()))
-        for spring in cell.springs
-        for speed in (0.0, cell.wind_speed)
-    )
-    campaign = _campaign(cell, truth, runs, load_rig(), rng, stated=True)
-    states = [(release, 0.0) for _, _, release in runs]
-    bound = campaign_bound(campaign, **vars(truth), noise_std=_noise(cell), initial_states=states)
-    return Trial(campaign, dict(vars(truth)), {name: bound.std(name) for name in bound.parameters})
-
-
-def _noise(cell: Cell) -> float:
-    return float(np.hypot(cell.noise * cell.amplitude, cell.resolution / np.sqrt(12.0)))
 
 
 def _campaign(
@@ -400,11 +321,12 @@ def _campaign(
     conditions: Sequence[tuple[float, float, float]],
     rig: Rig,
     rng: np.random.Generator,
-    *,
-    stated: bool,
 ) -> Campaign:
-    """Runs of (spring, speed, release); unless ``stated``, without their spring, which gives normalised form."""
-    effects = _effects(cell)
+    """Runs of (spring, speed, release). A decay does not state its spring, which gives normalised form."""
+    effects: tuple[Effect, ...] = ()
+    if cell.effect != NO_EFFECT:
+        setting = parse_effect(cell.effect)
+        effects = (effect_from(setting.name, setting.parameters),)
     sensor = SensorModel(
         cell.sample_rate, cell.noise * cell.amplitude, cell.resolution, _ZERO_STD * rng.standard_normal()
     )
@@ -421,39 +343,21 @@ def _campaign(
             duration=cell.duration,
             timestep=whole_steps(cell.sample_rate),
         )
+        chain = EffectChain.draw(settings, effects, rng)
+        try:
+            motion = forward_motion(rig, follow_fastest(rig, chain.physics()), cell.sample_rate)
+        except ValueError as error:
+            remedy = "choose a stiffer spring or less wind"
+            raise TunnelError(str(error), where=cell.label, remedy=remedy) from error
         runs.append(
             Run(
                 id=f"r{number:02d}",
-                record=_record(cell, settings, rig, sensor, effects, rng),
+                record=read_motion(motion, sensor, rng, chain),
                 wind_speed=speed,
-                spring_stiffness=spring if stated else None,
+                spring_stiffness=spring if cell.kind == "campaign" else None,
                 air_density=rig.air.density if speed > 0.0 else None,
                 release_angle=cell.amplitude,
             )
         )
     stated_sensor = SensorProperties(cell.sample_rate, cell.resolution or None)
     return Campaign("trial", RigProperties.of(rig), stated_sensor, tuple(runs))
-
-
-def _record(
-    cell: Cell,
-    settings: RunSettings,
-    rig: Rig,
-    sensor: SensorModel,
-    effects: Sequence[Effect],
-    rng: np.random.Generator,
-) -> Record:
-    chain = EffectChain.draw(settings, effects, rng)
-    try:
-        motion = forward_motion(rig, follow_fastest(rig, chain.physics()), cell.sample_rate)
-    except ValueError as error:
-        remedy = "choose a stiffer spring or less wind"
-        raise TunnelError(str(error), where=cell.label, remedy=remedy) from error
-    return read_motion(motion, sensor, rng, chain)
-
-
-def _effects(cell: Cell) -> tuple[Effect, ...]:
-    if cell.effect == NO_EFFECT:
-        return ()
-    setting = parse_effect(cell.effect)
-    return (effect_from(setting.name, setting.parameters),)

@@ -9,20 +9,24 @@ import hashlib
 import io
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib import resources
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import polars as pl
 
 from identification.estimate import UNITS, Quantity
 from identification.scoring import ScoredEstimate, Trials, collect
 from tunnel_lab.experiments.runner import Progress, processes, run_tasks
-from tunnel_lab.experiments.score_grid import Cell, Grid, check_trials
+from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.files.reading import (
     as_described,
+    check_count,
     frame_schema,
     parse_json,
     read_frame,
@@ -34,10 +38,6 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import polars as pl
-
     from identification.estimate import Estimate
     from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -48,6 +48,12 @@ UNIT_TRIALS = 5
 _COLUMNS = (
     "cell", "trial", "estimator", "quantity", "unit", "truth", "value", "std", "bound", "status", "milliseconds"
 )  # fmt: skip
+_TYPES: Mapping[str, Any] = {
+    **dict.fromkeys(("estimator", "quantity", "unit", "status"), pl.Utf8),
+    **dict.fromkeys(("truth", "value", "std", "bound", "milliseconds"), pl.Float64),
+    **dict.fromkeys(("cell", "trial"), pl.Int64),
+}
+_UNITS = {**UNITS, "zeta": "1", "omega_n": "rad/s"}
 Key = tuple[str, int, str]
 """Estimator, index of the cell, quantity."""
 
@@ -65,13 +71,7 @@ NamedT = TypeVar("NamedT", bound=Named)
 
 @dataclass(frozen=True)
 class Unit:
-    """Some trials of one cell.
-
-    Args:
-        cell: index of the cell in the grid.
-        first: number of the first trial.
-        stop: number after the last trial.
-    """
+    """Some trials of one cell, from the first to before the last; both and the cell are numbers from 0."""
 
     cell: int
     first: int
@@ -81,15 +81,6 @@ class Unit:
     def name(self) -> str:
         """Name of its file."""
         return f"c{self.cell:04d}-t{self.first:05d}"
-
-
-def units_of(grid: Grid) -> tuple[Unit, ...]:
-    """The grid in units of a few trials, ordered across cells so that the time left can be estimated early."""
-    return tuple(
-        Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
-        for first in range(0, grid.trials, UNIT_TRIALS)
-        for cell in range(len(grid.cells))
-    )
 
 
 def score_unit(grid: Grid, estimators: Sequence[str], unit: Unit) -> list[Row]:
@@ -120,15 +111,12 @@ def estimate_rows(
     """One estimator on one campaign of known truth, a row for each quantity of the truth.
 
     An estimator that raises an exception has failed, and its status names the exception: one bad record must not
-    stop the work.
+    stop the work. Value and std are then None.
 
     Args:
         truth: by quantity, SI; ζ and ωn are those of the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
         about: first columns of every row.
-
-    Returns:
-        The rows; value and std are None where the estimator failed.
     """
     from identification import identify
 
@@ -150,7 +138,7 @@ def estimate_rows(
                 **about,
                 "estimator": estimator,
                 "quantity": quantity,
-                "unit": unit_of(quantity),
+                "unit": _UNITS[quantity],
                 "truth": value,
                 "value": None if answer is None else answer.value,
                 "std": None if answer is None else answer.std,
@@ -168,15 +156,6 @@ def outcome(row: Row) -> ScoredEstimate:
     return ScoredEstimate(row["truth"], quantity, row["bound"])
 
 
-def unit_of(quantity: str) -> str:
-    """Unit of a scored quantity.
-
-    Raises:
-        KeyError: when no cell scores it.
-    """
-    return {**UNITS, "zeta": "1", "omega_n": "rad/s"}[quantity]
-
-
 def score_grid(
     grid: Grid,
     estimators: Sequence[str],
@@ -185,22 +164,26 @@ def score_grid(
     parts: Path | None = None,
     progress: Progress | None = None,
 ) -> list[Row]:
-    """Every estimator on every trial of a grid.
+    """Every estimator on every trial of a grid, in the order of cells, trials and estimators.
 
     Args:
         jobs: processes; 0 works in this one. Except for the times, the rows are the same to the bit.
         parts: folder for finished work, from which an interrupted score continues if grid, estimators and code
             are the same; None for none.
-        progress: called with the number of finished trials and of all trials.
-
-    Returns:
-        The rows, in the order of cells, trials and estimators.
 
     Raises:
         TunnelError: more trials than a table can hold.
     """
-    check_trials(grid, estimators, "score")
-    units = units_of(grid)
+    quantities = sum(len(cell.quantities) for cell in grid.cells)
+    count = quantities * sum(grid.trials_for(name) for name in estimators)
+    what = "rows (trials × estimators × quantities)"
+    check_count(count, limits.SCORE_ROWS, what, "score", "give fewer trials, cells or estimators")
+    # Ordered across cells, so that the time left can be estimated early.
+    units = [
+        Unit(cell, first, min(first + UNIT_TRIALS, grid.trials))
+        for first in range(0, grid.trials, UNIT_TRIALS)
+        for cell in range(len(grid.cells))
+    ]
     rows = rows_of(
         partial(score_unit, grid, tuple(estimators)),
         units,
@@ -227,17 +210,22 @@ def rows_of(
     """The rows of every task, by its name; those of finished tasks are kept in files of JSON.
 
     Args:
-        work: function of a module.
-        tasks: each with the name of its file.
         mark: rows kept under another mark are computed again, see `fingerprint`.
         jobs: number of processes; 0 works in this one.
         parts: folder of the files; None for none.
-        size: of a task, as progress counts it.
     """
     rows: dict[str, list[Row]] = {}
     if parts is not None:
-        kept = {task.name: _kept(parts / f"{task.name}.json", mark) for task in tasks}
-        rows = {name: found for name, found in kept.items() if found is not None}
+        for task in tasks:
+            try:
+                document = read_json(parts / f"{task.name}.json", remedy="score it again")
+            except TunnelError:  # there is none, or it is damaged
+                continue
+            kept = document.get("rows")
+            if document.get("fingerprint") != mark or not isinstance(kept, list):
+                continue
+            if all(isinstance(row, dict) for row in kept):
+                rows[task.name] = kept
 
     def keep(task: NamedT, found: list[Row]) -> None:
         if parts is not None:
@@ -257,14 +245,7 @@ def rows_of(
 
 
 def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
-    """Hash of all that results depend on: conditions, names of the estimators, and code of the packages below.
-
-    Args:
-        document: the conditions, in JSON's types.
-
-    Returns:
-        SHA-256 in hexadecimal.
-    """
+    """SHA-256 of all that results depend on: conditions, names of the estimators, code of the packages below."""
     text = json.dumps([document, list(estimators), _code()], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -285,40 +266,9 @@ def _code() -> str:
     return digest.hexdigest()
 
 
-def _kept(path: Path, mark: str) -> list[Row] | None:
-    """Stored rows of a task; None where there are none, or they have another mark."""
-    try:
-        document = read_json(path, remedy="score it again")
-    except TunnelError:
-        return None
-    rows = document.get("rows")
-    whole = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
-    return rows if whole and document.get("fingerprint") == mark else None
-
-
-def describe(cell: Cell) -> Row:
-    """A cell's conditions as columns of a table, units in their names."""
-    return {
-        "cell": cell.label,
-        "kind": cell.kind,
-        "zeta": cell.zeta or None,
-        "frequency_hz": cell.frequency or None,
-        "wind_speed_m_per_s": cell.wind_speed or None,
-        "effect": cell.effect,
-        "noise_over_amplitude": cell.noise,
-        "duration_s": cell.duration,
-        "runs": cell.runs,
-    }
-
-
 @dataclass(frozen=True, eq=False)
 class Results:
-    """A finished score.
-
-    Args:
-        estimators: names, in the order given.
-        rows: one per trial, estimator and quantity; see `tunnel_lab.experiments.score_trials`.
-    """
+    """A finished score: a row for each trial, estimator and quantity, see `estimate_rows`."""
 
     grid: Grid
     estimators: tuple[str, ...]
@@ -333,13 +283,7 @@ class Results:
         return {key: collect(every) for key, every in outcomes.items()}
 
     def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
-        """Median time an estimator took for one record, ms.
-
-        Args:
-            cells: indices of the cells to include.
-        """
-        from statistics import median
-
+        """Median time an estimator took for one record of some cells, ms."""
         wanted = set(cells)
         return median(
             float(row["milliseconds"])
@@ -360,46 +304,28 @@ def groups_of(grid: Grid) -> dict[str, list[int]]:
     """Cells that are pooled: decays, campaigns, and campaigns with each effect."""
     groups: dict[str, list[int]] = {}
     for index, cell in enumerate(grid.cells):
-        groups.setdefault(_group(cell), []).append(index)
+        name = "single decays" if cell.kind == "decay" else "campaigns"
+        if cell.effect != NO_EFFECT:
+            name = f"campaigns with {cell.effect}"
+        groups.setdefault(name, []).append(index)
     return groups
 
 
-def _group(cell: Cell) -> str:
-    if cell.kind == "decay":
-        return "single decays"
-    return "campaigns" if cell.effect == NO_EFFECT else f"campaigns with {cell.effect}"
-
-
 def write_trials(path: Path, results: Results) -> Path:
-    """Write the trials with their grid as Parquet, completely or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-    """
-    import polars as pl
-
+    """Write the trials with their grid as Parquet, completely or not at all."""
     frame = trials_frame(results)
     described = json_line(results.grid.to_json_dict(), sort_keys=True)
     return write_whole(path, parquet(frame.with_columns(pl.lit(described).alias("grid"))))
 
 
 def trials_frame(results: Results) -> pl.DataFrame:
-    """A row for every trial, estimator and quantity.
-
-    Returns:
-        Columns as in the rows; ``cell`` is the index of the grid's cell.
-    """
-    import polars as pl
-
+    """A row for every trial, estimator and quantity; ``cell`` is the index of the grid's cell."""
     columns = {name: [row[name] for row in results.rows] for name in _COLUMNS}
-    return pl.DataFrame(columns, schema_overrides=_types())
+    return pl.DataFrame(columns, schema_overrides=_TYPES)
 
 
 def read_trials(path: Path) -> Results:
-    """Read what `write_trials` wrote.
-
-    Returns:
-        The results, estimators in the order of their first rows.
+    """Read what `write_trials` wrote; estimators are in the order of their first rows.
 
     Raises:
         TunnelError: when there is no such file, or it is not a table of trials.
@@ -408,7 +334,7 @@ def read_trials(path: Path) -> Results:
     content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
     with as_described("is not a table of trials", where, remedy):
         schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
-        wrong = [name for name, kind in _types().items() if schema.get(name) != kind]
+        wrong = [name for name, kind in _TYPES.items() if schema.get(name) != kind]
         if wrong or "grid" not in schema:
             raise ValueError(", ".join(wrong) or "grid")
         frame = read_frame(content, where, remedy, _COLUMNS)
@@ -416,7 +342,20 @@ def read_trials(path: Path) -> Results:
         text = read_frame(content, where, remedy, ("grid",))["grid"][0]
         grid = Grid.from_json_dict(parse_json(text, where, remedy))
         rows = tuple(frame.to_dicts())
-        _check_rows(rows, grid)
+        wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
+        scored: dict[str, set[tuple[int, str]]] = {}
+        for row in rows:  # each estimator must have all cells, and each estimate all values
+            scored.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
+            if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
+                raise ValueError("a row without its truth or status")
+            if row["unit"] != _UNITS[row["quantity"]]:
+                raise ValueError("a unit that is not the quantity's")
+            if (row["value"] is None) != (row["std"] is None):
+                raise ValueError("a value without its standard deviation")
+            if not _can_be_scored(row):
+                raise ValueError("a number out of all range")
+        if not scored or any(cells != wanted for cells in scored.values()):
+            raise ValueError("cells that are not those of the grid")
     return Results(grid, tuple(dict.fromkeys(row["estimator"] for row in rows)), rows)
 
 
@@ -424,24 +363,6 @@ def packaged_baseline() -> Results:
     """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
         return read_trials(path)
-
-
-def _check_rows(rows: Sequence[Row], grid: Grid) -> None:
-    """Refuse incomplete rows: each estimator must have all cells, and each estimate all values."""
-    wanted = {(at, quantity) for at, cell in enumerate(grid.cells) for quantity in cell.quantities}
-    scored: dict[str, set[tuple[int, str]]] = {}
-    for row in rows:
-        scored.setdefault(row["estimator"], set()).add((row["cell"], row["quantity"]))
-        if None in [row[name] for name in ("trial", "estimator", "unit", "truth", "status")]:
-            raise ValueError("a row without its truth or status")
-        if row["unit"] != unit_of(row["quantity"]):
-            raise ValueError("a unit that is not the quantity's")
-        if (row["value"] is None) != (row["std"] is None):
-            raise ValueError("a value without its standard deviation")
-        if not _can_be_scored(row):
-            raise ValueError("a number out of all range")
-    if not scored or any(cells != wanted for cells in scored.values()):
-        raise ValueError("cells that are not those of the grid")
 
 
 def _can_be_scored(row: Row) -> bool:
@@ -463,11 +384,3 @@ def parquet(frame: pl.DataFrame) -> bytes:
     buffer = io.BytesIO()
     frame.write_parquet(buffer, compression="zstd")
     return buffer.getvalue()
-
-
-def _types() -> dict[str, Any]:
-    import polars as pl
-
-    text = dict.fromkeys(("estimator", "quantity", "unit", "status"), pl.Utf8)
-    numbers = dict.fromkeys(("truth", "value", "std", "bound", "milliseconds"), pl.Float64)
-    return {**text, **numbers, "cell": pl.Int64, "trial": pl.Int64}

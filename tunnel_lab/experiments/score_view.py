@@ -26,15 +26,14 @@ from identification.scoring import (
 )
 from identification.statistics import Proportion
 from tunnel_lab.experiments.score_grid import Cell
-from tunnel_lab.experiments.score_trials import Key, Results, describe, groups_of
+from tunnel_lab.experiments.score_trials import Key, Results, groups_of
 from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.outputs import table
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     import polars as pl
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from rich.table import Table
 
@@ -54,11 +53,7 @@ _PANEL, _LABELS, _ROW, _HEAD = 0.95, 1.7, 0.2, 0.85  # inches
 
 @dataclass(frozen=True)
 class Finding:
-    """One aspect of one estimator in the baseline and now.
-
-    Args:
-        worse: whether it is worse beyond chance, corrected for the number of findings.
-    """
+    """One aspect of one estimator in the baseline and now, and whether it is worse beyond chance."""
 
     estimator: str
     where: str
@@ -105,13 +100,15 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
         TunnelError: when the baseline has cells that were not scored now, or has none of the estimators.
     """
     estimators = [name for name in baseline.estimators if name in now.estimators]
-    places = _places(baseline, now)
+    for known in baseline.grid.cells:
+        if known not in now.grid.cells:
+            what = f"the baseline's cell {known.label!r} is not in the grid"
+            remedy = "leave the grid out: the baseline's own grid is then used"
+            raise TunnelError(what, where="--check", remedy=remedy)
     if not estimators:
-        raise TunnelError(
-            "the baseline has none of the estimators",
-            where="--check",
-            remedy=f"score one of {', '.join(baseline.estimators)}",
-        )
+        remedy = f"score one of {', '.join(baseline.estimators)}"
+        raise TunnelError("the baseline has none of the estimators", where="--check", remedy=remedy)
+    places = [now.grid.cells.index(cell) for cell in baseline.grid.cells]
     before, after = baseline.trials(), now.trials()
     tested: list[tuple[str, str, str, Change]] = []
     for name in estimators:
@@ -119,7 +116,12 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
             for quantity in baseline.grid.cells[cells[0]].quantities:
                 old = [before[name, cell, quantity] for cell in cells]
                 new = [after[name, places[cell], quantity] for cell in cells]
-                tested += [(name, *rest) for rest in _tests(baseline, cells, group, quantity, old, new)]
+                for cell, *pair in zip(cells, old, new, strict=True):
+                    label = baseline.grid.cells[cell].label
+                    tested += [(name, label, quantity, c) for c in changes(pair[:1], pair[1:])]
+                if len(cells) > 1:
+                    every = f"all {len(cells)} {group}"
+                    tested += [(name, every, quantity, change) for change in changes(old, new)]
     verdicts = holm([change.p_value for *_, change in tested], rate)
     return Verdict(
         findings=tuple(Finding(*test, worse) for test, worse in zip(tested, verdicts, strict=True)),
@@ -127,36 +129,6 @@ def check(baseline: Results, now: Results, *, rate: float = DIFFERENCE_RATE) -> 
         identical=_estimates(baseline, estimators) == _estimates(now, estimators),
         added=tuple(name for name in now.estimators if name not in baseline.estimators),
     )
-
-
-def _tests(
-    baseline: Results,
-    cells: Sequence[int],
-    group: str,
-    quantity: str,
-    old: Sequence[Trials],
-    new: Sequence[Trials],
-) -> list[tuple[str, str, Change]]:
-    tests = []
-    for cell, before, after in zip(cells, old, new, strict=True):
-        tests += [(baseline.grid.cells[cell].label, quantity, c) for c in changes([before], [after])]
-    if len(cells) > 1:
-        tests += [(f"all {len(cells)} {group}", quantity, change) for change in changes(old, new)]
-    return tests
-
-
-def _places(baseline: Results, now: Results) -> list[int]:
-    """Index of each of the baseline's cells in the present grid."""
-    places = []
-    for cell in baseline.grid.cells:
-        if cell not in now.grid.cells:
-            raise TunnelError(
-                f"the baseline's cell {cell.label!r} is not in the grid",
-                where="--check",
-                remedy="leave the grid out: the baseline's own grid is then used",
-            )
-        places.append(now.grid.cells.index(cell))
-    return places
 
 
 def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, int], object]:
@@ -168,52 +140,45 @@ def _estimates(results: Results, estimators: Sequence[str]) -> dict[tuple[Key, i
 
 
 def scores_frame(results: Results) -> pl.DataFrame:
-    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals.
-
-    Args:
-        results: at least one trial.
-
-    Returns:
-        Columns with the unit in their name, or in the column ``unit``.
-    """
+    """A row for every estimator, cell and quantity: conditions, figures, standard errors and intervals."""
     import polars as pl
 
     rows = []
     for (estimator, index, quantity), trials in results.trials().items():
-        judged = score(trials)
+        cell, judged = results.grid.cells[index], score(trials)
+        figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
+        for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
+            found: Quantity | None = getattr(judged, name)
+            label = "relative_bias_percent" if name == "relative_bias" else name
+            figures[label] = None if found is None else found.value
+            figures[f"{label}_std_error"] = None if found is None else found.std
+        for name, share in {"coverage": judged.coverage, "failure_share": judged.failures}.items():
+            ends = (None, None) if share is None else share.interval
+            figures[name] = None if share is None else share.value
+            figures[f"{name}_low"], figures[f"{name}_high"] = ends
         rows.append(
             {
                 "estimator": estimator,
-                **describe(results.grid.cells[index]),
+                "cell": cell.label,
+                "kind": cell.kind,
+                "zeta": cell.zeta or None,
+                "frequency_hz": cell.frequency or None,
+                "wind_speed_m_per_s": cell.wind_speed or None,
+                "effect": cell.effect,
+                "noise_over_amplitude": cell.noise,
+                "duration_s": cell.duration,
+                "runs": cell.runs,
                 "quantity": quantity,
                 "unit": trials.unit,
-                **_figures(judged),
+                **figures,
                 "milliseconds_per_record": results.milliseconds(estimator, [index]),
             }
         )
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def _figures(judged: Score) -> dict[str, Any]:
-    figures: dict[str, Any] = {"trials": judged.count, "failures": judged.failures.count}
-    for name in ("bias", "relative_bias", "bias_in_stds", "rmse", "rmse_over_bound"):
-        quantity: Quantity | None = getattr(judged, name)
-        label = "relative_bias_percent" if name == "relative_bias" else name
-        figures[label] = None if quantity is None else quantity.value
-        figures[f"{label}_std_error"] = None if quantity is None else quantity.std
-    shares = {"coverage": judged.coverage, "failure_share": judged.failures}
-    for name, share in shares.items():
-        figures[name] = None if share is None else share.value
-        figures[f"{name}_low"], figures[f"{name}_high"] = (None, None) if share is None else share.interval
-    return figures
-
-
 def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
-    """One table for each kind of cell, with all cells of that kind pooled.
-
-    Returns:
-        Tables with a section for each estimator and a row for each quantity.
-    """
+    """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     tables = []
     trials = results.trials()
     for group, cells in groups_of(results.grid).items():
@@ -244,11 +209,7 @@ def _section(result: Table, results: Results, name: str, cells: Sequence[int], *
 
 
 def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
-    """Figures of cells taken together, as text.
-
-    Returns:
-        RMSE over the bound, the worst cell's, bias over the bound, and the shares covered and failed in %.
-    """
+    """Of cells taken together: RMSE over the bound, the worst cell's, bias over the bound, % covered and failed."""
     scores = [score(trials) for trials in every]
     worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
     scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
@@ -267,11 +228,7 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
 
 
 def cell_tables(results: Results) -> list[Table]:
-    """One table for each cell.
-
-    Returns:
-        Tables with a section for each estimator and a row for each quantity.
-    """
+    """One table for each cell: a section for each estimator, a row for each quantity."""
     trials = results.trials()
     tables = []
     for index, cell in enumerate(results.grid.cells):
@@ -307,35 +264,23 @@ def _share(share: Proportion | None) -> str:
 
 
 def worse_table(verdict: Verdict) -> Table:
-    """The findings that are worse, the most significant first.
-
-    Returns:
-        A table; without rows where none is worse.
-    """
+    """The findings that are worse, the most significant first."""
     result = table(
         "Worse than the baseline",
         *("estimator", "", "aspect", "before", "now", "p", "where"),
         right=("before", "now", "p"),
     )
     for finding in verdict.worse[:_SHOWN_WORSE]:
-        before, now = _before_and_now(finding)
+        change = finding.change
+        if change.aspect in ("bias", "spread"):
+            before, now = significant(change.before, 3), significant(change.now, 3)
+        else:
+            before, now = f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
         result.add_row(
-            Text(finding.estimator),
-            NAMES[finding.quantity],
-            finding.change.aspect,
-            before,
-            now,
-            f"{finding.change.p_value:.1g}",
+            Text(finding.estimator), NAMES[finding.quantity], change.aspect, before, now, f"{change.p_value:.1g}",
             Text(finding.where),
-        )
+        )  # fmt: skip
     return result
-
-
-def _before_and_now(finding: Finding) -> tuple[str, str]:
-    change = finding.change
-    if change.aspect in ("bias", "spread"):
-        return significant(change.before, 3), significant(change.now, 3)
-    return f"{100 * change.before:.1f} %", f"{100 * change.now:.1f} %"
 
 
 def verdict_lines(verdict: Verdict) -> list[str]:
@@ -363,9 +308,8 @@ def verdict_lines(verdict: Verdict) -> list[str]:
 def score_figure(results: Results) -> Figure:
     """RMSE over the bound and coverage of 95 % intervals, with the sampling errors' 95 % intervals.
 
-    Returns:
-        For each kind of cell two rows of panels, one panel for each estimator. Cells are in rows, in the grid's
-        order, so that reading across compares the estimators; quantities differ in colour and marker.
+    Each kind of cell has two rows of panels, one panel for each estimator. Cells are in rows, in the order of
+    the grid, so that reading across compares the estimators; quantities differ in colour and marker.
     """
     kinds = [cell.kind for cell in results.grid.cells]
     groups = {
@@ -393,9 +337,25 @@ def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], 
         for place, quantity in enumerate(quantities):
             scores = [score(trials[name, cell, quantity]) for cell in cells]
             shift = 0.36 * ((place + 0.5) / len(quantities) - 0.5)
-            draw = _coverage if covered else _errors
-            style = {"color": COLOURS[place], "marker": MARKERS[place], "label": NAMES[quantity]}
-            draw(axes, scores, shift, style)
+            spans: Any
+            if covered:
+                shares = [(row + shift, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
+                rows, values = (
+                    [row for row, _ in shares],
+                    np.array([100 * share.value for _, share in shares]),
+                )
+                ends = 100 * np.array([share.interval for _, share in shares]).reshape(-1, 2)
+                spans = np.maximum(np.stack((values - ends[:, 0], ends[:, 1] - values)), 0.0)
+            else:
+                errors = [
+                    (row + shift, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound
+                ]
+                rows, values = [row for row, _ in errors], np.array([error.value for _, error in errors])
+                spans = [min(INTERVAL * error.std, 0.9 * error.value) for _, error in errors]
+            axes.errorbar(
+                values, rows, xerr=spans, color=COLOURS[place], marker=MARKERS[place], label=NAMES[quantity],
+                linestyle="none", markersize=3.0, elinewidth=0.8,
+            )  # fmt: skip
         axes.set_title(name.replace("_", " "), loc="center", fontsize=8)
         axes.tick_params(axis="y", length=0)
         grid(axes, "x")
@@ -413,36 +373,16 @@ def _block(part: SubFigure, results: Results, group: str, cells: Sequence[int], 
     part.legend(handles, names, loc="upper right", ncols=len(names), borderaxespad=0.0)
 
 
-def _errors(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
-    points = [(row, s.rmse_over_bound) for row, s in enumerate(scores) if s.rmse_over_bound is not None]
-    axes.errorbar(
-        [figure.value for _, figure in points],
-        [row + shift for row, _ in points],
-        xerr=[min(INTERVAL * figure.std, 0.9 * figure.value) for _, figure in points],
-        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
-    )  # fmt: skip
-
-
-def _coverage(axes: Axes, scores: Sequence[Score], shift: float, style: dict[str, Any]) -> None:
-    points = [(row, s.coverage) for row, s in enumerate(scores) if s.coverage is not None]
-    value = np.array([100 * share.value for _, share in points])
-    ends = 100 * np.array([share.interval for _, share in points]).reshape(-1, 2)
-    spans = np.maximum(np.stack((value - ends[:, 0], ends[:, 1] - value)), 0.0)
-    axes.errorbar(
-        value,
-        [row + shift for row, _ in points],
-        xerr=spans,
-        linestyle="none", markersize=3.0, elinewidth=0.8, **style,
-    )  # fmt: skip
-
-
 def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
-    """The conditions of cells of one kind in a few words.
-
-    Returns:
-        What distinguishes each cell from the others; and what is common to all.
-    """
-    parts = [_parts(cell) for cell in cells]
+    """What distinguishes each cell of one kind from the others, in a few words, and what is common."""
+    parts = []
+    for cell in cells:
+        noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
+        effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
+        if cell.kind == "decay":
+            parts.append((f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration))
+        else:
+            parts.append((f"{cell.wind_speed:g} m/s", noise, duration, effect))
     if len(parts) == 1:
         return [", ".join(filter(None, parts[0]))], ""
     varied = [len(set(column)) > 1 for column in zip(*parts, strict=True)]
@@ -452,11 +392,3 @@ def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
         for texts in parts
     ]
     return labels, ", ".join(common)
-
-
-def _parts(cell: Cell) -> tuple[str, ...]:
-    noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
-    if cell.kind == "decay":
-        return (f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration)
-    effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
-    return (f"{cell.wind_speed:g} m/s", noise, duration, effect)

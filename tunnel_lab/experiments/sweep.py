@@ -1,4 +1,4 @@
-"""A sweep: its file, which is checked before anything is simulated, and its folder, where finished shards are kept.
+"""A sweep: its shards, which are pure functions of the sweep and their numbers, and the folder that keeps them.
 
 ``sweep.json`` in the folder describes the sweep. Every shard is a file in ``results``, and one in ``records`` where
 these are stored. Files are written under a temporary name and renamed, results last: the shard is then finished.
@@ -9,189 +9,264 @@ checksum is repeated. ``timings`` are separate, because they differ every time.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import os
+import platform
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, lru_cache, partial
+from importlib.metadata import version
+from itertools import pairwise
+from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import polars as pl
 
-from identification.estimators import ALL_ESTIMATORS
+from identification import identify
+from identification.estimate import PARAMETERS, UNITS
+from identification.estimators import make_estimator
 from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
-from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase, SweepDocument, check_sweep_size
+from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
-from tunnel_sim.files.plan_file import check_conditions, first_twice
 from tunnel_sim.files.reading import as_described, frame_schema, read_frame, read_json, read_regular
-from tunnel_sim.files.rig_file import parse_rig, rig_document
-from tunnel_sim.files.toml_input import load_toml, shown, validate
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
-from tunnel_sim.physics.run_settings import sampling
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 
 if TYPE_CHECKING:
-    import polars as pl
+    from identification.estimate import Estimate, RunEstimate
+    from tunnel_sim.vocabulary.campaign import Campaign
 
-    from tunnel_lab.experiments.sweep_shards import Finished
 
-
-_AXES = ("rig", "conditions", "sensor", "truth", "effects")
 SCHEMA_VERSION = 1
 MANIFEST = "sweep.json"
 RESULTS, RECORDS, TIMINGS, CHECKSUMS = "results", "records", "timings", "checksums"
 _ELSEWHERE = "name another --out"
-_TIMING_COLUMNS = ("step", "runs", "seconds")
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""The last bit of sums in a linear algebra library depends on its number of threads; a shard uses one."""
+_PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy", "polars")
+NOT_SIMULATED, SIMULATED, REFUSED, RAISED = "not_simulated", "simulated", "refused", "raised"
+RUN_QUANTITIES: Mapping[str, str] = {"omega_n": "rad/s", "zeta": "1"}
+CAMPAIGN_QUANTITIES: Mapping[str, str] = {**{name: UNITS[name] for name in PARAMETERS}, "sensor_zero": "rad"}
+CASE_COLUMNS: Mapping[str, Any] = {
+    **dict.fromkeys(("case", "replicate"), pl.UInt32),
+    "seed": pl.Int64,
+    **dict.fromkeys(("rig", "conditions"), pl.String),
+    **dict.fromkeys(("duration", "sample_rate", "noise_std", "resolution"), pl.Float64),
+    "effect": pl.String,
+    "severity": pl.Float64,
+    "effect_parameters": pl.String,
+    **dict.fromkeys(("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping", "sensor_zero"), pl.Float64),
+}
+"""The simulated case; coefficients and zero are the injected ones."""
+RESULT_COLUMNS: Mapping[str, Any] = {
+    **CASE_COLUMNS,
+    **dict.fromkeys(("estimator", "run"), pl.String),
+    **dict.fromkeys(("spring_stiffness", "wind_speed", "release_angle"), pl.Float64),
+    **dict.fromkeys(("quantity", "unit"), pl.String),
+    **dict.fromkeys(("truth", "value", "std"), pl.Float64),
+    **dict.fromkeys(("status", "message"), pl.String),
+}
+RECORD_COLUMNS: Mapping[str, Any] = {
+    "case": pl.UInt32,
+    "run": pl.String,
+    **dict.fromkeys(("wind_speed", "spring_stiffness", "sample_rate"), pl.Float64),
+    "yaw_rad": pl.List(pl.Float64),
+}
+TIMING_COLUMNS: Mapping[str, Any] = {
+    "shard": pl.UInt32,
+    "step": pl.String,
+    **dict.fromkeys(("cases", "runs"), pl.UInt32),
+    "seconds": pl.Float64,
+}
+_READ_TIMINGS = ("step", "runs", "seconds")
 
 
-def read_sweep(path: Path) -> Sweep:
-    """Read and check a sweep file.
+@dataclass(frozen=True)
+class Finished:
+    """A finished shard, ready to be written: Parquet files, versions, and the number of estimates that raised.
+
+    Results and records (None where they are not stored) do not depend on where or when the shard is done; the times
+    differ every time.
+    """
+
+    index: int
+    results: bytes
+    records: bytes | None
+    timings: bytes
+    made_with: Mapping[str, str]
+    crashes: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a case has no estimate: `NOT_SIMULATED`, `REFUSED` or `RAISED`, and the message."""
+
+    status: str
+    message: str
+
+
+@cache
+def made_with() -> dict[str, str]:
+    """Versions and processor that the bits of a result depend on."""
+    return {**{name: version(name) for name in _PACKAGES}, "machine": platform.machine()}
+
+
+_sweep = lru_cache(maxsize=2)(Sweep.from_json)
+_estimator = lru_cache(maxsize=16)(make_estimator)
+
+
+def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
+    """Simulate the cases of a shard together, and estimate them one by one.
 
     Args:
-        path: a TOML file; paths of rig files are relative to its folder.
-
-    Raises:
-        TunnelError: for the first error, in one line that names file, key and remedy.
+        sweep: as `Sweep.to_json` gives it.
+        nthread: threads that simulate; the result is the same to the bit whatever their number.
     """
-    content = load_toml(path, missing="name a sweep file, see docs/how-to/sweep.md")
-    where = shown(path)
-    document = _named(validate(SweepDocument, content, path))
-    _check_names(document, where)
-    for conditions in document.conditions:
-        check_conditions(conditions, f"{where}, conditions '{conditions.name}'")
-    check_sweep_size(document, where)
-    rigs = tuple(_rig(table.file, table.changes, path.parent) for table in document.rig)
-    for table, sections in zip(document.rig, rigs, strict=True):
-        parse_rig(sections, f"{where}, rig '{table.name}'")
-    sweep = Sweep(_without_sources(document), rigs)
-    _check_axes(sweep, where)
-    _check_cases(sweep, where)
-    return sweep
+    plan = _sweep(sweep)
+    marks = [("begun", time.perf_counter())]
+    cases = list(plan.shard(index))
+    groups: dict[tuple[str, float], list[SweepCase]] = {}
+    for case in cases:
+        groups.setdefault((case.rig_name, case.plan.sensor.sample_rate), []).append(case)
+    done: dict[int, Campaign | Failure] = {}
+    for group in groups.values():
+        done.update(zip((case.index for case in group), _simulate(group, nthread), strict=True))
+    campaigns = [(case, done[case.index]) for case in cases]
+    marks.append(("simulate", time.perf_counter()))
+    answers: list[tuple[SweepCase, str | None, Estimate | Failure | None]] = []
+    for name in plan.document.estimators:
+        answers += [(case, name, _estimate(campaign, name)) for case, campaign in campaigns]
+        marks.append((name, time.perf_counter()))
+    if not plan.document.estimators:
+        answers = [
+            (case, None, campaign if isinstance(campaign, Failure) else None) for case, campaign in campaigns
+        ]
+    answers.sort(key=lambda answer: answer[0].index)  # the estimators of one case keep their order
+    results = _parquet([row for answer in answers for row in estimate_rows(*answer)], RESULT_COLUMNS)
+    records = None
+    if plan.document.records:
+        rows = [
+            (case.index, run.id, run.wind_speed, run.spring_stiffness, case.plan.sensor.sample_rate,
+             pl.Series(run.record.yaw_rad))
+            for case, campaign in campaigns
+            if not isinstance(campaign, Failure)
+            for run in campaign.runs
+        ]  # fmt: skip
+        records = _parquet(rows, RECORD_COLUMNS)
+    marks.append(("pack", time.perf_counter()))
+    runs = sum(len(case.plan.conditions) for case in cases)
+    timings = [(index, step, len(cases), runs, end - start) for (_, start), (step, end) in pairwise(marks)]
+    return Finished(
+        index=index,
+        results=results,
+        records=records,
+        timings=_parquet(timings, TIMING_COLUMNS),
+        made_with={**made_with(), "threads": os.environ.get(ONE_THREAD[0], "several")},
+        crashes=sum(isinstance(found, Failure) and found.status == RAISED for _, _, found in answers),
+    )
 
 
-def _named(document: SweepDocument) -> SweepDocument:
-    """The same, with a name for every table of conditions."""
-    many = len(document.conditions) > 1
-    conditions = [
-        table.model_copy(update={"name": table.name or (f"conditions-{place}" if many else "conditions")})
-        for place, table in enumerate(document.conditions, 1)
-    ]
-    return document.model_copy(update={"conditions": conditions})
+def _simulate(cases: Sequence[SweepCase], nthread: int) -> Sequence[Campaign | Failure]:
+    """Simulate cases of one rig and sample rate; one bad case must not stop the others."""
+    from tunnel_sim.engine.virtual_campaign import simulate_campaigns
 
-
-def _without_sources(document: SweepDocument) -> SweepDocument:
-    """The same without the files and changes of the rigs, which are stored separately."""
-    names = [table.model_copy(update={"file": None, "changes": {}}) for table in document.rig]
-    return document.model_copy(update={"rig": names})
-
-
-def _check_names(document: SweepDocument, where: str) -> None:
-    for name in document.estimators:
-        if name not in ALL_ESTIMATORS:
-            raise TunnelError(
-                f"unknown estimator '{name}'", where=where, remedy=did_you_mean(name, ALL_ESTIMATORS)
-            )
-    if not document.estimators and not document.records:
-        raise TunnelError(
-            "neither estimators nor records: there would be no result",
-            where=where,
-            remedy="name an estimator, or set records = true",
-        )
-    for key, names in (
-        ("estimators", document.estimators),
-        ("rig", [table.name for table in document.rig]),
-        ("conditions", [str(table.name) for table in document.conditions]),
-    ):
-        twice = first_twice(names)
-        if twice is not None:
-            raise TunnelError(f"{key} has '{twice}' twice", where=where, remedy="give each its own name")
-    for entry in document.effects:
-        if entry.name == NO_EFFECT and (entry.parameters or entry.together_with):
-            raise TunnelError(
-                f"'{NO_EFFECT}' takes no other key",
-                where=f"{where}, effects",
-                remedy="name an effect, or give the name only",
-            )
-        for name in (entry.name, *(other.name for other in entry.together_with)):
-            if name != NO_EFFECT or entry.together_with:
-                with _in(where):
-                    effect_class(name)
-
-
-def _rig(file: str | None, changes: Mapping[str, Mapping[str, Any]], folder: Path) -> dict[str, Any]:
-    """Sections of a rig with the changes, key by key."""
-    sections = rig_document(None if file is None else folder / file)
-    for name, table in changes.items():
-        old = sections.get(name, {})
-        # Anything but a table is left for the rig's own check to refuse.
-        sections[name] = {**old, **table} if isinstance(old, dict) else old
-    return sections
-
-
-def _check_axes(sweep: Sweep, where: str) -> None:
-    """Refuse a value that occurs twice in an axis: it would repeat the same records."""
-    axes: Iterable[tuple[str, Sequence[Any]]] = zip(_AXES, (sweep.rigs, *sweep.axes[1:]), strict=True)
-    for name, values in axes:
-        seen: set[str] = set()
-        for value in values:
-            physics = {k: v for k, v in value.items() if k != "name"} if name == "conditions" else value
-            text = json.dumps(physics, sort_keys=True)
-            if text in seen:
-                raise TunnelError(
-                    f"{name} holds a value twice",
-                    where=where,
-                    remedy="remove one, and use replicates for more runs",
-                )
-            seen.add(text)
-
-
-def _check_cases(sweep: Sweep, where: str) -> None:
-    """Refuse what the simulator would refuse: check every sensor and effect with each rig and conditions."""
-    from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
-
-    for case in _cases(sweep, "sensor", where):
-        with _in(where):
-            sampling(run_settings(case.plan.truth, case.plan.conditions[0]), case.plan.sensor.sample_rate)
-    for case in _cases(sweep, "effects", where):
-        with _in(where):
-            plan_effects(case.plan)
-
-
-def _cases(sweep: Sweep, axis: str, where: str) -> Iterable[SweepCase]:
-    """Cases that combine every value of an axis with every rig and conditions."""
-    lengths = tuple(map(len, sweep.axes))
-    wanted = (*_AXES[:2], axis)
-    for places in np.ndindex(tuple(lengths[_AXES.index(name)] for name in wanted)):
-        place = [0] * len(lengths)
-        for name, value in zip(wanted, places, strict=True):
-            place[_AXES.index(name)] = value
-        point = int(np.ravel_multi_index(tuple(place), lengths))
-        with _in(where):
-            case = sweep.case(point * sweep.document.replicates)
-        yield case
-
-
-@contextmanager
-def _in(where: str) -> Iterator[None]:
-    """Add the file to errors."""
     try:
-        yield
+        return simulate_campaigns([case.plan for case in cases], cases[0].rig, nthread=nthread)
     except TunnelError as error:
-        place = error.where if where in error.where else ", ".join(filter(None, (where, error.where)))
-        raise TunnelError(error.what, where=place, remedy=error.remedy) from None
+        if len(cases) == 1:
+            return [Failure(NOT_SIMULATED, one_line(error))]
+    half = len(cases) // 2
+    return [*_simulate(cases[:half], nthread), *_simulate(cases[half:], nthread)]
+
+
+def _estimate(campaign: Campaign | Failure, name: str) -> Estimate | Failure:
+    """An estimate, or why there is none: one bad case must not stop the sweep."""
+    if isinstance(campaign, Failure):
+        return campaign
+    try:
+        return identify(campaign, _estimator(name), throw=False)
+    except TunnelError as error:
+        return Failure(REFUSED, one_line(error))
+    except Exception as error:
+        return Failure(RAISED, one_line(f"{type(error).__name__}: {error}"))
+
+
+def _parquet(rows: Sequence[tuple[Any, ...]], columns: Mapping[str, Any]) -> bytes:
+    buffer = io.BytesIO()
+    pl.DataFrame(rows, schema=dict(columns), orient="row").write_parquet(buffer, compression="zstd")
+    return buffer.getvalue()
+
+
+def estimate_rows(
+    case: SweepCase, estimator: str | None, outcome: Estimate | Failure | None
+) -> Iterator[tuple[Any, ...]]:
+    """The rows of one estimator's answer to one case.
+
+    Args:
+        estimator: its name; None where the case was only simulated.
+        outcome: its estimate, or why there is none; None where the case was only simulated.
+
+    Yields:
+        Values of `RESULT_COLUMNS`, in their order: of the runs, then of the campaign.
+    """
+    plan, sensor, truth, conditions = case.plan, case.plan.sensor, case.plan.truth, case.plan.conditions
+    severity = 0.0
+    if plan.effects:
+        first = plan.effects[0]
+        severity = float(first.parameters[effect_class(first.name).parameters()[0].name])
+    parameters = " ".join(  # as ``--effect`` takes them
+        f"{effect.name}:" + ",".join(f"{name}={value!r}" for name, value in effect.parameters.items())
+        for effect in plan.effects
+    )
+    head = (
+        case.index, case.replicate, plan.seed, case.rig_name, case.conditions, case.duration, sensor.sample_rate,
+        sensor.noise_std, sensor.resolution, " + ".join(effect.name for effect in plan.effects) or NO_EFFECT,
+        severity, parameters, truth.cn_beta, truth.cn_r, truth.yaw_inertia, truth.mechanical_damping, sensor.zero,
+        estimator,
+    )  # fmt: skip
+    answer = None if isinstance(outcome, Failure) else outcome
+    status, message = (outcome.status, outcome.message) if isinstance(outcome, Failure) else (SIMULATED, None)
+    for place, condition in enumerate(conditions):
+        run = answer.runs[place] if answer else None
+        # Of the nominal model at small angles; there is no oscillation where its stiffness is not positive.
+        air = case.rig.body.flow(condition.air_density, condition.wind_speed)
+        stiffness = condition.spring_stiffness - aerodynamic_stiffness(truth.cn_beta, **air)
+        damping = truth.mechanical_damping - aerodynamic_damping(truth.cn_r, **air)
+        truths: dict[str, float | None] = {"omega_n": None, "zeta": None}
+        if stiffness > 0.0:
+            omega_n = sqrt(stiffness / truth.yaw_inertia)
+            truths = {"omega_n": omega_n, "zeta": damping / (2.0 * truth.yaw_inertia * omega_n)}
+        given = (condition.id, condition.spring_stiffness, condition.wind_speed, condition.release_angle)
+        found = run.status.name.lower() if run else status
+        for name, unit in RUN_QUANTITIES.items():
+            yield (*head, *given, name, unit, truths[name], *_figures(run, name), found, message)
+    # Spring, wind-on speed and release angle of the campaign, each where the campaign has only one.
+    kinds = (
+        {condition.spring_stiffness for condition in conditions},
+        {condition.wind_speed for condition in conditions if condition.wind_speed > 0.0} or {0.0},
+        {condition.release_angle for condition in conditions},
+    )
+    common = (None, *(next(iter(kind)) if len(kind) == 1 else None for kind in kinds))
+    injected = {**vars(truth), "sensor_zero": sensor.zero}
+    found = answer.status.name.lower() if answer else status
+    for name, unit in CAMPAIGN_QUANTITIES.items():
+        yield (*head, *common, name, unit, injected[name], *_figures(answer, name), found, message)
+
+
+def _figures(owner: Estimate | RunEstimate | None, name: str) -> tuple[float | None, float | None]:
+    quantity = getattr(owner, name, None)
+    return (None, None) if quantity is None else (quantity.value, quantity.std)
 
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of one sweep.
-
-    Args:
-        folder: an existing folder with the ``sweep.json`` of the sweep.
-        made_with: versions that its results are made with.
-    """
+    """The folder of one sweep, which has its ``sweep.json``, and the versions that its results are made with."""
 
     folder: Path
     sweep: Sweep
@@ -201,118 +276,107 @@ class Store:
         """Shards whose parts exist and match their checksums, in ascending order."""
         return [index for index in range(self.sweep.shards) if self._is_whole(index)]
 
-    def keep(self, shard: Finished) -> None:
-        """Write a finished shard.
-
-        Raises:
-            TunnelError: when it was made with other versions, or cannot be written.
-        """
-        wanted = {**self.made_with, "threads": "1"}
-        odd = next((name for name, value in wanted.items() if shard.made_with.get(name) != value), None)
-        if odd is not None:
-            raise TunnelError(
-                f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep uses {wanted[odd]}",
-                where=shown(self.folder),
-                remedy="give every worker the same environment (threads: OMP_NUM_THREADS=1)",
-            )
-        lines = self._line(RESULTS, shard.index, shard.results)
-        if shard.records is not None:
-            write_whole(self._part(RECORDS, shard.index), shard.records)
-            lines += self._line(RECORDS, shard.index, shard.records)
-        write_whole(self._part(TIMINGS, shard.index), shard.timings)
-        write_whole(self._checksum(shard.index), lines.encode())
-        write_whole(self._part(RESULTS, shard.index), shard.results)
-
-    def tidy(self) -> None:
-        """Remove partial files that a killed run left."""
-        for name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS):
-            clear_leftovers(self.folder / name)
-
-    def timings(self) -> pl.DataFrame:
-        """The times of the finished shards; a shard whose times were removed is left out.
-
-        Returns:
-            Columns ``step``, ``runs`` and ``seconds``, with a row for each step of each shard.
-
-        Raises:
-            TunnelError: when one is damaged.
-        """
-        import polars as pl
-
-        from tunnel_lab.experiments.sweep_shards import TIMING_COLUMNS
-
-        paths = [self._part(TIMINGS, index) for index in self.finished()]
-        used = {name: TIMING_COLUMNS[name] for name in _TIMING_COLUMNS}
-        return pl.concat(
-            [pl.DataFrame(schema=used), *(_read_timing(path) for path in paths if path.exists())]
-        )
-
-    def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
-        """The rows of the finished shards, in the order of the cases.
-
-        Args:
-            dataset: ``results`` or ``records``.
-
-        Raises:
-            TunnelError: when there is none yet.
-        """
-        import polars as pl
-
-        parts = [self._part(dataset, index) for index in self.finished()]
-        if not parts or not all(path.exists() for path in parts):
-            raise TunnelError(
-                f"there are no {dataset}",
-                where=shown(self.folder),
-                remedy="run the sweep first" if not parts else "set records = true in the sweep file",
-            )
-        return pl.scan_parquet(parts)
-
-    def _part(self, dataset: str, index: int) -> Path:
-        return self.folder / dataset / f"{self._name(index)}.parquet"
-
-    def _checksum(self, index: int) -> Path:
-        return self.folder / CHECKSUMS / f"{self._name(index)}.sha256"
-
-    def _name(self, index: int) -> str:
-        width = max(5, len(str(self.sweep.shards - 1)))
-        return f"part-{index:0{width}d}"
-
-    def _line(self, dataset: str, index: int, content: bytes) -> str:
-        """The line of ``sha256sum`` for a part."""
-        name = self._part(dataset, index).relative_to(self.folder).as_posix()
-        return f"{hashlib.sha256(content).hexdigest()}  {name}\n"
-
     def _is_whole(self, index: int) -> bool:
-        """Whether the parts of a shard exist and match their checksums."""
-        if not self._checksum(index).exists():
+        checksum = self._file(CHECKSUMS, index)
+        if not checksum.exists():
             return False
         kept = (RESULTS, RECORDS) if self.sweep.document.records else (RESULTS,)
         try:
-            known = read_regular(self._checksum(index), limits.DOCUMENT_BYTES)
-            parts = {name: read_regular(self._part(name, index), limits.DATA_BYTES) for name in kept}
+            known = read_regular(checksum, limits.DOCUMENT_BYTES)
+            parts = {name: read_regular(self._file(name, index), limits.DATA_BYTES) for name in kept}
         except TunnelError:
             return False
         return known == "".join(self._line(name, index, part) for name, part in parts.items()).encode()
 
+    def _file(self, dataset: str, index: int) -> Path:
+        width = max(5, len(str(self.sweep.shards - 1)))
+        suffix = "sha256" if dataset == CHECKSUMS else "parquet"
+        return self.folder / dataset / f"part-{index:0{width}d}.{suffix}"
+
+    def _line(self, dataset: str, index: int, content: bytes) -> str:
+        """The line of ``sha256sum`` for a part."""
+        name = self._file(dataset, index).relative_to(self.folder).as_posix()
+        return f"{hashlib.sha256(content).hexdigest()}  {name}\n"
+
+    def keep(self, shard: Finished) -> None:
+        """Write a finished shard; a `TunnelError` when it was made with other versions, or cannot be written."""
+        wanted = {**self.made_with, "threads": "1"}
+        odd = _first_difference(wanted, {name: shard.made_with.get(name) for name in wanted})
+        if odd:
+            what = f"a worker has {odd} {shard.made_with.get(odd)}, but this sweep uses {wanted[odd]}"
+            remedy = "give every worker the same environment (threads: OMP_NUM_THREADS=1)"
+            raise TunnelError(what, where=shown(self.folder), remedy=remedy)
+        lines = self._line(RESULTS, shard.index, shard.results)
+        if shard.records is not None:
+            write_whole(self._file(RECORDS, shard.index), shard.records)
+            lines += self._line(RECORDS, shard.index, shard.records)
+        write_whole(self._file(TIMINGS, shard.index), shard.timings)
+        write_whole(self._file(CHECKSUMS, shard.index), lines.encode())
+        write_whole(self._file(RESULTS, shard.index), shard.results)
+
+    def timings(self) -> pl.DataFrame:
+        """Step, runs and seconds of each step of the finished shards; a shard whose times were removed is left out.
+
+        Raises:
+            TunnelError: when a file of times is damaged.
+        """
+        frames = [pl.DataFrame(schema={name: TIMING_COLUMNS[name] for name in _READ_TIMINGS})]
+        remedy = "remove it: no result depends on it"
+        for path in filter(Path.exists, (self._file(TIMINGS, index) for index in self.finished())):
+            # They have no checksum, so the file may be anything: a FIFO would block Polars.
+            where, content = shown(path), read_regular(path, limits.DATA_BYTES, readable=remedy)
+            with as_described("is not a table of times", where, remedy):
+                schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
+                if missing := [name for name in _READ_TIMINGS if name not in schema]:
+                    raise ValueError(f"no column {missing[0]}")
+                frames.append(read_frame(content, where, remedy, _READ_TIMINGS))
+        return pl.concat(frames)
+
+    def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
+        """The results or records of the finished shards, in the order of the cases.
+
+        Raises:
+            TunnelError: when there are none yet.
+        """
+        parts = [self._file(dataset, index) for index in self.finished()]
+        if not parts or not all(path.exists() for path in parts):
+            remedy = "run the sweep first" if not parts else "set records = true in the sweep file"
+            raise TunnelError(f"there are no {dataset}", where=shown(self.folder), remedy=remedy)
+        return pl.scan_parquet(parts)
+
 
 def begin(sweep: Sweep, folder: Path) -> Store:
-    """The folder of a sweep, which may be new.
-
-    Args:
-        folder: created where it is missing.
+    """The folder of a sweep, which is created where it is missing.
 
     Raises:
         TunnelError: when the folder holds another sweep or something else, or cannot be written.
     """
-    from tunnel_lab.experiments.sweep_shards import made_with
-
+    where, versions = shown(folder), made_with()
     if (folder / MANIFEST).is_file():
         store = open_store(folder)
-        _check_same(store, sweep, made_with())
+        old, new = (json.loads(each.to_json()) for each in (store.sweep, sweep))
+        if old != new:
+            key = _first_difference(
+                {**old["document"], "rig": old["rigs"]}, {**new["document"], "rig": new["rigs"]}
+            )
+            raise TunnelError(
+                f"the folder holds sweep '{store.sweep.document.name}', whose {key} differs from the file's",
+                where=where,
+                remedy=f"{_ELSEWHERE}, or undo the change",
+            )
+        if key := _first_difference(store.made_with, versions):
+            raise TunnelError(
+                f"the sweep was begun with {key} {store.made_with.get(key)}, and this is {versions.get(key)}",
+                where=where,
+                remedy=f"{_ELSEWHERE}, or go back to that version",
+            )
     else:
         clear_leftovers(folder)
-        if folder.is_dir() and not all(map(_is_begun, folder.iterdir())):
-            raise TunnelError("the folder holds something else", where=shown(folder), remedy=_ELSEWHERE)
+        # A sweep that was stopped before its ``sweep.json`` was written may have left empty folders.
+        for path in folder.iterdir() if folder.is_dir() else ():
+            dataset = path.name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS) and path.is_dir()
+            if not (dataset and not any(path.iterdir())) and not path.name.startswith(f".{MANIFEST}."):
+                raise TunnelError("the folder holds something else", where=where, remedy=_ELSEWHERE)
         output_folder(folder)
         document = {
             "schema_version": SCHEMA_VERSION,
@@ -320,29 +384,22 @@ def begin(sweep: Sweep, folder: Path) -> Store:
             "cases": sweep.size,
             "runs": sweep.runs,
             "shards": sweep.shards,
-            "made_with": made_with(),
+            "made_with": versions,
             "sweep": json.loads(sweep.to_json()),
         }
         write_json(folder / MANIFEST, document)  # first: what is stopped afterwards is continued
-        store = Store(folder, sweep, made_with())
+        store = Store(folder, sweep, versions)
     for name in (RESULTS, TIMINGS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
         output_folder(folder / name)
     return store
 
 
-def _is_begun(path: Path) -> bool:
-    """Whether a sweep that was stopped before its ``sweep.json`` was written may have left this."""
-    empty_dataset = (
-        path.name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS) and path.is_dir() and not any(path.iterdir())
-    )
-    return empty_dataset or path.name.startswith(f".{MANIFEST}.")
+def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    return next((key for key in {**old, **new} if old.get(key) != new.get(key)), "")
 
 
 def open_store(folder: Path) -> Store:
     """Open the folder of a sweep, finished or not.
-
-    Args:
-        folder: as given to `begin`.
 
     Raises:
         TunnelError: when it holds no sweep, or one that is malformed or of another version of the format.
@@ -358,50 +415,9 @@ def open_store(folder: Path) -> Store:
         return Store(folder, Sweep.from_json(json.dumps(document["sweep"])), made_with)
 
 
-def _read_timing(path: Path) -> pl.DataFrame:
-    """The times of one shard. They have no checksum, so the file may be anything: a FIFO would block Polars."""
-    where, remedy = shown(path), "remove it: no result depends on it"
-    content = read_regular(path, limits.DATA_BYTES, readable=remedy)
-    with as_described("is not a table of times", where, remedy):
-        schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
-        if missing := [name for name in _TIMING_COLUMNS if name not in schema]:
-            raise ValueError(f"no column {missing[0]}")
-        return read_frame(content, where, remedy, _TIMING_COLUMNS)
-
-
-def _check_same(store: Store, sweep: Sweep, versions: Mapping[str, str]) -> None:
-    where = shown(store.folder)
-    old, new = (json.loads(each.to_json()) for each in (store.sweep, sweep))
-    if old != new:
-        key = _first_difference(
-            {**old["document"], "rig": old["rigs"]}, {**new["document"], "rig": new["rigs"]}
-        )
-        raise TunnelError(
-            f"the folder holds sweep '{store.sweep.document.name}', whose {key} differs from the file's",
-            where=where,
-            remedy=f"{_ELSEWHERE}, or undo the change",
-        )
-    key = _first_difference(dict(store.made_with), dict(versions))
-    if key:
-        raise TunnelError(
-            f"the sweep was begun with {key} {store.made_with.get(key)}, and this is {versions.get(key)}",
-            where=where,
-            remedy=f"{_ELSEWHERE}, or go back to that version",
-        )
-
-
-def _first_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-    return next((key for key in {**old, **new} if old.get(key) != new.get(key)), "")
-
-
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a sweep.
-
-    Args:
-        found: number of shards that were finished already.
-        crashes: number of estimates that raised an exception, in the shards done now.
-    """
+    """The outcome of a sweep: shards found finished, and estimates that raised an exception in those done now."""
 
     store: Store
     found: int
@@ -409,35 +425,30 @@ class Outcome:
 
 
 def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress | None = None) -> Outcome:
-    """Do the rest of a sweep.
+    """Do the rest of a sweep; all results are then complete.
 
     Args:
         progress: called with the number of finished cases and of all cases, at the start and after each shard.
 
-    Returns:
-        The outcome; all results are then complete.
-
     Raises:
         TunnelError: when the folder belongs to another sweep, or the work cannot be done.
     """
-    from tunnel_lab.experiments.sweep_shards import run_shard
-
     store = begin(sweep, folder)
-    finished = set(store.finished())
     crashes = []
 
     def keep(_: int, shard: Finished) -> None:
         store.keep(shard)
         crashes.append(shard.crashes)
 
-    kept = run_tasks(
+    found = run_tasks(
         partial(run_shard, sweep.to_json()),
         range(sweep.shards),
         workers,
-        finished=finished.__contains__,
+        finished=set(store.finished()).__contains__,
         keep=keep,
         size=lambda index: min(sweep.cases_per_shard, sweep.size - index * sweep.cases_per_shard),
         progress=progress,
     )
-    store.tidy()
-    return Outcome(store, kept, sum(crashes))
+    for name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS):  # partial files that a killed run left
+        clear_leftovers(store.folder / name)
+    return Outcome(store, found, sum(crashes))

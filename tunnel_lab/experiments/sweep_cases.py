@@ -1,4 +1,4 @@
-"""The cases of a sweep: the tables of its file, and their product.
+"""The cases of a sweep: the tables of its file, which is checked before anything is simulated, and their product.
 
 The tables are those of a campaign description, with lists of the values to sweep. Every case is a campaign
 description with a seed computed from its contents.
@@ -9,16 +9,20 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from math import prod
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.terminal.inputs import NO_EFFECT
+from tunnel_sim.effects import effect_class
 from tunnel_sim.files.plan_file import (
     STEPS_PER_SECOND,
     EffectTable,
@@ -28,14 +32,26 @@ from tunnel_sim.files.plan_file import (
     Springs,
     Stiffnesses,
     WindSpeeds,
+    check_conditions,
     check_size,
+    first_twice,
     plan_from,
     run_count,
 )
 from tunnel_sim.files.reading import as_described, check_count, parse_json
-from tunnel_sim.files.rig_file import parse_rig
-from tunnel_sim.files.toml_input import NotNegative, OneLine, Positive, SampleRate, StrictModel
+from tunnel_sim.files.rig_file import parse_rig, rig_document
+from tunnel_sim.files.toml_input import (
+    NotNegative,
+    OneLine,
+    Positive,
+    SampleRate,
+    StrictModel,
+    load_toml,
+    validate,
+)
+from tunnel_sim.physics.run_settings import sampling
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, shown
 from tunnel_sim.vocabulary.plan import DEFAULT_SAMPLE_RATE, CampaignPlan
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -48,10 +64,8 @@ def _listed(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
-Many = Annotated[list[float], BeforeValidator(_listed), Field(min_length=1)]
-ManyPositive = Annotated[list[Positive], BeforeValidator(_listed), Field(min_length=1)]
-ManyRates = Annotated[list[SampleRate], BeforeValidator(_listed), Field(min_length=1)]
-ManyNotNegative = Annotated[list[NotNegative], BeforeValidator(_listed), Field(min_length=1)]
+T = TypeVar("T")
+Many = Annotated[list[T], BeforeValidator(_listed), Field(min_length=1)]
 
 
 class RigTable(StrictModel):
@@ -67,12 +81,12 @@ class RigTable(StrictModel):
 class TruthAxis(StrictModel):
     """``[truth]`` or ``[[truth]]``: coefficients to inject, each a number or a list."""
 
-    cn_beta: Many = Field(description="a number or a list of them, 1/rad")
-    cn_r: Many = Field(description="a number or a list of them, 1/rad")
-    yaw_inertia: ManyPositive | None = Field(
+    cn_beta: Many[float] = Field(description="a number or a list of them, 1/rad")
+    cn_r: Many[float] = Field(description="a number or a list of them, 1/rad")
+    yaw_inertia: Many[Positive] | None = Field(
         default=None, description="a positive number or a list of them, kg m2"
     )
-    mechanical_damping: ManyNotNegative | None = Field(
+    mechanical_damping: Many[NotNegative] | None = Field(
         default=None, description="a number or a list of them, N m s/rad, zero or more"
     )
 
@@ -80,21 +94,23 @@ class TruthAxis(StrictModel):
 class SensorAxis(StrictModel):
     """``[sensor]`` or ``[[sensor]]``: the potentiometer, each key a number or a list."""
 
-    sample_rate: ManyRates | None = Field(default=None, description="a positive number or a list of them, Hz")
-    noise_std: ManyNotNegative | None = Field(
+    sample_rate: Many[SampleRate] | None = Field(
+        default=None, description="a positive number or a list of them, Hz"
+    )
+    noise_std: Many[NotNegative] | None = Field(
         default=None, description="a number or a list of them, rad, zero or more"
     )
-    resolution: ManyNotNegative | None = Field(
+    resolution: Many[NotNegative] | None = Field(
         default=None, description="a number or a list of them, rad, zero for none"
     )
-    zero: Many | None = Field(default=None, description="a number or a list of them, rad")
+    zero: Many[float] | None = Field(default=None, description="a number or a list of them, rad")
 
 
 class EffectAxis(StrictModel):
     """``[[effects]]``: one alternative, an effect with its severities; ``none`` is the nominal model."""
 
     name: OneLine = Field(description='the name of an effect in quotes, or "none"')
-    parameters: dict[str, Many] = Field(
+    parameters: dict[str, Many[float]] = Field(
         default={}, description="a table of numbers or lists of them, such as { x = [0.1, 0.2] }"
     )
     together_with: list[EffectTable] = Field(
@@ -111,7 +127,7 @@ class ConditionsTable(StrictModel):
     wind_speeds: WindSpeeds
     release_angles_deg: ReleaseAngles
     repeats: Repeats = 1
-    duration: ManyPositive = Field(description="a positive number or a list of them, s")
+    duration: Many[Positive] = Field(description="a positive number or a list of them, s")
     air_density: Positive | None = Field(default=None, description="a positive number in kg/m3")
 
 
@@ -127,21 +143,13 @@ class SweepDocument(StrictModel):
     )
     records: bool = Field(default=False, description="true or false")
     cases_per_shard: int | None = Field(default=None, ge=1, description="a whole number, one or more")
-    rig: Annotated[list[RigTable], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        default=[RigTable()], description="[[rig]] tables"
-    )
-    conditions: Annotated[list[ConditionsTable], BeforeValidator(_listed), Field(min_length=1)] = Field(
+    rig: Many[RigTable] = Field(default=[RigTable()], description="[[rig]] tables")
+    conditions: Many[ConditionsTable] = Field(
         description="a [conditions] table with springs, wind_speeds, release_angles_deg and duration"
     )
-    sensor: Annotated[list[SensorAxis], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        default=[SensorAxis()], description="a [sensor] table"
-    )
-    truth: Annotated[list[TruthAxis], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        description="a [truth] table with cn_beta and cn_r"
-    )
-    effects: Annotated[list[EffectAxis], BeforeValidator(_listed), Field(min_length=1)] = Field(
-        default=[EffectAxis(name="none")], description="[[effects]] tables"
-    )
+    sensor: Many[SensorAxis] = Field(default=[SensorAxis()], description="a [sensor] table")
+    truth: Many[TruthAxis] = Field(description="a [truth] table with cn_beta and cn_r")
+    effects: Many[EffectAxis] = Field(default=[EffectAxis(name="none")], description="[[effects]] tables")
 
 
 @dataclass(frozen=True)
@@ -168,11 +176,7 @@ class SweepCase:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep file with its rigs, which together determine the results.
-
-    Args:
-        rigs: sections of each rig's description, in the order of the file.
-    """
+    """A sweep file with the sections of each rig's description, which together determine the results."""
 
     document: SweepDocument
     rigs: tuple[Mapping[str, Any], ...]
@@ -185,11 +189,7 @@ class Sweep:
 
     @classmethod
     def from_json(cls, text: str) -> Sweep:
-        """The inverse of `to_json`.
-
-        Raises:
-            TunnelError: when it is not a sweep, or too large.
-        """
+        """The inverse of `to_json`; a `TunnelError` when it is not a sweep, or too large."""
         where, remedy = "the sweep as JSON", "start the sweep again"
         document = parse_json(text, where, remedy)
         with as_described("is not a sweep", where, remedy):
@@ -203,12 +203,25 @@ class Sweep:
     def axes(self) -> tuple[Sequence[Any], ...]:
         """Values of rig, conditions, sensor, truth and effects; the last varies fastest."""
         file = self.document
+        conditions: list[dict[str, Any]] = []
+        for table in file.conditions:
+            kept = table.model_dump(exclude_none=True)
+            named = {"name": kept.pop("name", "conditions"), **kept}
+            conditions += [{**named, "duration": duration} for duration in table.duration]
+        effects: list[list[dict[str, Any]]] = []
+        for entry in file.effects:
+            if entry.name == NO_EFFECT:
+                effects.append([])
+                continue
+            others = [other.model_dump() for other in entry.together_with]
+            for parameters in _spread(entry.parameters):
+                effects.append([{"name": entry.name, "parameters": parameters}, *others])
         return (
             range(len(self.rigs)),
-            [value for table in file.conditions for value in _conditions(table.model_dump())],
+            conditions,
             [value for table in file.sensor for value in _spread(table.model_dump(exclude_none=True))],
             [value for table in file.truth for value in _spread(table.model_dump(exclude_none=True))],
-            [value for entry in file.effects for value in _effects(entry.model_dump())],
+            effects,
         )
 
     @property
@@ -234,24 +247,12 @@ class Sweep:
         return -(-self.size // self.cases_per_shard)
 
     def shard(self, index: int) -> Iterator[SweepCase]:
-        """The cases of a shard.
-
-        Args:
-            index: from 0.
-        """
+        """The cases of a shard, which is counted from 0."""
         start = index * self.cases_per_shard
-        for place in range(start, min(start + self.cases_per_shard, self.size)):
-            yield self.case(place)
+        return map(self.case, range(start, min(start + self.cases_per_shard, self.size)))
 
     def case(self, index: int) -> SweepCase:
-        """A case.
-
-        Args:
-            index: in the order of the product, from 0.
-
-        Returns:
-            The case, which is the same in any sweep of the same seed that contains it.
-        """
+        """A case by its place in the product, from 0; it is the same in any sweep of its seed that has it."""
         point, replicate = divmod(index, self.document.replicates)
         places = np.unravel_index(point, tuple(map(len, self.axes)))
         rig, conditions, sensor, truth, effects = (
@@ -263,40 +264,22 @@ class Sweep:
             "truth": truth,
             "effects": effects,
         }
-        seed = case_seed(self.document.seed, {"rig": self.rigs[rig], **physics}, replicate)
+        # The seed depends on what the case holds, not on its place in the product; from 0 to 2⁶³ − 1.
+        contents = json.dumps({"rig": self.rigs[rig], **physics}, sort_keys=True, allow_nan=False)
+        words = np.frombuffer(hashlib.sha256(contents.encode()).digest(), dtype="<u4").tolist()
+        sequence = np.random.SeedSequence(self.document.seed, spawn_key=(*words, replicate))
+        seed = int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
         document = {"name": f"{self.document.name}-{index}", "seed": seed, **physics}
         plan = plan_from(PlanDocument.model_validate(document), self._parsed[rig], self.document.name)
         return SweepCase(
-            index=index,
-            replicate=replicate,
-            rig_name=self.document.rig[rig].name,
-            rig=self._parsed[rig],
-            conditions=conditions["name"],
-            duration=conditions["duration"],
-            plan=plan,
-            document=document,
-        )
+            index, replicate, self.document.rig[rig].name, self._parsed[rig], conditions["name"],
+            conditions["duration"], plan, document,
+        )  # fmt: skip
 
     @cached_property
     def _parsed(self) -> tuple[Rig, ...]:
         named = zip(self.document.rig, self.rigs, strict=True)
-        return tuple(parse_rig(_numbered(sections), f"rig '{table.name}'") for table, sections in named)
-
-
-def case_seed(seed: int, physics: Mapping[str, Any], replicate: int) -> int:
-    """The seed of a case: it depends on the contents of the case, not on its place in the product.
-
-    Args:
-        physics: everything that the records of the case depend on besides the noise, as plain values.
-        replicate: number of the repetition, from 0.
-
-    Returns:
-        A number from 0 to 2⁶³ − 1, as a campaign description's ``seed``.
-    """
-    digest = hashlib.sha256(json.dumps(physics, sort_keys=True, allow_nan=False).encode()).digest()
-    words = tuple(np.frombuffer(digest, dtype="<u4").tolist())
-    sequence = np.random.SeedSequence(seed, spawn_key=(*words, replicate))
-    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+        return tuple(parse_rig(sections, f"rig '{table.name}'") for table, sections in named)
 
 
 def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
@@ -304,40 +287,23 @@ def _spread(table: Mapping[str, Sequence[float]]) -> list[dict[str, float]]:
     return [dict(zip(table, values, strict=True)) for values in product(*table.values())]
 
 
-def _conditions(table: Mapping[str, Any]) -> list[dict[str, Any]]:
-    kept = {key: value for key, value in table.items() if value is not None}
-    named = {"name": kept.pop("name", "conditions"), **kept}
-    return [{**named, "duration": duration} for duration in table["duration"]]
-
-
-def _effects(entry: Mapping[str, Any]) -> list[list[dict[str, Any]]]:
-    if entry["name"] == NO_EFFECT:
-        return [[]]
-    others = [dict(other) for other in entry["together_with"]]
-    return [
-        [{"name": entry["name"], "parameters": parameters}, *others]
-        for parameters in _spread(entry["parameters"])
-    ]
-
-
 def axis_lengths(document: SweepDocument) -> dict[str, int]:
     """Number of values of every axis by its name, counted from the lengths of the lists."""
-    effects = (1 if effect.name == NO_EFFECT else _points(effect.parameters) for effect in document.effects)
+
+    def points(lists: Mapping[str, Sequence[float]]) -> int:
+        return prod(map(len, lists.values()))
+
     return {
         "rig": len(document.rig),
         "conditions": sum(len(table.duration) for table in document.conditions),
-        "sensor": sum(_points(table.model_dump(exclude_none=True)) for table in document.sensor),
-        "truth": sum(_points(table.model_dump(exclude_none=True)) for table in document.truth),
-        "effects": sum(effects),
+        "sensor": sum(points(table.model_dump(exclude_none=True)) for table in document.sensor),
+        "truth": sum(points(table.model_dump(exclude_none=True)) for table in document.truth),
+        "effects": sum(1 if one.name == NO_EFFECT else points(one.parameters) for one in document.effects),
     }
 
 
 def check_sweep_size(document: SweepDocument, where: str) -> None:
-    """Refuse a sweep that is too large before it is expanded.
-
-    Raises:
-        TunnelError: too many values of an axis, cases, shards, runs or samples, with their number and the limit.
-    """
+    """Refuse a sweep that is too large before it is expanded, with what is too many and the limit."""
     lengths = axis_lengths(document)
     for name, length in lengths.items():
         check_count(length, limits.SWEEP_AXIS, "values", f"{where}, {name}", "shorten a list")
@@ -351,14 +317,10 @@ def check_sweep_size(document: SweepDocument, where: str) -> None:
         place = f"{where}, conditions '{table.name}'"
         for rate in (min(rates), max(rates)):
             check_size(run_count(table), max(table.duration), rate, place)
-    _check_shards(document, cases, max(rates), where)
-
-
-def _check_shards(document: SweepDocument, cases: int, rate: float, where: str) -> None:
     together = min(cases, _cases_per_shard(document))
     shards = -(-cases // together)
     check_count(shards, limits.SWEEP_SHARDS, "shards", where, "raise cases_per_shard, or make several sweeps")
-    samples = together * max(_samples(table, rate) for table in document.conditions)
+    samples = together * max(_samples(table, max(rates)) for table in document.conditions)
     check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in a shard", where, "lower cases_per_shard")
 
 
@@ -372,11 +334,105 @@ def _samples(table: ConditionsTable, rate: float) -> float:
     return run_count(table) * max(table.duration) * rate
 
 
-def _points(lists: Mapping[str, Sequence[float]]) -> int:
-    """Number of combinations that `_spread` makes."""
-    return prod(map(len, lists.values()))
+def read_sweep(path: Path) -> Sweep:
+    """Read and check a sweep file.
+
+    Args:
+        path: a TOML file; paths of rig files are relative to its folder.
+
+    Raises:
+        TunnelError: for the first error, in one line that names file, key and remedy.
+    """
+    content = load_toml(path, missing="name a sweep file, see docs/how-to/sweep.md")
+    where = shown(path)
+    document = validate(SweepDocument, content, path)
+    many = len(document.conditions) > 1
+    conditions = [
+        table.model_copy(update={"name": table.name or (f"conditions-{place}" if many else "conditions")})
+        for place, table in enumerate(document.conditions, 1)
+    ]
+    document = document.model_copy(update={"conditions": conditions})
+    _check_names(document, where)
+    for table in conditions:
+        check_conditions(table, f"{where}, conditions '{table.name}'")
+    check_sweep_size(document, where)
+    rigs = []
+    for rig in document.rig:
+        sections = rig_document(None if rig.file is None else path.parent / rig.file)
+        for name, changes in rig.changes.items():
+            old = sections.get(name, {})
+            # Anything but a table is left for the rig's own check to refuse.
+            sections[name] = {**old, **changes} if isinstance(old, dict) else old
+        parse_rig(sections, f"{where}, rig '{rig.name}'")
+        rigs.append(sections)
+    # Files and changes of the rigs are left out: what they give is stored.
+    names = [table.model_copy(update={"file": None, "changes": {}}) for table in document.rig]
+    sweep = Sweep(document.model_copy(update={"rig": names}), tuple(rigs))
+    _check_cases(sweep, where)
+    return sweep
 
 
-def _numbered(sections: Mapping[str, Any]) -> dict[str, Any]:
-    """A rig's sections with the keys of TOML."""
-    return {name: dict(table) if isinstance(table, Mapping) else table for name, table in sections.items()}
+def _check_names(document: SweepDocument, where: str) -> None:
+    for name in document.estimators:
+        if name not in ALL_ESTIMATORS:
+            raise TunnelError(
+                f"unknown estimator '{name}'", where=where, remedy=did_you_mean(name, ALL_ESTIMATORS)
+            )
+    if not document.estimators and not document.records:
+        what = "neither estimators nor records: there would be no result"
+        raise TunnelError(what, where=where, remedy="name an estimator, or set records = true")
+    for key, names in (
+        ("estimators", document.estimators),
+        ("rig", [table.name for table in document.rig]),
+        ("conditions", [str(table.name) for table in document.conditions]),
+    ):
+        twice = first_twice(names)
+        if twice is not None:
+            raise TunnelError(f"{key} has '{twice}' twice", where=where, remedy="give each its own name")
+    for entry in document.effects:
+        if entry.name == NO_EFFECT and (entry.parameters or entry.together_with):
+            remedy = "name an effect, or give the name only"
+            raise TunnelError(f"'{NO_EFFECT}' takes no other key", where=f"{where}, effects", remedy=remedy)
+        for name in (entry.name, *(other.name for other in entry.together_with)):
+            if name != NO_EFFECT or entry.together_with:
+                with _in(where):
+                    effect_class(name)
+
+
+def _check_cases(sweep: Sweep, where: str) -> None:
+    """Refuse a value that occurs twice in an axis, and what the simulator would refuse."""
+    from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
+
+    lengths = axis_lengths(sweep.document)
+    axes: Iterator[tuple[str, Sequence[Any]]] = zip(lengths, (sweep.rigs, *sweep.axes[1:]), strict=True)
+    for name, values in axes:
+        seen: set[str] = set()
+        for value in values:
+            physics = {k: v for k, v in value.items() if k != "name"} if name == "conditions" else value
+            text = json.dumps(physics, sort_keys=True)
+            if text in seen:
+                remedy = "remove one, and use replicates for more runs"
+                raise TunnelError(f"{name} holds a value twice", where=where, remedy=remedy)
+            seen.add(text)
+    for axis in ("sensor", "effects"):  # each of their values with every rig and conditions
+        for rig, conditions, value in np.ndindex(lengths["rig"], lengths["conditions"], lengths[axis]):
+            places = {"rig": rig, "conditions": conditions, axis: value}
+            point = np.ravel_multi_index(
+                tuple(places.get(name, 0) for name in lengths), tuple(lengths.values())
+            )
+            with _in(where):
+                plan = sweep.case(int(point) * sweep.document.replicates).plan
+                if axis == "sensor":
+                    sampling(run_settings(plan.truth, plan.conditions[0]), plan.sensor.sample_rate)
+                else:
+                    plan_effects(plan)
+
+
+@contextmanager
+def _in(where: str) -> Iterator[None]:
+    """Add the file to errors."""
+    try:
+        yield
+    except TunnelError as error:
+        place = error.where if where in error.where else ", ".join(filter(None, (where, error.where)))
+        raise TunnelError(error.what, where=place, remedy=error.remedy) from None

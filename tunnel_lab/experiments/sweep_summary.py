@@ -19,7 +19,7 @@ from identification.statistics import Proportion
 from tunnel_lab.experiments.sweep import TIMINGS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_lab.terminal.tables import table
+from tunnel_lab.terminal.outputs import table
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.vocabulary.errors import TunnelError, shown
@@ -27,7 +27,6 @@ from tunnel_sim.vocabulary.record import read_only
 
 if TYPE_CHECKING:
     import polars as pl
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from rich.table import Table
 
@@ -106,10 +105,7 @@ def _share(name: str, share: Proportion | None) -> dict[str, float | None]:
 
 
 def summarise(store: Store) -> list[Line]:
-    """Score the finished part of a sweep.
-
-    Args:
-        store: at least one shard finished.
+    """Score the finished part of a sweep, of at least one shard.
 
     Returns:
         Lines: of all cases, then along each axis that has two values or more, by estimator and quantity.
@@ -140,11 +136,7 @@ def summarise(store: Store) -> list[Line]:
 
 
 def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line]:
-    """The lines of one quantity of an estimator: of all cases, then along each axis.
-
-    Args:
-        data: rows of the results, with the columns of `summarise`.
-    """
+    """The lines of a quantity of an estimator, from columns of `summarise`: of all cases, then along each axis."""
     import polars as pl
 
     plain = data.filter(pl.col("effect") == NO_EFFECT)
@@ -187,48 +179,8 @@ def _score(data: pl.DataFrame) -> Score:
     )
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Time of one step of the work.
-
-    Args:
-        step: ``simulate``, an estimator's name or ``pack``.
-        middle: median over the shards, s per run.
-        low: their lower quartile, s per run.
-        high: their upper quartile, s per run.
-    """
-
-    step: str
-    middle: float
-    low: float
-    high: float
-
-
-def paces(store: Store) -> Sequence[Pace]:
-    """Times of the steps of a sweep per run; they are not comparable under different machine load.
-
-    Args:
-        store: at least one shard finished.
-
-    Raises:
-        TunnelError: when the timings are damaged.
-    """
-    import polars as pl
-
-    each = pl.col("seconds") / pl.col("runs")
-    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
-    folder = shown(store.folder / TIMINGS)
-    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
-        table = store.timings().group_by("step", maintain_order=True).agg(*wanted)
-        return [Pace(str(step), float(a), float(b), float(c)) for step, a, b, c in table.iter_rows()]
-
-
 def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
-    """Lines grouped by figure.
-
-    Returns:
-        Lines by file name without its suffix, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``.
-    """
+    """Lines by the name of their figure, such as ``error-by-noise-std`` or ``error-by-coulomb-friction``."""
     by_name: dict[str, list[Line]] = {}
     for line in lines:
         if line.axis != OVERALL:
@@ -241,9 +193,6 @@ def groups(lines: Iterable[Line]) -> dict[str, list[Line]]:
 def error_figure(lines: Sequence[Line]) -> Figure | None:
     """RMSE and bias along one axis, a row of panels for each quantity, a colour for each estimator.
 
-    Args:
-        lines: of one axis, and of one effect where that is severity.
-
     Returns:
         The figure, with 95 % intervals from the number of trials; None where no quantity has a panel.
     """
@@ -253,16 +202,38 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
     estimators = list(dict.fromkeys(line.estimator for line in lines))
     fig = figure(WIDTH, 1.2 + 1.6 * len(quantities))
     panels = fig.subplots(len(quantities), 2, sharex=True, squeeze=False)
-    logarithmic = _is_logarithmic(lines)
+    first, values = lines[0], [line.at for line in lines if line.at is not None]
+    logarithmic = first.axis in _LOGARITHMIC and min(values) > 0.0 and max(values) / min(values) >= _WIDE
     for name, (errors, biases) in zip(quantities, panels, strict=True):
         mine = [line for line in lines if line.quantity == name and line.score.rmse and line.score.bias]
         for place, estimator in enumerate(estimators):
-            shown = [line for line in mine if line.estimator == estimator and line.at is not None]
-            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE
-            at = _moved(shown, aside, logarithmic=logarithmic)
-            _errorbars(errors, at, [line.score.rmse for line in shown], place, estimator)
-            _errorbars(biases, at, [line.score.bias for line in shown], place, estimator)
-        _dress(errors, biases, mine[0], name)
+            drawn = [line for line in mine if line.estimator == estimator and line.at is not None]
+            if not drawn:
+                continue
+            at = [float(line.at) for line in drawn if line.at is not None]
+            aside = (place - (len(estimators) - 1) / 2.0) * _ASIDE  # intervals must not hide each other
+            if logarithmic:
+                at = [x * (max(at) / min(at)) ** aside for x in at]
+            else:
+                at = [x + aside * (max(at) - min(at)) for x in at]
+            for axes, figures in (
+                (errors, [line.score.rmse for line in drawn]),
+                (biases, [line.score.bias for line in drawn]),
+            ):
+                axes.errorbar(
+                    at, [found.value for found in figures if found],
+                    yerr=[INTERVAL * found.std for found in figures if found],
+                    color=COLOURS[place % len(COLOURS)], marker=MARKERS[place % len(MARKERS)], markersize=4.0,
+                    linewidth=1.0, label=estimator.replace("_", " "),
+                )  # fmt: skip
+        scale = mine[0].score.rmse.unit if mine[0].score.rmse else ""
+        per = "% of truth" if scale == "%" else scale
+        log_axis(errors, "y")
+        biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+        errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
+        biases.set_ylabel(f"bias [{per}]")
+        for axes in (errors, biases):
+            grid(axes)
     for axes in panels[-1]:
         if logarithmic:
             log_axis(axes, "x")
@@ -270,54 +241,14 @@ def error_figure(lines: Sequence[Line]) -> Figure | None:
             axes.locator_params(axis="x", nbins=_TICKS)
     for column in panels.T:
         fig.align_ylabels(column)
-    first = lines[0]
-    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
-    fig.supxlabel(f"{label} [{first.at_unit}]", fontsize=9)
+    fig.supxlabel(f"{_label(first)} [{first.at_unit}]", fontsize=9)
     handles, names = panels[0, 0].get_legend_handles_labels()
     fig.legend(handles, names, loc="outside upper center", ncols=min(4, len(names)))
     return fig
 
 
-def _moved(lines: Sequence[Line], aside: float, *, logarithmic: bool) -> list[float]:
-    """Where the lines stand on the axis, a little aside, so that intervals do not hide each other."""
-    at = [float(line.at) for line in lines if line.at is not None]
-    if logarithmic:
-        return [x * (max(at) / min(at)) ** aside for x in at]
-    return [x + aside * (max(at) - min(at)) for x in at]
-
-
-def _errorbars(
-    axes: Axes, at: Sequence[float], figures: Sequence[Quantity | None], place: int, label: str
-) -> None:
-    pairs = [(x, quantity) for x, quantity in zip(at, figures, strict=True) if quantity is not None]
-    if not pairs:
-        return
-    axes.errorbar(
-        [x for x, _ in pairs],
-        [quantity.value for _, quantity in pairs],
-        yerr=[INTERVAL * quantity.std for _, quantity in pairs],
-        color=COLOURS[place % len(COLOURS)],
-        marker=MARKERS[place % len(MARKERS)],
-        markersize=4.0,
-        linewidth=1.0,
-        label=label.replace("_", " "),
-    )
-
-
-def _dress(errors: Axes, biases: Axes, line: Line, name: str) -> None:
-    scale = line.score.rmse.unit if line.score.rmse else ""
-    per = "% of truth" if scale == "%" else scale
-    log_axis(errors, "y")
-    biases.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
-    errors.set_ylabel(f"{NAMES[name]}: RMSE [{per}]")
-    biases.set_ylabel(f"bias [{per}]")
-    for axes in (errors, biases):
-        grid(axes)
-
-
-def _is_logarithmic(lines: Sequence[Line]) -> bool:
-    at = [line.at for line in lines if line.at is not None]
-    return lines[0].axis in _LOGARITHMIC and min(at) > 0.0 and max(at) / min(at) >= _WIDE
+def _label(line: Line) -> str:
+    return line.effect.replace("_", " ") if line.axis == SEVERITY else AXES[line.axis][0]
 
 
 def overall_table(lines: Iterable[Line]) -> Table:
@@ -342,16 +273,11 @@ def overall_table(lines: Iterable[Line]) -> Table:
 
 
 def axis_table(lines: Sequence[Line]) -> Table:
-    """RMSE along one axis, a column for each quantity that has a panel in the figures.
-
-    Args:
-        lines: of one axis, and of one effect where that is severity.
-    """
-    first = lines[0]
-    label = first.effect.replace("_", " ") if first.axis == SEVERITY else AXES[first.axis][0]
+    """RMSE along one axis, a column for each quantity that has a panel in the figures."""
+    label, at_unit = _label(lines[0]), lines[0].at_unit
     quantities = [name for name in DRAWN if any(line.quantity == name for line in lines)]
     heads = [f"RMSE {NAMES[name]}" for name in quantities]
-    result = table(f"Error against {label}", f"{label} {unit(first.at_unit)}", "estimator", *heads)
+    result = table(f"Error against {label}", f"{label} {unit(at_unit)}", "estimator", *heads)
     cells = {(line.at, line.estimator, line.quantity): line.score.rmse for line in lines}
     for at in sorted({line.at for line in lines if line.at is not None}):
         if result.row_count:
@@ -362,12 +288,19 @@ def axis_table(lines: Sequence[Line]) -> Table:
     return result
 
 
-def pace_table(paces: Sequence[Pace]) -> Table:
-    """Times of the steps."""
+def pace_table(store: Store) -> Table:
+    """Times of the steps of a sweep per run; they are not comparable under different machine load."""
+    import polars as pl
+
+    each = pl.col("seconds") / pl.col("runs")
+    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
     result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
-    for pace in paces:
-        middle, low, high = (significant(1e3 * value, 3) for value in (pace.middle, pace.low, pace.high))
-        result.add_row(pace.step, middle, f"{low} to {high}")
+    folder = shown(store.folder / TIMINGS)
+    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
+        steps = store.timings().group_by("step", maintain_order=True).agg(*wanted)
+        for step, *seconds in steps.iter_rows():
+            middle, low, high = (significant(1e3 * float(value), 3) for value in seconds)
+            result.add_row(str(step), middle, f"{low} to {high}")
     return result
 
 

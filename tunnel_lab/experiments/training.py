@@ -57,13 +57,7 @@ _GREATEST_GRADIENT = 5.0
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """Everything that a training depends on.
-
-    Args:
-        seed: of all random numbers.
-        shards: of training samples, two hundred campaigns each.
-        steps: number of batches of each network.
-    """
+    """Everything that a training depends on: shards of two hundred campaigns each, and batches of each network."""
 
     seed: int = 1
     shards: int = 15
@@ -73,40 +67,32 @@ class TrainingSpec:
         """Number of shards of a part."""
         return self.shards if part == PARTS[0] else max(1, self.shards // 10)
 
-    @property
-    def fit(self) -> FitSpec:
-        """How each network is fitted."""
-        return FitSpec(self.seed, self.steps)
-
-
-@dataclass(frozen=True)
-class Result:
-    """The result of a training.
-
-    Args:
-        weights: the safetensors file.
-        record: of the training, as JSON.
-    """
-
-    weights: bytes
-    record: dict[str, Any]
-
 
 def train(
     spec: TrainingSpec, folder: Path, *, jobs: int, progress: Progress = lambda _what, _done, _all: None
-) -> Result:
+) -> tuple[bytes, dict[str, Any]]:
     """Simulate what is missing, and fit both networks; finished work in the folder is kept and used.
 
     Args:
-        folder: of shards and checkpoints.
         jobs: processes that simulate; the result does not depend on their number.
         progress: called with what is done, how much of it is finished, and of how much.
+
+    Returns:
+        The safetensors file, and the record of the training as JSON.
 
     Raises:
         TunnelError: when the folder belongs to another seed, or cannot be written.
     """
     output_folder(folder)
-    sizes = _sizes(spec.seed, folder)
+    path = folder / "sizes.json"  # of the forms; it also marks the folder as one of this seed
+    if not path.exists():
+        write_json(path, {"seed": spec.seed, "sizes": sizes_at_unit_excess(spec.seed)})
+    document = read_json(path, remedy="remove the folder")
+    if document.get("seed") != spec.seed or not isinstance(document.get("sizes"), dict):
+        raise TunnelError(
+            "belongs to another training", where=str(path), remedy="name another file, or --restart"
+        )
+    sizes = tuple(sorted(document["sizes"].items()))
     shards = [
         ShardSpec(spec.seed, part, number, sizes) for part in PARTS for number in range(spec.of_part(part))
     ]
@@ -119,65 +105,42 @@ def train(
         progress=partial(progress, "simulating"),
     )
     parts = {part: read_shards(folder, part, spec.of_part(part)) for part in PARTS}
-    networks = {kind: _fitted(kind, spec, parts[PARTS[0]], folder, progress) for kind in KINDS}
-    trained = {
-        kind: judged(
-            networks[kind], usable(parts[PARTS[0]], _LETTERS[kind]), usable(parts[PARTS[2]], _LETTERS[kind])
-        )
-        for kind in KINDS
+    used = {
+        kind: {part: usable(samples, _LETTERS[kind]) for part, samples in parts.items()} for kind in KINDS
     }
+    networks = {kind: _fitted(kind, spec, used[kind][PARTS[0]], folder, progress) for kind in KINDS}
+    trained = {kind: judged(networks[kind], used[kind][PARTS[0]], used[kind][PARTS[2]]) for kind in KINDS}
     weights = to_bytes(trained)
-    return Result(weights, _record(spec, trained, parts, weights))
-
-
-def _sizes(seed: int, folder: Path) -> tuple[tuple[str, float], ...]:
-    """The sizes of the forms, which also mark the folder as one of this seed."""
-    path = folder / "sizes.json"
-    if not path.exists():
-        write_json(path, {"seed": seed, "sizes": sizes_at_unit_excess(seed)})
-    document = read_json(path, remedy="remove the folder")
-    if document.get("seed") != seed or not isinstance(document.get("sizes"), dict):
-        raise TunnelError(
-            "belongs to another training", where=str(path), remedy="name another file, or --restart"
-        )
-    return tuple(sorted(document["sizes"].items()))
+    return weights, _record(spec, trained, used, weights)
 
 
 def _fitted(
     kind: str, spec: TrainingSpec, samples: Mapping[str, Array], folder: Path, progress: Progress
 ) -> dict[str, Array]:
-    """The weights of one network, from its checkpoint on."""
-    mine = usable(samples, _LETTERS[kind])
-    mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in mine.items())])
+    """The weights of one network, from the checkpoint of the same training on, where there is one."""
+    mark = json_line([asdict(spec), sorted((name, list(value.shape)) for name, value in samples.items())])
     path = folder / f"{kind}.part.safetensors"
-    state = _resumed(path, mark) or start_state(mine, spec.fit)
+    state = None
+    if path.exists():
+        content = read_regular(path, limits.WEIGHTS_BYTES)
+        try:
+            header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])["__metadata__"]
+            if header["mark"] == mark:
+                tensors, step = load(content), int(header["step"])
+                weights = {n[2:]: v for n, v in tensors.items() if n.startswith("w/")}
+                moments = {n[2:]: v for n, v in tensors.items() if n.startswith("m/")}
+                state = State(weights, moments, step)
+        except (SafetensorError, ValueError, LookupError, TypeError):
+            state = None
+    fitting = FitSpec(spec.seed, spec.steps)
+    state = state or start_state(samples, fitting)
     while state.step < spec.steps:
-        state = fit(mine, spec.fit, state, until=state.step + _KEPT_EVERY)
-        tensors = {f"w/{n}": v for n, v in state.weights.items()} | {
-            f"m/{n}": v for n, v in state.moments.items()
-        }
+        state = fit(samples, fitting, state, until=state.step + _KEPT_EVERY)
+        tensors = {f"w/{n}": v for n, v in state.weights.items()}
+        tensors |= {f"m/{n}": v for n, v in state.moments.items()}
         write_whole(path, save(tensors, {"mark": mark, "step": str(state.step)}))
         progress(f"fitting the network of a {kind}", state.step, spec.steps)
     return state.weights
-
-
-def _resumed(path: Path, mark: str) -> State | None:
-    """A checkpoint of the same training; None where there is none."""
-    if not path.exists():
-        return None
-    content = read_regular(path, limits.WEIGHTS_BYTES)
-    try:
-        header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])["__metadata__"]
-        if header["mark"] != mark:
-            return None
-        tensors = load(content)
-        step = int(header["step"])
-    except (SafetensorError, ValueError, LookupError, TypeError):
-        return None
-    by_letter = {
-        letter: {n[2:]: v for n, v in tensors.items() if n.startswith(f"{letter}/")} for letter in "wm"
-    }
-    return State(by_letter["w"], by_letter["m"], step)
 
 
 def contexts(weights: Mapping[str, Array], samples: Mapping[str, Array]) -> Array:
@@ -203,25 +166,24 @@ def judged(
 def _record(
     spec: TrainingSpec,
     trained: Mapping[str, TrainedPosterior],
-    parts: Mapping[str, Mapping[str, Array]],
+    used: Mapping[str, Mapping[str, Mapping[str, Array]]],
     weights: bytes,
 ) -> dict[str, Any]:
     networks = {}
-    for kind, letter in _LETTERS.items():
-        used = {part: usable(samples, letter) for part, samples in parts.items()}
-        rivals, runs = used["training"]["rivals"], used["training"]["runs"]
+    for kind, parts in used.items():
+        rivals, runs = parts["training"]["rivals"], parts["training"]["runs"]
         networks[kind] = {
             "sizes": {
                 "rivals": rivals.shape[1],
                 "features": rivals.shape[2],
                 "runs": runs.shape[2] - 1,
-                "quantities": used["training"]["target"].shape[1],
+                "quantities": parts["training"]["target"].shape[1],
                 "effects": len(FAMILIES),
             },
-            "samples": {part: len(values["target"]) for part, values in used.items()},
+            "samples": {part: len(values["target"]) for part, values in parts.items()},
             "loss": {
                 part: [float(loss) for loss in losses(np, trained[kind].weights, values)]
-                for part, values in used.items()
+                for part, values in parts.items()
             },
             "threshold": trained[kind].threshold,
         }
@@ -254,13 +216,7 @@ class FitSpec:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Progress of a fit: everything that the next step depends on.
-
-    Args:
-        weights: as `weight_shapes`, and the scalings.
-        moments: first and second moments of the gradients by Adam, by name.
-        step: number of finished steps.
-    """
+    """Progress of a fit, on which the next step depends: weights, moments of the gradients by Adam, steps done."""
 
     weights: dict[str, Array]
     moments: dict[str, Array]
@@ -305,12 +261,7 @@ def fit(
     progress: Callable[[int, float], None] = lambda _step, _loss: None,
     until: int | None = None,
 ) -> State:
-    """Continue a fit.
-
-    Args:
-        progress: called with the step and its loss.
-        until: step to stop at; the last one where None.
-    """
+    """Continue a fit until a step, the last one where None; progress is called with the step and its loss."""
     import torch
 
     torch.set_num_threads(1)
@@ -334,7 +285,8 @@ def fit(
         gradients = torch.autograd.grad(value, [weights[name] for name in trained])
         norm = math.sqrt(sum(float((g * g).sum()) for g in gradients))
         shrink = min(1.0, _GREATEST_GRADIENT / max(norm, 1e-12))
-        rate = _rate(step, spec)
+        warm = min(1.0, (step + 1) / 100.0)
+        rate = spec.rate * warm * 0.5 * (1.0 + math.cos(math.pi * step / spec.steps))
         with torch.no_grad():
             for name, gradient in zip(trained, gradients, strict=True):
                 first[name].lerp_(shrink * gradient, 0.1)
@@ -350,16 +302,8 @@ def fit(
     return State({n: v.detach().numpy() for n, v in weights.items()}, moments, max(done, state.step))
 
 
-def _rate(step: int, spec: FitSpec) -> float:
-    warm = min(1.0, (step + 1) / 100.0)
-    return spec.rate * warm * 0.5 * (1.0 + math.cos(math.pi * step / spec.steps))
-
-
 def losses(xp: Any, weights: Mapping[str, Any], batch: Mapping[str, Any]) -> tuple[Any, Any]:
-    """What the fit lowers, means over the samples.
-
-    Args:
-        xp: numpy or torch.
+    """What the fit lowers, means over the samples, in numpy or torch.
 
     Returns:
         The negative logarithm of the posterior's density at the truth, per quantity, and the cross entropy of the

@@ -47,11 +47,7 @@ _ROUNDS = 3
 
 @dataclass(frozen=True)
 class ShardSpec:
-    """What a shard depends on.
-
-    Args:
-        part: one of `PARTS`.
-    """
+    """What a shard depends on; its part is one of `PARTS`."""
 
     seed: int
     part: str
@@ -65,22 +61,18 @@ class ShardSpec:
 
 
 def write_shard(spec: ShardSpec, folder: Path) -> Path:
-    """Make a shard.
-
-    Returns:
-        Its file.
-    """
-    samples = list(samples_of(spec))
+    """Write the samples of a shard: names begin with ``c.`` for campaigns, with ``r.`` for records."""
+    samples = [
+        sample
+        for campaign, conditions, families, number in readings_of(spec)
+        for sample in reduced(campaign, truth_of(conditions), families, first_run=number)
+    ]
     names = sorted({name for sample in samples for name in sample})
-    return write_whole(
-        folder / spec.name,
-        save(
-            {
-                name: np.stack([sample[name] for sample in samples if name in sample]).astype(np.float32)
-                for name in names
-            }
-        ),
-    )
+    stacked = {
+        name: np.stack([sample[name] for sample in samples if name in sample]).astype(np.float32)
+        for name in names
+    }
+    return write_whole(folder / spec.name, save(stacked))
 
 
 def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
@@ -89,22 +81,11 @@ def read_shards(folder: Path, part: str, count: int) -> dict[str, Array]:
     return {name: np.concatenate([shard[name] for shard in shards]) for name in shards[0]}
 
 
-def samples_of(spec: ShardSpec) -> Iterator[dict[str, Array]]:
-    """Draw, simulate and reduce the campaigns of a shard.
-
-    Yields:
-        A sample for each campaign (``c.`` before the names) or each of its records (``r.``).
-    """
-    for campaign, conditions, families, number in readings_of(spec):
-        yield from reduced(campaign, truth_of(conditions), families, first_run=number)
-
-
 def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[str], int]]:
-    """Draw and simulate the campaigns of a shard.
+    """Draw and simulate the campaigns of a shard: each reading of each campaign.
 
     Yields:
-        Each reading of a campaign with its true conditions, the families of its effects and its number among the
-        readings of that campaign.
+        A reading with its true conditions, the families of its effects and its number in the campaign.
     """
     root = np.random.SeedSequence([spec.seed, PARTS.index(spec.part), spec.number])
     rngs = [np.random.default_rng(child) for child in root.spawn(CAMPAIGNS)]
@@ -149,12 +130,7 @@ def _variant(
 
 def truth_of(c: Conditions) -> dict[str, float]:
     """The campaign's true coefficients by name, SI."""
-    return {
-        "cn_beta": c.cn_beta,
-        "cn_r": c.cn_r,
-        "yaw_inertia": c.yaw_inertia,
-        "mechanical_damping": c.mechanical_damping,
-    }
+    return {name: getattr(c, name) for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")}
 
 
 def reduced(
@@ -232,11 +208,7 @@ def _sample(kind: str, features: Features, truth: Array, labels: Array) -> dict[
 
 
 def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> CampaignDraw:
-    """Draw one campaign.
-
-    Args:
-        sizes: magnitude of every form's parameter at the unit excess, by `label`.
-    """
+    """Draw one campaign; sizes are the magnitude of every form's parameter at the unit excess, by `label`."""
     kind = str(rng.choice(np.array(list(KINDS)), p=list(KINDS.values())))
     draw = draw_campaign(rng, kind=kind, mixture=_MIXTURE)
     while any(e.form.family == ROD for e in draw.effects) and len(draw.effects) > 1:
@@ -254,7 +226,15 @@ def draw_for_training(rng: np.random.Generator, sizes: Mapping[str, float]) -> C
         )
         for effect in draw.effects
     )
-    return replace(draw, conditions=_widened(rng, draw.conditions), effects=effects)
+    conditions = at_low_rate(draw.conditions)
+    if rng.random() >= 0.5:  # coefficients from wider ranges
+        conditions = replace(
+            conditions,
+            mechanical_damping=float(np.exp(rng.uniform(np.log(0.003), np.log(0.15)))),
+            cn_beta=float(rng.uniform(-0.2, 0.8)),
+            cn_r=float(-rng.uniform(0.0, 0.4)),
+        )
+    return replace(draw, conditions=conditions, effects=effects)
 
 
 def label(form: Form) -> str:
@@ -282,19 +262,6 @@ def at_low_rate(c: Conditions) -> Conditions:
     )
 
 
-def _widened(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """The rig at the low rate; in half of the campaigns with coefficients from wider ranges."""
-    c = at_low_rate(c)
-    if rng.random() < 0.5:
-        return c
-    return replace(
-        c,
-        mechanical_damping=float(np.exp(rng.uniform(np.log(0.003), np.log(0.15)))),
-        cn_beta=float(rng.uniform(-0.2, 0.8)),
-        cn_r=float(-rng.uniform(0.0, 0.4)),
-    )
-
-
 def sizes_at_unit_excess(seed: int) -> dict[str, float]:
     """The magnitude at which each common form has about the unit excess, in one campaign."""
     forms = [form for form in FORMS if form.group is not Group.RARE]
@@ -310,20 +277,15 @@ def sizes_at_unit_excess(seed: int) -> dict[str, float]:
         effect = EffectDraw(form, extra, form.signs[-1], _UNIT, form.start)
         draws.append(replace(plain, conditions=conditions, effects=(effect,)))
     for _ in range(_ROUNDS):
-        draws = [nearer(draw, excess) for draw, excess in zip(draws, _excesses(draws), strict=True)]
+        excesses = []
+        for draw, motion in zip(draws, motions_of(draws, 1), strict=True):
+            with np.errstate(over="ignore", invalid="ignore"):
+                try:
+                    excesses.append(read_and_fit(draw, motion).excess)
+                except ValueError:  # the motion grows without bound
+                    excesses.append(np.inf)
+        draws = [nearer(draw, excess) for draw, excess in zip(draws, excesses, strict=True)]
     return {label(form): draw.effects[0].value for form, draw in zip(forms, draws, strict=True)}
-
-
-def _excesses(draws: Sequence[CampaignDraw]) -> list[float]:
-    return [_excess(draw, motion) for draw, motion in zip(draws, motions_of(draws, 1), strict=True)]
-
-
-def _excess(draw: CampaignDraw, motion: Motion) -> float:
-    with np.errstate(over="ignore", invalid="ignore"):
-        try:
-            return read_and_fit(draw, motion).excess
-        except ValueError:  # the motion grows without bound
-            return np.inf
 
 
 def nearer(draw: CampaignDraw, excess: float) -> CampaignDraw:
@@ -349,11 +311,7 @@ def _clipped(form: Form, value: float) -> float:
 
 
 def motions_of(draws: Sequence[CampaignDraw], substeps: int) -> list[Motion]:
-    """Integrate campaigns together; those with a flexible rod, which act alone, in closed form.
-
-    Args:
-        substeps: Runge–Kutta steps per sample.
-    """
+    """Integrate campaigns together; those with a flexible rod, which act alone, in closed form."""
     bound = [bind_effects(draw) for draw in draws]
     rigid = [place for place, (c, _) in enumerate(bound) if c.rod is None]
     terms = [[term for term in bound[place][1] if isinstance(term, Term)] for place in rigid]
@@ -373,30 +331,26 @@ def flexible_motion(c: Conditions) -> Motion:
     rate = np.empty_like(angle)
     time = np.arange(c.samples) / c.sample_rate
     for run in range(c.runs):
-        matrix, start = _linear(c, run)
+        assert c.rod is not None
+        # The equations of body angle and rate, upper angle and rate, and their state at the release.
+        spring, air, drag = c.true_stiffness[run], c.air_stiffness[run], c.air_damping[run]
+        top, body = c.rod.share * c.yaw_inertia, (1.0 - c.rod.share) * c.yaw_inertia
+        rod = 1.0 / c.rod.compliance
+        damper = 2.0 * c.rod.damping_ratio * np.sqrt(rod * top)
+        matrix = np.array(
+            [
+                [0.0, 1.0, 0.0, 0.0],
+                [(air - rod) / body, (drag - damper) / body, rod / body, damper / body],
+                [0.0, 0.0, 0.0, 1.0],
+                [rod / top, damper / top, -(spring + rod) / top, -(c.mechanical_damping + damper) / top],
+            ]
+        )
+        release = c.start_angle[run]
+        held_body = np.array([release, 0.0, release * rod / (spring + rod), 0.0])
+        held_top = np.array([release * rod / (rod - air), 0.0, release, 0.0])
+        start = held_body if c.rod.held_body else held_top
         values, modes = np.linalg.eig(matrix)
         weights = np.linalg.solve(modes, start.astype(complex))
         states = (modes * weights) @ np.exp(np.outer(values, time))
         angle[:, run], rate[:, run] = states[2].real, states[3].real
     return Motion(angle, rate)
-
-
-def _linear(c: Conditions, run: int) -> tuple[Array, Array]:
-    """The equations of body angle and rate, upper angle and rate, and their state at the release."""
-    assert c.rod is not None
-    spring, air, drag = c.true_stiffness[run], c.air_stiffness[run], c.air_damping[run]
-    top, body = c.rod.share * c.yaw_inertia, (1.0 - c.rod.share) * c.yaw_inertia
-    rod = 1.0 / c.rod.compliance
-    damper = 2.0 * c.rod.damping_ratio * np.sqrt(rod * top)
-    matrix = np.array(
-        [
-            [0.0, 1.0, 0.0, 0.0],
-            [(air - rod) / body, (drag - damper) / body, rod / body, damper / body],
-            [0.0, 0.0, 0.0, 1.0],
-            [rod / top, damper / top, -(spring + rod) / top, -(c.mechanical_damping + damper) / top],
-        ]
-    )
-    release = c.start_angle[run]
-    held_body = np.array([release, 0.0, release * rod / (spring + rod), 0.0])
-    held_top = np.array([release * rod / (rod - air), 0.0, release, 0.0])
-    return matrix, held_body if c.rod.held_body else held_top

@@ -100,6 +100,11 @@ def table_3(folder: Path) -> Section:
     campaigns = dict(zip(plans, simulate_campaigns(list(plans.values())), strict=True))
     windows = {name: identify(c, NETWORK).runs[1].windows for name, c in campaigns.items()}
     save_both(table3_figure(paper_windows(), windows), folder / "windows.png")
+    inference = "; ".join(
+        f"spring {springs.spring} needs {springs.wind_speed:.1f} m/s "
+        f"and Cr {signed(springs.mechanical_damping, 4)} N m s/rad"
+        for springs in infer_springs()[:2]
+    )
     rows = tuple(
         (
             str(row.number), f"{row.zeta:.4f}", f"{row.omega_n_rad_per_s:.4f}",
@@ -115,7 +120,8 @@ def table_3(folder: Path) -> Section:
         outcome="in part",
         words=(
             "The run behind the table is not named, and its record is not published, so the numbers cannot be "
-            "computed again. Spring 5 at about 10 m/s is an inference: " + _inference(),
+            f"computed again. Spring 5 at about 10 m/s is an inference: {inference}, which is impossible, and "
+            "so are the stiffer ones.",
             "The paper takes the drift for the rig's nonlinearity, and it is right: on a linear rig the "
             "networks give constant columns within their noise. A spring that softens with the amplitude "
             "and a damping that grows with it make them drift as the paper's do. Other pairs of effects do so as "
@@ -133,15 +139,6 @@ def table_3(folder: Path) -> Section:
             Picture(file="windows.png", caption="Table III, and the networks on simulated runs; 95 % intervals."),
         ),
     )  # fmt: skip
-
-
-def _inference() -> str:
-    parts = [
-        f"spring {springs.spring} needs {springs.wind_speed:.1f} m/s "
-        f"and Cr {signed(springs.mechanical_damping, 4)} N m s/rad"
-        for springs in infer_springs()[:2]
-    ]
-    return "; ".join(parts) + ", which is impossible, and so are the stiffer ones."
 
 
 def table_4(_: Path) -> Section:
@@ -176,7 +173,13 @@ def table_4(_: Path) -> Section:
     spring = infer_springs()[0]
     beta = paper_derivatives()[0].cn_beta_per_rad * (spring.wind_speed / _SPEED) ** 2
     again = (f"from Table III's mean ωn, spring {spring.spring} at {_SPEED:g} m/s", f"{beta:.3f}", "–", "–")
-    linear, soft = (_closer(closeness_of[name]) for name in ("linear, noise", "softening, noise"))
+    closer = []  # which of the paper's two methods has the smaller error of Cnβ
+    for name in ("linear, noise", "softening, noise"):
+        found = closeness_of[name]
+        errors = {method: abs(found[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in found}
+        least = min(errors, key=errors.__getitem__)
+        closer.append("network" if least == NETWORK else "conventional method")
+    linear, soft = closer
     return Section(
         title="Table IV",
         about="Cnβ and Cnr of both methods",
@@ -231,21 +234,9 @@ def figures_4_to_6(folder: Path) -> Section:
     )
 
 
-def _closer(distances: Mapping[str, Closeness]) -> str:
-    """Which of the paper's two methods has the smaller error of Cnβ."""
-    errors = {
-        method: abs(distances[method].cn_beta) for method in (NETWORK, CONVENTIONAL) if method in distances
-    }
-    return "network" if min(errors, key=errors.__getitem__) == NETWORK else "conventional method"
-
-
 @styled
 def error_figure(errors: HeldOutErrors) -> Figure:
-    """Fig. 3: the error of ζ against ζ and of ωn against ωn.
-
-    Args:
-        errors: in %, on responses that were not trained on.
-    """
+    """Fig. 3: the error of ζ against ζ and of ωn against ωn, in %, on responses that were not trained on."""
     fig = figure(WIDTH, 2.9)
     left, right = fig.subplots(1, 2)
     left.plot(errors.zeta, errors.zeta_percent, ".", ms=1.5, color=BLUE)
@@ -261,11 +252,7 @@ def error_figure(errors: HeldOutErrors) -> Figure:
 
 @styled
 def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[WindowEstimate]]) -> Figure:
-    """Table III beside windows of simulated runs.
-
-    Returns:
-        The figure: ζ on the left, ωn on the right, against the window's number; 95 % intervals.
-    """
+    """Table III beside windows of simulated runs: ζ and ωn against the window's number, with 95 % intervals."""
     fig = figure(WIDTH, 3.4)
     panels = fig.subplots(1, 2)
     number = np.array([row.number for row in rows])
@@ -299,12 +286,7 @@ def table3_figure(rows: Sequence[WindowRow], shown: Mapping[str, Sequence[Window
 def response_figure(run: Run, estimates: Sequence[Estimate], *, magnified: tuple[float, float]) -> Figure:
     """Figs 4 to 6: the record and the responses regenerated from each method's ζ and ωn.
 
-    Args:
-        run: the record; its id is looked up in the estimates.
-        magnified: stretch shown large, from and to, s.
-
-    Returns:
-        The figure: the whole record above, the stretch in the middle, what is left of it below.
+    The whole record is above, a stretch of it (from and to, s) in the middle, what is left of it below.
     """
     fig = figure(WIDTH, 6.4)
     whole, part, residual = fig.subplots(3, 1)

@@ -27,12 +27,7 @@ Outcome = Literal["reproduced", "in part", "not reproducible", "corrected"]
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of the page.
-
-    Args:
-        file: its name in the page's folder, a PNG; a PDF of that name stands beside figures.
-        caption: what it shows.
-    """
+    """A PNG in the page's folder, beside which a PDF stands for figures, and its caption."""
 
     __pydantic_config__ = _STRICT
 
@@ -42,19 +37,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """What one table or figure of the paper says, and what is found here.
-
-    Args:
-        title: such as ``Table II``.
-        about: what it is of.
-        theirs: the paper's result in a line.
-        ours: ours in a line.
-        outcome: whether the paper's result is found here too.
-        words: paragraphs.
-        headings: of the table's columns; none where there is no table.
-        rows: cells as text.
-        pictures: below the table.
-    """
+    """What a table or figure of the paper says and what is found here: theirs and ours in a line each."""
 
     __pydantic_config__ = _STRICT
 
@@ -108,9 +91,6 @@ def write_paper(
         names: parts to compute where they are not finished; finished ones stay in the page.
         progress: called with the number finished, of how many, and the next part's name.
 
-    Returns:
-        The page, and its sections by name.
-
     Raises:
         TunnelError: when the folder cannot be written to, or a kept part is damaged.
     """
@@ -120,7 +100,16 @@ def write_paper(
     sections: dict[str, Section] = {}
     for name, part in parts.items():
         path = kept / f"{name}.json"
-        section = _finished(path, folder)
+        section = None
+        document = read_json(path, remedy=_REMEDY) if path.exists() else {}
+        if document.get("version") == version(_PACKAGE):
+            try:
+                section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
+            except ValidationError as error:
+                what = f"is not a part of the page ({error.errors()[0]['msg']})"
+                raise TunnelError(what, where=str(path), remedy=_REMEDY) from None
+            if not all((folder / picture.file).is_file() for picture in section.pictures):
+                section = None
         if section is None and name in names:
             progress(len([finished for finished in names if finished in sections]), len(names), name)
             section = part(folder)
@@ -132,27 +121,8 @@ def write_paper(
     return page, sections
 
 
-def _finished(path: Path, folder: Path) -> Section | None:
-    """A part of this version that is kept with all its pictures."""
-    if not path.exists():
-        return None
-    document = read_json(path, remedy=_REMEDY)
-    if document.get("version") != version(_PACKAGE):
-        return None
-    try:
-        section = TypeAdapter(Section).validate_json(json.dumps(document.get("section")))
-    except ValidationError as error:
-        reason = error.errors()[0]["msg"]
-        raise TunnelError(f"is not a part of the page ({reason})", where=str(path), remedy=_REMEDY) from None
-    return section if all((folder / picture.file).is_file() for picture in section.pictures) else None
-
-
 def render(sections: Mapping[str, Section]) -> str:
-    """The page as HTML; its pictures stand beside it.
-
-    Args:
-        sections: by name, in order.
-    """
+    """The page as HTML; its pictures stand beside it."""
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(

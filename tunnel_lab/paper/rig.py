@@ -21,7 +21,7 @@ from tunnel_lab.plotting.style import BLUE, COLOURS, VERMILION, WIDTH, figure, g
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import CampaignPlan, aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -70,7 +70,14 @@ def table_2(folder: Path) -> Section:
     springs = paper_springs()
     stiffness = [spring.stiffness_n_m_per_rad for spring in springs]
     theirs = fit_springs(stiffness, [spring.frequency_hz for spring in springs])
-    campaign = simulate_campaign(springs_plan(stiffness))
+    # A wind-off run of every spring.
+    plan = paper_plan()
+    off = next(condition for condition in plan.conditions if condition.wind_speed == 0.0)
+    conditions = tuple(
+        replace(off, id=f"spring-{number}", spring_stiffness=value, duration=_DURATION)
+        for number, value in enumerate(stiffness, 1)
+    )
+    campaign = simulate_campaign(replace(plan, name="springs", conditions=conditions))
     runs = identify(campaign, "conventional", throw=False).runs
     frequencies = [scaled(run.omega_n, 1.0 / (2.0 * pi)) for run in runs]
     kept = [
@@ -90,7 +97,7 @@ def table_2(folder: Path) -> Section:
         )
     )  # fmt: skip
     save_both(springs_figure(springs, theirs, TABLE_I_INERTIA), folder / "springs.png")
-    off = ", ".join(str(spring.number) for spring, flag in zip(springs, theirs.flagged, strict=True) if flag)
+    odd = ", ".join(str(spring.number) for spring, flag in zip(springs, theirs.flagged, strict=True) if flag)
     return Section(
         title="Table II",
         about="springs and wind-off frequencies; the inertia (eq. 1)",
@@ -100,7 +107,7 @@ def table_2(folder: Path) -> Section:
         words=(
             "The gradient of Kr against ωn² of Table II is not the 0.11 kg m² of Table I. The text says "
             "that Kr is plotted against ωn; the gradient is an inertia only against ωn².",
-            f"Springs beyond chance off the line: {off or 'none'}. No inertia moves one spring and not the "
+            f"Springs beyond chance off the line: {odd or 'none'}. No inertia moves one spring and not the "
             "next, so their stiffness or frequency is wrong, or they are of another kind. The virtual rig "
             "takes the stiffnesses as stated; its frequencies are those of one inertia and differ from "
             "the paper's by as much.",
@@ -118,21 +125,6 @@ def table_2(folder: Path) -> Section:
             Picture(file="springs.png", caption="Table II with its line, and the residuals of the springs."),
         ),
     )
-
-
-def springs_plan(stiffness: list[float]) -> CampaignPlan:
-    """A wind-off run of every spring.
-
-    Args:
-        stiffness: N m/rad.
-    """
-    plan = paper_plan()
-    off = next(condition for condition in plan.conditions if condition.wind_speed == 0.0)
-    conditions = tuple(
-        replace(off, id=f"spring-{number}", spring_stiffness=value, duration=_DURATION)
-        for number, value in enumerate(stiffness, 1)
-    )
-    return replace(plan, name="springs", conditions=conditions)
 
 
 def equations(_: Path) -> Section:
@@ -175,13 +167,12 @@ def equations(_: Path) -> Section:
 
 def figure_1(folder: Path) -> Section:
     """The rig."""
-    from tunnel_lab.show.film import Look, write_still
-    from tunnel_lab.show.request import Request
+    from tunnel_lab.show.film import Look, Request, write_film
 
     words = "The paper shows a photograph. This is the virtual rig of the same sizes."
     pictures: tuple[Picture, ...] = ()
     try:
-        write_still(Request(), Look(height=600, trace=False), folder / "rig.png", 0.0)
+        write_film(Request(), Look(height=600, trace=False), folder / "rig.png", at=0.0)
         pictures = (
             Picture(file="rig.png", caption="The virtual rig: the Davis model on its rod, yawed by 20°."),
         )

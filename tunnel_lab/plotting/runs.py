@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from math import ceil, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,15 +30,14 @@ from tunnel_lab.plotting.style import (
     with_breaks,
 )
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from identification.estimate import Estimate, RunEstimate
-    from tunnel_sim.files.importing.records import Imported, ImportedRun
+    from identification.estimate import Estimate
+    from tunnel_sim.files.importing.records import Imported
 
 
 WIND_OFF, WIND_ON = BLUE, VERMILION
@@ -58,11 +57,7 @@ _INPUTS = {"moment_nm": "moment", "drive": "input", "base_rad": "root"}
 
 
 def run_label(run: Run) -> str:
-    """The conditions of a run in a few words, for a figure.
-
-    Returns:
-        Text such as ``r02 · 16.12 N m/rad · 15 m/s``.
-    """
+    """The conditions of a run in a few words, such as ``r02 · 16.12 N m/rad · 15 m/s``."""
     parts = [figure_text(run.id)]
     if run.spring_stiffness is not None:
         parts.append(f"{run.spring_stiffness:g} N m/rad")
@@ -75,51 +70,37 @@ def run_label(run: Run) -> str:
 
 @styled
 def trace_pages(campaign: Campaign) -> tuple[Figure, ...]:
-    """Angle against time, one panel for each run; of a driven run its input is drawn behind it.
-
-    Returns:
-        Figures of up to twelve panels, in the campaign's order.
-    """
-    pages = range(0, len(campaign.runs), PANELS_PER_PAGE)
-    return tuple(_trace_page(campaign.runs[i : i + PANELS_PER_PAGE]) for i in pages)
-
-
-def _trace_page(runs: Sequence[Run]) -> Figure:
-    columns = 1 if len(runs) <= 3 else 2 if len(runs) <= 6 else 3
-    rows = ceil(len(runs) / columns)
-    fig = figure(WIDTH if columns < 3 else 1.4 * WIDTH, 1.8 * rows + 0.6)
-    for place, run in enumerate(runs, 1):
-        axes = fig.add_subplot(rows, columns, place)
-        colour = WIND_ON if run.wind_on else WIND_OFF
-        axes.plot(*with_breaks(run.record.time_s, run.record.yaw_rad), color=colour, linewidth=0.7)
-        axes.set_title(run_label(run))
-        axes.margins(x=0.01)
-        grid(axes)
-        if (place - 1) % columns == 0:
-            axes.set_ylabel("angle β [rad]")
-        if place > len(runs) - columns:
-            axes.set_xlabel("time [s]")
-        if run.drive is not None:
-            _draw_input(axes, run.record.time_s, run.drive)
-    return fig
-
-
-def _draw_input(axes: Axes, time: Array, drive: Drive) -> None:
-    """The input on an axis of its own at the right, behind the response."""
-    beside = axes.twinx()
-    beside.plot(*with_breaks(time, drive.values), color=_GREY, linewidth=0.5)
-    beside.set_ylabel(f"{_INPUTS[drive.column]} [{drive.unit}]", color="0.4")
-    axes.set_zorder(beside.get_zorder() + 1)
-    axes.patch.set_visible(False)
+    """Angle against time, a panel for each run, twelve on a page; the input of a driven run is behind it."""
+    pages = []
+    for first in range(0, len(campaign.runs), PANELS_PER_PAGE):
+        runs = campaign.runs[first : first + PANELS_PER_PAGE]
+        columns = 1 if len(runs) <= 3 else 2 if len(runs) <= 6 else 3
+        rows = ceil(len(runs) / columns)
+        fig = figure(WIDTH if columns < 3 else 1.4 * WIDTH, 1.8 * rows + 0.6)
+        for place, run in enumerate(runs, 1):
+            axes = fig.add_subplot(rows, columns, place)
+            colour, time = WIND_ON if run.wind_on else WIND_OFF, run.record.time_s
+            axes.plot(*with_breaks(time, run.record.yaw_rad), color=colour, linewidth=0.7)
+            axes.set_title(run_label(run))
+            axes.margins(x=0.01)
+            grid(axes)
+            if (place - 1) % columns == 0:
+                axes.set_ylabel("angle β [rad]")
+            if place > len(runs) - columns:
+                axes.set_xlabel("time [s]")
+            if run.drive is not None:  # on an axis of its own at the right, behind the response
+                beside = axes.twinx()
+                beside.plot(*with_breaks(time, run.drive.values), color=_GREY, linewidth=0.5)
+                beside.set_ylabel(f"{_INPUTS[run.drive.column]} [{run.drive.unit}]", color="0.4")
+                axes.set_zorder(beside.get_zorder() + 1)
+                axes.patch.set_visible(False)
+        pages.append(fig)
+    return tuple(pages)
 
 
 @styled
 def wind_off_on_figure(off: Run, on: Run) -> Figure:
-    """One run with the wind off above one with the wind on, on the same axes.
-
-    Args:
-        on: the wind-on run, preferably with the same spring.
-    """
+    """A run with the wind off above one with the wind on, preferably of the same spring, on the same axes."""
     fig = figure(WIDTH, 4.2)
     first: Axes | None = None
     for place, (run, colour) in enumerate(((off, WIND_OFF), (on, WIND_ON)), 1):
@@ -136,14 +117,7 @@ def wind_off_on_figure(off: Run, on: Run) -> Figure:
 
 @styled
 def spectrum_figure(runs: Sequence[Run]) -> Figure:
-    """Power spectral density of the angle.
-
-    Args:
-        runs: up to six runs, one line each.
-
-    Returns:
-        A figure of one panel with logarithmic axes, rad²/Hz against Hz.
-    """
+    """Power spectral density of the angle of up to six runs, rad²/Hz against Hz, on logarithmic axes."""
     fig = figure(WIDTH, 3.6)
     axes = fig.add_subplot()
     for run, colour in zip(runs[:RUNS_PER_PLOT], COLOURS, strict=False):
@@ -173,20 +147,24 @@ def spectrum(run: Run) -> tuple[Array, Array]:
         run.record.yaw_rad, run.record.sample_rate, window="hann", detrend="constant"
     )
     first = min(LEAKING, frequency.size - 1)
-    return _log_averaged(frequency[first:], density[first:], first)
+    frequency, density = frequency[first:], density[first:]
+    # Means over bins of equal ratio; the first value belongs to ``first`` cycles in the record.
+    decades = np.log10(frequency[-1] / frequency[0])
+    edges = np.geomspace(first, first + frequency.size, max(2, int(BINS_PER_DECADE * decades)))
+    starts = np.unique(edges.astype(int) - first)[:-1]
+    counts = np.diff(np.append(starts, frequency.size))
+    return np.add.reduceat(frequency, starts) / counts, np.add.reduceat(density, starts) / counts
 
 
 @styled
 def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Figure:
-    """Estimates of each estimator against the injected values.
+    """Estimates of each estimator against the injected values, a row for each quantity.
+
+    On the left is the error in reported standard deviations with the interval that holds 95 % of them, on the right
+    the standard deviations in % of the truth, on a logarithmic scale.
 
     Args:
-        truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that
-            name.
-
-    Returns:
-        Two panels with a row for each quantity: the error in reported standard deviations with the interval that
-        holds 95 % of them, and the standard deviations in % of the truth, on a logarithmic scale.
+        truth: injected values by name, all nonzero, each in the unit of the estimate's quantity of that name.
     """
     names = tuple(truth)
     fig = figure(WIDTH, 1.3 + 0.5 * len(names))
@@ -218,27 +196,13 @@ def truth_figure(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> F
     return fig
 
 
-def _log_averaged(frequency: Array, density: Array, first: int) -> tuple[Array, Array]:
-    """Means of a spectrum over bins of equal ratio; its first value belongs to ``first`` cycles in the record."""
-    decades = np.log10(frequency[-1] / frequency[0])
-    edges = np.geomspace(first, first + frequency.size, max(2, int(BINS_PER_DECADE * decades)))
-    starts = np.unique(edges.astype(int) - first)[:-1]
-    counts = np.diff(np.append(starts, frequency.size))
-    return np.add.reduceat(frequency, starts) / counts, np.add.reduceat(density, starts) / counts
-
-
 @styled
 def windows_figure(estimate: Estimate) -> Figure:
     """ζ and ωn of the windows of each run against the amplitude, with 95 % intervals.
 
-    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks.
-
-    Args:
-        estimate: of any campaign; runs past the sixth and those with fewer than two windows are left out.
-
-    Returns:
-        A figure of two panels. Where the runs differ in frequency, each quantity is shown as its deviation from
-        the weighted mean of its run, so that only its change with the amplitude is seen.
+    A linear rig gives horizontal lines; a slope shows an effect that the linear model lacks. Runs past the sixth
+    and those with fewer than two windows are left out. Where the runs differ in frequency, a quantity is shown as
+    its deviation from the weighted mean of its run, so that only its change with the amplitude is seen.
     """
     runs = [run for run in estimate.runs if len(run.windows) > 1][:RUNS_PER_PLOT]
     centres = [window.omega_n.value for run in runs for window in run.windows]
@@ -246,12 +210,26 @@ def windows_figure(estimate: Estimate) -> Figure:
     fig = figure(WIDTH, 3.6)
     panels = fig.subplots(1, 2)
     for axes, name in zip(panels, ("zeta", "omega_n"), strict=True):
-        shown = [_shown(run, name, absolute=one_rig) for run in runs]
-        for index, (run, quantities) in enumerate(zip(runs, shown, strict=True)):
-            amplitude = [window.amplitude.value for window in run.windows]
-            _intervals(axes, amplitude, quantities, index, figure_text(run.id))
+        drawn: list[Quantity] = []
+        for index, run in enumerate(runs):
+            quantities: list[Quantity] = [getattr(window, name) for window in run.windows]
+            if not one_rig:
+                shifts = deviations(quantities)
+                mean = quantities[0].value - shifts[0].value
+                scale, unit = (1e3, "10⁻³") if name == "zeta" else (100.0 / mean, "%")
+                quantities = [Quantity(scale * q.value, scale * q.std, unit) for q in shifts]
+            axes.errorbar(
+                [window.amplitude.value for window in run.windows],
+                [q.value for q in quantities],
+                yerr=[INTERVAL * q.std for q in quantities],
+                color=COLOURS[index],
+                marker=MARKERS[index],
+                label=figure_text(run.id),
+                linewidth=0.8,
+                markersize=3.5,
+            )
+            drawn += quantities
         if runs:
-            drawn = [quantity for quantities in shown for quantity in quantities]
             limit_to_known(axes, np.array([q.value for q in drawn]), np.array([q.std for q in drawn]))
             log_axis(axes, "x")
         if not one_rig:
@@ -271,13 +249,9 @@ def windows_figure(estimate: Estimate) -> Figure:
 
 
 def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
-    """Each value less the weighted mean of all.
+    """Each value less the weighted mean of all; they are independent and of one unit.
 
-    Args:
-        quantities: independent, of one unit.
-
-    Returns:
-        The deviations. Their variance is that of the value less that of the mean, which has the value in it.
+    The variance of a deviation is that of the value less that of the mean, which has the value in it.
     """
     stds = np.array([quantity.std for quantity in quantities])
     least = 1e-6 * float(np.min(stds[stds > 0.0], initial=np.inf))
@@ -287,33 +261,9 @@ def deviations(quantities: Sequence[Quantity]) -> list[Quantity]:
     return [Quantity(q.value - mean, sqrt(max(q.std**2 - of_mean, 0.0)), q.unit) for q in quantities]
 
 
-def _shown(run: RunEstimate, name: str, *, absolute: bool) -> list[Quantity]:
-    """One quantity of the windows as it is drawn."""
-    given: list[Quantity] = [getattr(window, name) for window in run.windows]
-    if absolute:
-        return given
-    shifts = deviations(given)
-    mean = given[0].value - shifts[0].value
-    scale, unit = (1e3, "10⁻³") if name == "zeta" else (100.0 / mean, "%")
-    return [Quantity(scale * q.value, scale * q.std, unit) for q in shifts]
-
-
-def _intervals(
-    axes: Axes, x: Sequence[float], quantities: Sequence[Quantity], index: int, label: str
-) -> None:
-    """Points with 95 % intervals."""
-    style: dict[str, Any] = {"color": COLOURS[index], "marker": MARKERS[index], "label": label}
-    spans = [INTERVAL * q.std for q in quantities]
-    axes.errorbar(x, [q.value for q in quantities], yerr=spans, linewidth=0.8, markersize=3.5, **style)
-
-
 @styled
 def import_picture(imported: Imported) -> bytes:
-    """Draw what was read.
-
-    Returns:
-        A PNG. Samples that are left out are grey; a vertical line marks where a run begins.
-    """
+    """Draw what was read as PNG: left-out samples are grey, a vertical line marks where a run begins."""
     from matplotlib.figure import Figure
 
     raws = {id(part.raw): part.raw for part in imported.parts}
@@ -323,7 +273,28 @@ def import_picture(imported: Imported) -> bytes:
     figure = Figure(figsize=(max(4.5 * columns, 8.0), 2.2 * rows + 0.8), layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for key, axes in zip(shown, panels, strict=False):
-        _draw(axes, [part for part in imported.parts if id(part.raw) == key], imported.campaign.sensor.unit)
+        raw, parts = raws[key], [part for part in imported.parts if id(part.raw) == key]
+        time, reading = raw.cleaned.time_s, raw.cleaned.reading
+        axes.plot(*thinned(time, reading), color=_GREY, linewidth=0.7)
+        kept = 0
+        for number, part in enumerate(parts):
+            if part.run is None:
+                continue
+            kept += 1
+            piece = slice(part.piece.first, part.piece.last)
+            colour = COLOURS[number % len(COLOURS)] if len(parts) > 1 else BLUE
+            axes.plot(*thinned(time[piece], reading[piece]), color=colour, linewidth=0.7)
+            axes.axvline(time[part.piece.first], color=VERMILION, linewidth=0.8, linestyle="--")
+        if raw.input is not None:
+            name, values = raw.input
+            beside = axes.twinx()
+            beside.plot(*thinned(time, values), color=VERMILION, linewidth=0.4, alpha=0.6)
+            beside.set_ylabel(f"input {name}", fontsize=8, color=VERMILION)
+            beside.tick_params(labelsize=7)
+        axes.set_title(figure_text(raw.id if kept == 1 else f"{raw.id}: {kept} runs"), fontsize=9, loc="left")
+        axes.set_xlabel("time [s]", fontsize=8)
+        axes.set_ylabel(f"reading [{imported.campaign.sensor.unit}]", fontsize=8)
+        axes.tick_params(labelsize=7)
     for axes in panels[len(shown) :]:
         axes.remove()
     more = f" (the first {MOST_PANELS} of {len(raws)} records)" if len(raws) > MOST_PANELS else ""
@@ -334,32 +305,6 @@ def import_picture(imported: Imported) -> bytes:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=120)
     return stream.getvalue()
-
-
-def _draw(axes: Axes, parts: list[ImportedRun], unit: str) -> None:
-    """One record with its runs."""
-    raw = parts[0].raw
-    time, reading = raw.cleaned.time_s, raw.cleaned.reading
-    axes.plot(*thinned(time, reading), color=_GREY, linewidth=0.7)
-    for number, part in enumerate(parts):
-        if part.run is None:
-            continue
-        piece = slice(part.piece.first, part.piece.last)
-        colour = COLOURS[number % len(COLOURS)] if len(parts) > 1 else BLUE
-        axes.plot(*thinned(time[piece], reading[piece]), color=colour, linewidth=0.7)
-        axes.axvline(time[part.piece.first], color=VERMILION, linewidth=0.8, linestyle="--")
-    if raw.input is not None:
-        name, values = raw.input
-        beside = axes.twinx()
-        beside.plot(*thinned(time, values), color=VERMILION, linewidth=0.4, alpha=0.6)
-        beside.set_ylabel(f"input {name}", fontsize=8, color=VERMILION)
-        beside.tick_params(labelsize=7)
-    kept = sum(part.run is not None for part in parts)
-    about = raw.id if kept == 1 else f"{raw.id}: {kept} runs"
-    axes.set_title(figure_text(about), fontsize=9, loc="left")
-    axes.set_xlabel("time [s]", fontsize=8)
-    axes.set_ylabel(f"reading [{unit}]", fontsize=8)
-    axes.tick_params(labelsize=7)
 
 
 def thinned(time: Array, reading: Array) -> tuple[Array, Array]:

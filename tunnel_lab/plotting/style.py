@@ -151,20 +151,15 @@ def with_breaks(time: Array, *readings: Array) -> tuple[Array, ...]:
 def figure_text(text: str) -> str:
     """A text of the user's, such as the id of a run, as matplotlib has to be given it to show it as it is.
 
-    Dollar signs would begin a formula, and a legend leaves out what begins with an underscore.
-
-    Returns:
-        The text with its dollar signs escaped, and with a blank before a leading underscore.
+    Dollar signs, which would begin a formula, are escaped. A blank goes before a leading underscore, with which a
+    legend would leave the text out.
     """
     return (" " if text.startswith("_") else "") + text.replace("$", r"\$")
 
 
 @styled
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure, completely or not at all; the same figure gives the same file.
-
-    Args:
-        path: the file, ``.png`` or ``.pdf``; replaced when it exists.
+    """Write a figure as ``.png`` or ``.pdf``, completely or not at all; the same figure gives the same file.
 
     Raises:
         TunnelError: when the file cannot be written.
@@ -175,12 +170,5 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def save_both(figure: Figure, path: Path) -> tuple[Path, Path]:
-    """Write a figure as a picture, and as a vector graphic beside it.
-
-    Args:
-        path: the picture, ``.png``.
-
-    Returns:
-        The picture and the PDF.
-    """
+    """Write a figure as a picture, ``.png``, and as a vector graphic, ``.pdf``, beside it."""
     return save(figure, path), save(figure, path.with_suffix(".pdf"))

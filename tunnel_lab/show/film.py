@@ -1,4 +1,4 @@
-"""A film of a run: the oscillating model beside the trace of its angle.
+"""The run that is shown, from a plan or from a few options, and its film: the model beside the trace of its angle.
 
 Frames are rendered off-screen. This needs an OpenGL back end, which many machines lack, and a missing back end may
 end the whole process. Therefore a child process draws, trying one back end after another. The trace is drawn twice,
@@ -12,7 +12,10 @@ import os
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from math import degrees, isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,13 +23,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_lab.plotting.style import with_breaks
-from tunnel_lab.show.request import Request, ShownRun, shown_run
+from tunnel_lab.terminal.inputs import parse_effect
+from tunnel_sim.files.plan_file import load_plan
+from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.plan import CampaignPlan, Condition, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.rig import Rig
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    from tunnel_sim.effects import EffectChain
 
 
 Image = NDArray[np.uint8]
@@ -44,12 +54,147 @@ _CURSOR = (90, 90, 90)
 _VERMILION = (213, 94, 0)
 
 
-def backends() -> tuple[str, ...]:
-    """The OpenGL back ends to try, best first.
+PAPER = {"cn_beta": 0.4719, "cn_r": -0.1033}
+"""Coefficients of a run that no plan describes, 1/rad: the paper's Table IV, neural network."""
 
-    Returns:
-        Values for ``MUJOCO_GL``; only the user's own choice where that variable is set, and an empty
-        string (MuJoCo's default) where the platform has only one.
+
+@dataclass(frozen=True)
+class Request:
+    """The options; None takes the value of the plan or the rig.
+
+    Args:
+        plan: a campaign's description.
+        run: id of a run of the plan; None takes its first.
+        spring: number in the rig's table.
+        wind_speed: m/s.
+        release_angle_deg: degrees.
+        duration: s.
+        effects: ``NAME:PARAMETER=VALUE``, beyond the plan's.
+        seed: of the sensor's noise and of what effects draw; None takes the plan's, or 1.
+    """
+
+    plan: str | None = None
+    run: str | None = None
+    spring: int | None = None
+    wind_speed: float | None = None
+    release_angle_deg: float | None = None
+    duration: float | None = None
+    effects: tuple[str, ...] = ()
+    seed: int | None = None
+
+    @classmethod
+    def from_json_dict(cls, data: Mapping[str, Any]) -> Request:
+        """From the fields by name."""
+        return cls(**{**data, "effects": tuple(data["effects"])})
+
+
+@dataclass(frozen=True)
+class ShownRun:
+    """A run ready to be simulated."""
+
+    rig: Rig
+    chain: EffectChain
+    sensor: SensorModel
+    title: str
+    seed: int
+
+    @cached_property
+    def settings(self) -> RunSettings:
+        """The run's physics, effects included."""
+        from tunnel_sim.physics.steps import follow_fastest
+
+        return follow_fastest(self.rig, self.chain.physics())
+
+    def record(self) -> Record:
+        """The potentiometer's reading, simulated at each call with the same bits."""
+        from tunnel_sim.effects.base import read_motion
+        from tunnel_sim.engine.model import build_model
+        from tunnel_sim.engine.simulate import simulate_motion
+
+        motion = simulate_motion(build_model(self.rig, self.settings), self.sensor.sample_rate)
+        return read_motion(motion, self.sensor, np.random.default_rng([self.seed, 1]), self.chain)
+
+
+def shown_run(request: Request) -> ShownRun:
+    """Prepare a run; a `TunnelError` for a bad plan, an unknown run, spring or effect, or a number out of range."""
+    from tunnel_sim.effects import EffectChain
+    from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
+
+    rig = load_rig()
+    plan = _plan_of(request, rig)
+    (condition,) = plan.conditions
+    stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
+    effects = plan_effects(plan)
+    chain = EffectChain.draw(stated, effects, np.random.default_rng([plan.seed, 0]))
+    wind = f"{condition.wind_speed:g} m/s" if condition.wind_speed > 0.0 else "wind off"
+    names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
+    start = "driven" if condition.drive else f"released at {degrees(condition.release_angle):.3g}°"
+    title = f"{condition.spring_stiffness:g} N m/rad, {wind}, {start}{names}"
+    return ShownRun(rig, chain, plan.sensor, title, plan.seed)
+
+
+def _plan_of(request: Request, rig: Rig) -> CampaignPlan:
+    """The plan with the request's effects and seed, and with the one run that is shown."""
+    if request.plan is None:
+        dynamics = rig.dynamics
+        condition = Condition(
+            id="run",
+            spring_stiffness=rig.spring(dynamics.default_spring),
+            wind_speed=10.0,
+            air_density=rig.air.density,
+            release_angle=radians(20.0),
+            duration=10.0,
+        )
+        truth = Truth(
+            **PAPER, yaw_inertia=dynamics.yaw_inertia, mechanical_damping=dynamics.mechanical_damping
+        )
+        plan = CampaignPlan("run", 1, truth, (condition,))
+    else:
+        plan = load_plan(Path(request.plan))
+    if request.seed is not None:
+        plan = replace(plan, seed=request.seed)
+    added = tuple(parse_effect(text) for text in request.effects)
+    condition = plan.conditions[0]
+    if request.run is not None:
+        if request.plan is None:
+            raise TunnelError(
+                "there is no plan", where=f"--run {request.run}", remedy="name the plan of this run"
+            )
+        by_id = {condition.id: condition for condition in plan.conditions}
+        if request.run not in by_id:
+            raise TunnelError(
+                f"has no run {request.run!r}", where=request.plan, remedy=did_you_mean(request.run, by_id)
+            )
+        condition = by_id[request.run]
+    wind = _number("--wind", request.wind_speed, condition.wind_speed, 0.0, 60.0, "m/s")
+    stated = degrees(condition.release_angle)
+    angle = _number("--angle", request.release_angle_deg, stated, -60.0, 60.0, "degrees")
+    condition = replace(
+        condition,
+        wind_speed=wind,
+        release_angle=condition.release_angle if request.release_angle_deg is None else radians(angle),
+        duration=_number("--duration", request.duration, condition.duration, 0.5, 600.0, "s"),
+        spring_stiffness=condition.spring_stiffness if request.spring is None else rig.spring(request.spring),
+    )
+    # Keep only this run, so that effects are checked against its spring alone.
+    return replace(plan, effects=plan.effects + added, conditions=(condition,))
+
+
+def _number(option: str, given: float | None, plan: float, low: float, high: float, unit: str) -> float:
+    if given is None:
+        return plan
+    if not (isfinite(given) and low <= given <= high):
+        raise TunnelError(
+            f"{given:g} is out of range", where=option, remedy=f"give {low:g} to {high:g} {unit}"
+        )
+    return given
+
+
+def backends() -> tuple[str, ...]:
+    """The OpenGL back ends to try, best first: values for ``MUJOCO_GL``.
+
+    Only the user's own choice where that variable is set, and an empty string (MuJoCo's default) where the platform
+    has only one.
     """
     chosen = os.environ.get("MUJOCO_GL")
     if chosen:
@@ -60,11 +205,7 @@ def backends() -> tuple[str, ...]:
 
 
 def checked_camera(name: str) -> str:
-    """Check the name of a camera.
-
-    Raises:
-        TunnelError: when the rig has no such camera.
-    """
+    """A name of a camera; a `TunnelError` with the closest name when the rig has no such camera."""
     if name not in CAMERAS:
         raise TunnelError(
             f"there is no camera {name!r}", where="--camera", remedy=did_you_mean(name, CAMERAS)
@@ -92,53 +233,29 @@ class Look:
     camera: str = "overview"
     trace: bool = True
 
-    def frame_times(self, duration: float) -> NDArray[np.float64]:
-        """When the frames are, in the run's own time.
-
-        Args:
-            duration: of the run, s.
-
-        Returns:
-            s from the release, shape (frames,).
-        """
-        return np.arange(max(1, int(duration * self.fps / self.speed))) * self.speed / self.fps
-
 
 def write_film(
-    request: Request, look: Look, path: Path, progress: Callable[[int, int], None] | None = None
+    request: Request,
+    look: Look,
+    path: Path,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    at: float | None = None,
 ) -> None:
-    """Write a run as MP4 (H.264), completely or not at all.
+    """Write a run as MP4 (H.264), or one frame of it as PNG, completely or not at all.
+
+    A child process draws into a temporary folder; the result is then moved to its place.
 
     Args:
-        path: the file; replaced when it exists.
         progress: called with (frames done, frames in all).
+        at: the frame, s from the release; None for the film.
 
     Raises:
-        TunnelError: when the machine cannot render off-screen, or the file cannot be written.
-    """
-    _draw_elsewhere(request, look, path, None, progress)
-
-
-def write_still(request: Request, look: Look, path: Path, at: float) -> None:
-    """Write one frame of the film as PNG, completely or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-        at: s from the release.
-
-    Raises:
-        TunnelError: as `write_film`; also when the run is shorter.
+        TunnelError: when the machine cannot render off-screen, the file cannot be written, or the run is shorter.
     """
     duration = shown_run(request).settings.duration
-    if not 0.0 <= at <= duration:
+    if at is not None and not 0.0 <= at <= duration:
         raise TunnelError(f"{at:g} s is not in the run", where="--at", remedy=f"give 0 to {duration:g} s")
-    _draw_elsewhere(request, look, path, at, None)
-
-
-def _draw_elsewhere(
-    request: Request, look: Look, path: Path, at: float | None, progress: Callable[[int, int], None] | None
-) -> None:
-    """Draw in a child process into a temporary folder, then move the result to its place."""
     order = {"request": asdict(request), "look": asdict(look), "at": at}
     reasons = []
     with tempfile.TemporaryDirectory() as folder:
@@ -154,51 +271,43 @@ def _draw_elsewhere(
 
 def _one_backend(backend: str, order: dict[str, Any], progress: Callable[[int, int], None] | None) -> str:
     """Draw with one back end; return an empty text on success, else the reason."""
+    import threading
+
     environment = {**os.environ, "MUJOCO_GL": backend} if backend else dict(os.environ)
     arguments = [sys.executable, "-m", "tunnel_lab.show.film", json.dumps(order)]  # our own module, no shell
+    silent = threading.Event()
     with (
         tempfile.TemporaryFile("w+") as errors,
         subprocess.Popen(
             arguments, env=environment, stdout=subprocess.PIPE, stderr=errors, text=True
         ) as child,
     ):
+
+        def give_up() -> None:
+            silent.set()
+            child.kill()
+
+        patience = threading.Timer(FIRST_FRAME_S, give_up)
+        patience.start()
         try:
-            silent = _follow(child, progress)
+            assert child.stdout is not None
+            for line in child.stdout:
+                patience.cancel()
+                done, _, total = line.partition("/")
+                if progress is not None and total.strip().isdigit():
+                    progress(int(done), int(total))
+            child.wait()
         finally:  # also when interrupted; `Popen` itself would then wait for a quarter of a second only
+            patience.cancel()
             child.kill()
             child.wait()
-        if silent:
+        if silent.is_set():
             return f"no answer in {FIRST_FRAME_S:.0f} s"
         if child.returncode == 0:
             return ""
         errors.seek(0)
         lines = errors.read().strip().splitlines()
     return (lines or [f"ended with status {child.returncode}"])[-1][:80]
-
-
-def _follow(child: subprocess.Popen[str], progress: Callable[[int, int], None] | None) -> bool:
-    """Read the child's progress until it ends; return whether it exceeded the time limit."""
-    import threading
-
-    silent = threading.Event()
-
-    def give_up() -> None:
-        silent.set()
-        child.kill()
-
-    patience = threading.Timer(FIRST_FRAME_S, give_up)
-    patience.start()
-    try:
-        assert child.stdout is not None
-        for line in child.stdout:
-            patience.cancel()
-            done, _, total = line.partition("/")
-            if progress is not None and total.strip().isdigit():
-                progress(int(done), int(total))
-        child.wait()
-    finally:
-        patience.cancel()
-    return silent.is_set()
 
 
 def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Image]:
@@ -233,32 +342,6 @@ def frames(run: ShownRun, look: Look, times: NDArray[np.float64]) -> Iterator[Im
             yield picture if trace is None else np.concatenate((picture, trace.at(float(time))), axis=1)
 
 
-def _draw(order: dict[str, Any]) -> None:
-    """Draw in this process; an error ends it."""
-    run = shown_run(Request.from_json_dict(order["request"]))
-    look, path = Look(**order["look"]), Path(order["path"])
-    if order["at"] is not None:
-        from matplotlib import image
-
-        (picture,) = frames(run, look, np.array([float(order["at"])]))
-        image.imsave(path, picture, format="png")
-        return
-    import imageio.v2 as imageio
-
-    times = look.frame_times(run.settings.duration)
-    writer: Any = imageio.get_writer(
-        path, format="FFMPEG", mode="I", fps=look.fps, codec="libx264", quality=7, macro_block_size=2
-    )
-    with writer:
-        for number, frame in enumerate(frames(run, look, times), 1):
-            writer.append_data(frame)
-            print(f"{number}/{len(times)}", flush=True)
-
-
-if __name__ == "__main__":
-    _draw(json.loads(sys.argv[1]))
-
-
 @dataclass(frozen=True, eq=False)
 class Trace:
     """Two drawings of the same axes, and the positions of the samples.
@@ -282,14 +365,7 @@ class Trace:
     bottom: int
 
     def at(self, time: float) -> Image:
-        """The trace up to a time.
-
-        Args:
-            time: s from the release.
-
-        Returns:
-            RGB, shape (height, width, 3).
-        """
+        """The trace up to a time in s from the release, RGB, shape (height, width, 3)."""
         picture = self.faint.copy()
         column = round(float(np.interp(time, self.time, self.columns)))
         row = round(float(np.interp(time, self.time, self.rows)))
@@ -301,12 +377,7 @@ class Trace:
 
 
 def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
-    """Draw a record's axes once.
-
-    Args:
-        width: pixels.
-        height: pixels.
-    """
+    """Draw a record's axes once; width and height in pixels."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -340,3 +411,30 @@ def draw_trace(record: Record, width: int, height: int, title: str) -> Trace:
 def _pixels(canvas: Any) -> Image:
     canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3], dtype=np.uint8)
+
+
+def _draw(order: dict[str, Any]) -> None:
+    """Draw in this process; an error ends it."""
+    run = shown_run(Request.from_json_dict(order["request"]))
+    look, path = Look(**order["look"]), Path(order["path"])
+    if order["at"] is not None:
+        from matplotlib import image
+
+        (picture,) = frames(run, look, np.array([float(order["at"])]))
+        image.imsave(path, picture, format="png")
+        return
+    import imageio.v2 as imageio
+
+    count = max(1, int(run.settings.duration * look.fps / look.speed))
+    times = np.arange(count) * look.speed / look.fps
+    writer: Any = imageio.get_writer(
+        path, format="FFMPEG", mode="I", fps=look.fps, codec="libx264", quality=7, macro_block_size=2
+    )
+    with writer:
+        for number, frame in enumerate(frames(run, look, times), 1):
+            writer.append_data(frame)
+            print(f"{number}/{len(times)}", flush=True)
+
+
+if __name__ == "__main__":
+    _draw(json.loads(sys.argv[1]))

@@ -16,8 +16,8 @@ from mujoco.studio import messages, plugin, step_control
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 from mujoco.studio.implot import implot
 
-from tunnel_lab.show.request import ShownRun
-from tunnel_lab.terminal.tables import say
+from tunnel_lab.show.film import ShownRun
+from tunnel_lab.terminal.outputs import say
 from tunnel_sim.engine.model import build_model, build_spec
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -67,30 +67,22 @@ class LiveRun:
         self._record()
 
     def advance(self, seconds: float) -> None:
-        """Advance; a run that is over is released again.
+        """Advance by seconds of the run; a run that is over is released again."""
 
-        Args:
-            seconds: of the run, s.
-        """
-        self.advance_by(lambda: self._step(self._steps(seconds)))
+        def step() -> None:
+            steps, apart = self._steps(seconds), self._steps(self.history.interval) or 1
+            for done in range(0, steps, apart):  # a stop for every point of the history
+                mujoco.mj_step(self.model.mj, self.data, min(apart, steps - done))
+                self._record()
+
+        self.advance_by(step)
 
     def advance_by(self, step: Callable[[], object]) -> None:
-        """Advance by an external clock; a run that is over is released again.
-
-        Args:
-            step: advances ``data``, or leaves it unchanged.
-        """
+        """Advance by an external clock, which steps ``data`` or leaves it; a run that is over is released again."""
         if self.data.time >= self.run.settings.duration:
             self.release()
         step()
         self._record()
-
-    def _step(self, steps: int) -> None:
-        """Step, with a stop for every point of the history."""
-        apart = self._steps(self.history.interval) or 1
-        for done in range(0, steps, apart):
-            mujoco.mj_step(self.model.mj, self.data, min(apart, steps - done))
-            self._record()
 
     def _record(self) -> None:
         self.history.add(float(self.data.time), self.angle)
@@ -163,7 +155,7 @@ class History:
         return np.array(self._points, dtype=np.float64).reshape(-1, 2)
 
 
-class _PuppetMaster(step_control.StepControl):  # type: ignore[misc]  # mujoco is untyped
+class PuppetMaster(step_control.StepControl):  # type: ignore[misc]  # mujoco is untyped
     """Studio's pause, speed and single step, applied to the full physics instead of the shown model."""
 
     def __init__(self, live: LiveRun) -> None:
@@ -185,15 +177,6 @@ class _PuppetMaster(step_control.StepControl):  # type: ignore[misc]  # mujoco i
         self._live.release()
 
 
-def puppet_master(live: LiveRun) -> Any:
-    """Studio's stepper for a run.
-
-    Returns:
-        A plugin for ``mujoco.studio.launch_web.launch``.
-    """
-    return _PuppetMaster(live)
-
-
 def missing_display() -> str:
     """Why no window can be opened; empty where the environment shows no reason."""
     if sys.platform.startswith("linux") and not (
@@ -212,22 +195,14 @@ class Controls:
         self.released = False
 
     def key(self, code: int) -> None:
-        """Record a key; called from the viewer's thread, so it only sets a flag.
-
-        Args:
-            code: of the key, a GLFW number (count).
-        """
+        """Record a GLFW key; called from the viewer's thread, so it only sets a flag."""
         if code == _KEY_SPACE:
             self.paused = not self.paused
         elif code == _KEY_R:
             self.released = True
 
     def advance(self, seconds: float) -> None:
-        """Advance by the clock, as the keys demand.
-
-        Args:
-            seconds: since the last call, s.
-        """
+        """Advance by the seconds since the last call, as the keys demand."""
         if self.released:
             self.released = False
             self._live.release()
@@ -294,33 +269,22 @@ def window_loop(
         with handle.lock():
             controls.advance(min(now - last, 0.1) * speed)
         last = now
-        import mujoco
-
         width, height = (
             (handle.viewport.width, handle.viewport.height) if handle.viewport is not None else (1200, 900)
         )
-        handle.set_figures(
-            (mujoco.MjrRect(width - width // 3, 0, width // 3, height // 4), _figure(live.history))
-        )
+        figure = mujoco.MjvFigure()
+        mujoco.mjv_defaultFigure(figure)
+        figure.title = "angle [rad] against time [s]"
+        figure.flg_extend = 1
+        figure.gridsize[:] = 3, 3
+        figure.linergb[0][:] = 0.84, 0.37, 0.0
+        points = live.history.points.astype(np.float32)
+        figure.linepnt[0] = len(points)
+        figure.linedata[0][: 2 * len(points)] = points.ravel()
+        handle.set_figures((mujoco.MjrRect(width - width // 3, 0, width // 3, height // 4), figure))
         handle.set_texts((None, None, "space\nR", "pause\nrelease again"))
         handle.sync()
         sleep(max(0.0, FRAME_S - (clock() - now)))
-
-
-def _figure(history: History) -> Any:
-    """The trace as a figure of MuJoCo's."""
-    import mujoco
-
-    figure = mujoco.MjvFigure()
-    mujoco.mjv_defaultFigure(figure)
-    figure.title = "angle [rad] against time [s]"
-    figure.flg_extend = 1
-    figure.gridsize[:] = 3, 3
-    figure.linergb[0][:] = 0.84, 0.37, 0.0
-    points = history.points.astype(np.float32)
-    figure.linepnt[0] = len(points)
-    figure.linedata[0][: 2 * len(points)] = points.ravel()
-    return figure
 
 
 def view_in_browser(
@@ -352,7 +316,7 @@ def view_in_browser(
         gfx="web", http_port=port, open_browser=open_browser, title="virtual wind tunnel"
     )
     # The inspector lies where the trace is, and shows the copy rather than the physics.
-    plugins = [app.App(app.Config(show_inspector=False)), puppet_master(live), overlay(live, address)]
+    plugins = [app.App(app.Config(show_inspector=False)), PuppetMaster(live), Overlay(live, address)]
     begun = time.monotonic()
     try:
         with launch_web.launch(config, plugins=plugins) as handle:
@@ -375,7 +339,7 @@ def _free_port() -> int:
     return 0
 
 
-class _Overlay(plugin.ViewerPlugin):  # type: ignore[misc]  # mujoco is untyped
+class Overlay(plugin.ViewerPlugin):  # type: ignore[misc]  # mujoco is untyped
     """A window in the upper right corner, drawn with every frame from the shown pose."""
 
     def __init__(self, live: LiveRun, address: str) -> None:
@@ -395,41 +359,15 @@ class _Overlay(plugin.ViewerPlugin):  # type: ignore[misc]  # mujoco is untyped
         imgui.SetNextWindowPos(place, imgui.Cond.Always, corner)
         imgui.SetNextWindowSize(imgui.Vec2(_WIDTH, 0.0), imgui.Cond.Always)
         imgui.Begin("Run")
-        for line in (*self._head, readings(time, angle, self._wind), f"served at {self._address}"):
+        wind = f"{self._wind:.1f} m/s" if self._wind > 0.0 else "off"
+        readings = f"time {time:5.2f} s   angle {degrees(angle):+6.2f} deg   wind {wind}"
+        for line in (*self._head, readings, f"served at {self._address}"):
             imgui.TextUnformatted(line)
         if implot.BeginPlot("##angle against time", imgui.Vec2(-1.0, _PLOT)):
-            self._plot(time)
+            points, span = self._history.points, self._history.span
+            begin = max(0.0, time - span)
+            implot.SetupAxes("time [s]", "angle [deg]")
+            implot.SetupAxesLimits(begin, begin + span, -self._limit, self._limit, implot.Cond.Always)
+            implot.PlotLine("", points[:, 0].tolist(), [degrees(value) for value in points[:, 1]])
             implot.EndPlot()
         imgui.End()
-
-    def _plot(self, time: float) -> None:
-        points = self._history.points
-        span = self._history.span
-        begin = max(0.0, time - span)
-        implot.SetupAxes("time [s]", "angle [deg]")
-        implot.SetupAxesLimits(begin, begin + span, -self._limit, self._limit, implot.Cond.Always)
-        implot.PlotLine("", points[:, 0].tolist(), [degrees(value) for value in points[:, 1]])
-
-
-def readings(time: float, angle: float, wind_speed: float) -> str:
-    """Time, angle and wind speed in one line.
-
-    Args:
-        time: s.
-        angle: rad.
-        wind_speed: m/s.
-    """
-    wind = f"{wind_speed:.1f} m/s" if wind_speed > 0.0 else "off"
-    return f"time {time:5.2f} s   angle {degrees(angle):+6.2f} deg   wind {wind}"
-
-
-def overlay(live: LiveRun, address: str) -> Any:
-    """The window of a run.
-
-    Args:
-        address: of the page.
-
-    Returns:
-        A plugin for ``mujoco.studio.launch_web.launch``.
-    """
-    return _Overlay(live, address)

@@ -1,13 +1,21 @@
-"""What commands are given: a campaign, as a folder or as a file of a data logger, and an effect."""
+"""What commands are given: a campaign or an effect, and options that several commands share."""
 
 from __future__ import annotations
 
 import hashlib
 import shlex
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from enum import StrEnum
+from functools import wraps
+from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from tunnel_sim.vocabulary.errors import TunnelError
+import typer
+from typer import Option
+
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
@@ -23,29 +31,21 @@ _FORM = "write NAME:PARAMETER=VALUE, with a comma before each further PARAMETER=
 
 
 def given_campaign(path: Path) -> Campaign:
-    """Read what a command is given.
+    """Read a campaign's folder, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
 
-    Args:
-        path: the folder of a campaign, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
-
-    Returns:
-        The campaign. What was made of a file of a data logger is printed on standard error.
+    What was made of a file of a data logger is printed on standard error.
 
     Raises:
         TunnelError: for the first fault.
     """
-    from tunnel_lab.terminal.tables import say
+    from tunnel_lab.terminal.outputs import say
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
-    from tunnel_sim.vocabulary.errors import TunnelError, shown
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:
         return read_campaign(path)
     if path.suffix.lower() == ".toml":
-        raise TunnelError(
-            f"is neither a record nor a {CAMPAIGN_FILE}",
-            where=shown(path),
-            remedy=f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER",
-        )
+        remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
+        raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)
     from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
 
     try:
@@ -59,34 +59,28 @@ def given_campaign(path: Path) -> Campaign:
 
 
 def file_hashes(path: Path) -> dict[str, str]:
-    """SHA-256 of the files that a campaign was read from.
-
-    Args:
-        path: as for `given_campaign`, which has read it.
+    """SHA-256 of the files that a campaign was read from, as for `given_campaign`, which has read it.
 
     Returns:
         Hexadecimal digests by name in the campaign's folder: ``campaign.toml`` and the runs, or the one file.
     """
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_document
-    from tunnel_sim.vocabulary.errors import one_line
 
     if path.is_file() and path.name != CAMPAIGN_FILE:
-        return {one_line(path.name): _sha256(path)}
-    folder = path.parent if path.is_file() else path
-    names = dict.fromkeys([CAMPAIGN_FILE, *(run.file for run in read_document(folder / CAMPAIGN_FILE).runs)])
-    return {name: _sha256(folder / name) for name in names}
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+        paths = {one_line(path.name): path}
+    else:
+        folder = path.parent if path.is_file() else path
+        files = [CAMPAIGN_FILE, *(run.file for run in read_document(folder / CAMPAIGN_FILE).runs)]
+        paths = {name: folder / name for name in files}
+    digests = {}
+    for name, file in paths.items():
+        with file.open("rb") as stream:
+            digests[name] = hashlib.file_digest(stream, "sha256").hexdigest()
+    return digests
 
 
 def parse_effect(text: str) -> EffectSetting:
-    """Read the value of ``--effect``.
-
-    Args:
-        text: such as ``coulomb_friction:friction_moment=0.004``.
+    """Read the value of ``--effect``, such as ``coulomb_friction:friction_moment=0.004``.
 
     Returns:
         Name and parameters; the registry checks whether they exist and are in range.
@@ -112,3 +106,108 @@ def parse_effect(text: str) -> EffectSetting:
     if not name.strip():
         raise TunnelError("no effect is named", where=where, remedy=_FORM)
     return EffectSetting(name.strip(), values)
+
+
+EVERY = "As for every command"
+"""Where the help lists what every command takes."""
+quiet: ContextVar[bool] = ContextVar("quiet", default=False)
+"""Whether this command prints errors only."""
+
+
+def _know_effects(context: typer.Context, path: Path | None) -> Path | None:
+    """Make the effects of a file known until the command ends."""
+    if path is not None:
+        from tunnel_sim.effects.expression_effect import read_effects
+        from tunnel_sim.effects.registry import answering_with
+
+        context.with_resource(answering_with(read_effects(path)))
+    return path
+
+
+EffectsFileOption = Annotated[
+    Path | None,
+    Option(
+        "--effects-file",
+        metavar="FILE.toml",
+        rich_help_panel="Effects",
+        help="Add the effects that this file states as expressions to the vocabulary.",
+        callback=_know_effects,
+    ),
+]
+
+
+def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Names from repeated options, from lists with commas, or from both."""
+    return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
+
+
+def known_estimator(name: str) -> None:
+    """Refuse an unknown estimator with a `TunnelError` that suggests the closest name."""
+    from identification.estimators import known_estimators
+
+    known = known_estimators()
+    if name not in known:
+        raise TunnelError(
+            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, known)
+        )
+
+
+def refuse_unwritable_files(*paths: Path | None) -> None:
+    """Refuse the first file that cannot be written before the work is done; None is left out."""
+    from tunnel_sim.files.writing import refuse_unwritable
+
+    for path in filter(None, paths):
+        refuse_unwritable(path)
+
+
+class TableFormat(StrEnum):
+    """How tables are printed."""
+
+    TEXT = "text"
+    CSV = "csv"
+    MD = "md"
+    JSON = "json"
+
+
+chosen: ContextVar[TableFormat] = ContextVar("table format", default=TableFormat.TEXT)
+"""The format of this command's tables."""
+
+
+def with_format(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with ``--quiet``, and ``--format`` for the tables that it prints."""
+    option = Option(
+        "--format",
+        metavar="FORMAT",
+        rich_help_panel=EVERY,
+        help="Format of the tables: text, csv, md or json (one object per line). "
+        "Other lines then go to standard error.",
+    )
+    return _with_option(with_quiet(run), "table_format", Annotated[TableFormat, option], chosen)
+
+
+def with_quiet(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with the option ``--quiet``."""
+    text = "Print errors only; files and --json - are still written."
+    option = Option("--quiet", "-q", rich_help_panel=EVERY, help=text)
+    return _with_option(run, "quiet", Annotated[bool, option], quiet)
+
+
+def _with_option(
+    run: Callable[..., None], name: str, kind: Any, variable: ContextVar[Any]
+) -> Callable[..., None]:
+    """A command with one more option, whose value a variable has while it runs."""
+    default = variable.get()
+
+    @wraps(run)
+    def wider(*args: Any, **named: Any) -> None:
+        token = variable.set(named.pop(name, default))
+        try:
+            run(*args, **named)
+        finally:
+            variable.reset(token)
+
+    option = Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+    given = signature(run, eval_str=True)  # Typer finds its own annotations only where they are not texts
+    vars(wider)["__signature__"] = given.replace(parameters=[*given.parameters.values(), option])
+    wider.__annotations__ = {**run.__annotations__, name: kind}
+    return wider

@@ -1,28 +1,267 @@
-"""What several commands print: an estimate, an import, an uncertainty budget."""
+"""What commands print: lines, progress, and estimates, imports and budgets as tables with units and deviations."""
 
 from __future__ import annotations
 
+import csv
+import io
+import re
 import shlex
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import sqrt
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
+from rich import box
+from rich.cells import cell_len
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
 from identification import printing
-from identification.estimate import UNITS
-from identification.printing import SYMBOLS, TextTable, significant, unit
-from tunnel_lab.terminal import tables
+from identification.printing import SYMBOLS, TextTable, concise, in_stds, significant, unit, with_std
+from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
 
 if TYPE_CHECKING:
-    from identification.estimate import Estimate
-    from tunnel_sim.files.importing.records import Imported, ImportedRun
+    from rich.table import Column
+
+    from identification.estimate import Estimate, Quantity, RunEstimate, Status
+    from tunnel_sim.files.importing.records import Imported
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
+BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
+"""Printed once below tables in the short notation."""
+PROSE = 30
+"""Columns: a longer cell is a sentence, which may go over several lines."""
+_PADDING, _BETWEEN = 2, 1  # columns beside a cell, and between two
 DIAGNOSE = "run the diagnosis"
 """How notes end whose remedy is the diagnosis."""
 Document = Mapping[str, Any]
 _DOMINANT = 0.5  # of the variance: more than all others together
+_NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
+
+
+class _Console(Console):
+    """A console that leaves a closed pipe to ``main``."""
+
+    def on_broken_pipe(self) -> None:
+        """Pass the error on; Rich itself would exit with status 1."""
+        raise BrokenPipeError
+
+
+def console(*, stderr: bool = False) -> Console:
+    """A console that prints text unchanged, without highlighting and markup, or not at all with ``--quiet``."""
+    return _Console(stderr=stderr, quiet=quiet.get(), highlight=False, markup=False, emoji=False)
+
+
+def say(line: str, *, stderr: bool = False) -> None:
+    """Print one line unchanged, so that paths can be copied; on standard error where tables are not text."""
+    console(stderr=stderr or chosen.get() is not TableFormat.TEXT).print(line, soft_wrap=True)
+
+
+def say_written(*paths: Path | None) -> None:
+    """Name the files that were written; None is left out."""
+    for path in filter(None, paths):
+        say(f"Written: {path}")
+
+
+def show_tables(*tables: Table) -> None:
+    """Print tables that have rows, each followed by an empty line, in the format of ``--format``.
+
+    A table of text that is wider than the terminal is printed row by row.
+    """
+    out = console()
+    for table in tables:
+        if not table.row_count:
+            continue
+        if chosen.get() is TableFormat.TEXT and is_too_wide(table, out.width):
+            out.print(stacked(table, out.width), soft_wrap=True)
+        elif chosen.get() is TableFormat.TEXT:
+            out.print(keep_whole(table))
+        else:
+            out.print(rendered(table, chosen.get()), soft_wrap=True, end="")
+        if chosen.get() is not TableFormat.JSON:
+            out.print()
+
+
+def rendered(table: Table, kind: TableFormat) -> str:
+    """A table of texts as CSV, Markdown or JSON, which has numbers where a cell is one; with a final line feed."""
+    heads = [_plain(column.header) for column in table.columns]
+    rows = list(zip(*([_plain(cell) for cell in column.cells] for column in table.columns), strict=True))
+    title = _plain(table.title or "")
+    if kind is TableFormat.JSON:
+        from tunnel_sim.files.writing import json_line
+
+        records = [{head: _value(cell) for head, cell in zip(heads, row, strict=True)} for row in rows]
+        return json_line({"table": title, "rows": records}) + "\n"
+    if kind is TableFormat.MD:
+        lines = [heads, ["---"] * len(heads), *rows]
+        cells = (" | ".join(cell.replace("|", "\\|") for cell in line) for line in lines)
+        body = "\n".join(f"| {line} |" for line in cells)
+        return f"**{title}**\n\n{body}\n"
+    stream = io.StringIO()
+    stream.write(f"# {title}\n")
+    csv.writer(stream, lineterminator="\n").writerows([heads, *rows])
+    return stream.getvalue()
+
+
+def _plain(cell: object) -> str:
+    return " ".join(str(cell).split())
+
+
+def _value(cell: str) -> str | float:
+    if not _NUMBER.fullmatch(cell):
+        return cell
+    return int(cell) if cell.isdecimal() else float(cell)
+
+
+def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:
+    """An empty table in the common style: headings have units, those of ``right`` align to the right."""
+    result = Table(
+        title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_edge=False
+    )
+    for column in columns:
+        # As text, not markup: units are in brackets. Folded, not cut, so that no digit is lost.
+        result.add_column(Text(column), justify="right" if column in right else "left", overflow="fold")
+    return result
+
+
+def rich_table(plain: TextTable) -> Table:
+    """A plain table in the house's style."""
+    result = table(plain.title, *plain.columns, right=plain.right)
+    for row in plain.rows:
+        result.add_row(*map(Text, row))
+    return result
+
+
+def truth_table(estimates: Sequence[Estimate], truth: Mapping[str, float]) -> Table:
+    """Estimates beside the injected values.
+
+    Args:
+        truth: injected values by name, each in the unit of the estimate's quantity of that name.
+    """
+    from identification.estimate import UNITS
+
+    result = table(
+        "Estimates against the injected truth",
+        *("quantity", "truth", "estimate ± std", "error", "error/std"),
+        right=("truth", "error", "error/std"),
+    )
+    for estimate in estimates:
+        if result.row_count:
+            result.add_section()
+        result.add_row(Text(estimate.estimator, style="bold"))
+        for name, value in truth.items():
+            row = (Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"), significant(value))
+            quantity: Quantity | None = getattr(estimate, name)
+            if quantity is None:
+                result.add_row(*row, _status(estimate.status))
+                continue
+            error = quantity.value - value
+            relative = f"{100.0 * error / abs(value):+.1g} %" if value else ""
+            stds = in_stds(error, quantity.std)
+            result.add_row(*row, with_std(quantity.value, quantity.std), relative, stds)
+    return result
+
+
+def runs_table(campaign: Campaign, estimate: Estimate) -> Table:
+    """Natural frequency and damping ratio of every run."""
+    result = table(
+        f"Runs of {campaign.name}",
+        *("run", "Kr\n[N m/rad]", "V\n[m/s]", "ωn\n[rad/s]", "ζ\n[1]", "status"),
+        right=("Kr\n[N m/rad]", "V\n[m/s]"),
+    )
+    for run, estimated in zip(campaign.runs, estimate.runs, strict=True):
+        result.add_row(
+            Text(run.id),
+            "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+            f"{run.wind_speed:g}",
+            _concise(estimated.omega_n),
+            _concise(estimated.zeta),
+            _status(estimated.status),
+        )
+    return result
+
+
+def windows_table(run: RunEstimate) -> Table:
+    """Estimates of consecutive windows of a run, the largest amplitude first, as in the paper's Table III."""
+    cycles = run.windows[0].cycles if run.windows else 0
+    result = table(
+        f"{run.id}: windows of {cycles} cycle{'s' if cycles > 1 else ''}",
+        *("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]"),
+        right=("from [s]", "to [s]"),
+    )
+    for window in run.windows:
+        result.add_row(
+            f"{window.start_s:.2f}",
+            f"{window.start_s + window.duration_s:.2f}",
+            _concise(window.amplitude),
+            _concise(window.zeta),
+            _concise(window.omega_n),
+        )
+    return result
+
+
+def _concise(quantity: Quantity | None) -> str:
+    """A quantity without its unit, which is in the heading."""
+    return "–" if quantity is None else concise(quantity.value, quantity.std)
+
+
+def _status(status: Status) -> str:
+    """A status in a few words; its remedy is printed below the table."""
+    return status.name.lower().replace("_", " ")
+
+
+def is_too_wide(table: Table, width: int) -> bool:
+    """Whether cells other than sentences, or words of a heading, would be broken in so many columns."""
+    needed = sum(_least_width(column) + _PADDING for column in table.columns)
+    return needed + _BETWEEN * (len(table.columns) - 1) > width
+
+
+def keep_whole(table: Table) -> Table:
+    """The same table, with columns so wide that only headings and sentences are wrapped."""
+    for column in table.columns:
+        column.min_width = _least_width(column)
+    return table
+
+
+def _least_width(column: Column) -> int:
+    widths = [cell_len(word) for word in str(column.header).split()]
+    for cell in column.cells:  # its longest line, or the longest word of a sentence
+        longest = max(map(cell_len, str(cell).splitlines()), default=0)
+        widths.append(longest if longest <= PROSE else max(map(cell_len, str(cell).split())))
+    return max(widths, default=0)
+
+
+def stacked(table: Table, width: int) -> str:
+    """A table row by row: its first cell, and below it the others with their headings; empty ones are left out.
+
+    Sentences are wrapped to the width of the terminal; words are never broken.
+    """
+    heads = [" ".join(str(column.header).split()) for column in table.columns]
+    lines = [str(table.title or "")]
+    for first, *others in zip(*(column.cells for column in table.columns), strict=True):
+        named = [(head, str(cell)) for head, cell in zip(heads[1:], others, strict=True) if str(cell)]
+        if len(heads) == 2:
+            named, first = [], f"{first}: {others[0]}"
+        else:
+            first = f"{heads[0]} {first}"
+        lines += _wrapped(first, " ", width)
+        room = max((cell_len(head) for head, _ in named), default=0)
+        for head, cell in named:
+            lines += _wrapped(cell, f"   {head}{' ' * (room - cell_len(head))}  ", width)
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, prefix: str, width: int) -> Iterator[str]:
+    """Lines of a text after a prefix, the later ones indented as far."""
+    room = max(width - cell_len(prefix), PROSE)
+    lines = [part for line in text.splitlines() for part in wrap(line, room, break_long_words=False)]
+    for number, line in enumerate(lines or [""]):
+        yield f"{prefix if number == 0 else ' ' * cell_len(prefix)}{line}".rstrip()
 
 
 def show_estimate(
@@ -34,101 +273,161 @@ def show_estimate(
         source: what the campaign was read from, for commands to copy; None: nowhere.
     """
     document = estimate.to_json_dict()
-    coefficients = tables.rich_table(printing.coefficients_table(document))
-    tables.show_tables(coefficients, tables.runs_table(campaign, estimate))
+    show_tables(rich_table(printing.coefficients_table(document)), runs_table(campaign, estimate))
     if windows:
-        tables.show_tables(*map(tables.windows_table, estimate.runs))
-    tables.say(tables.BRACKETS)
+        show_tables(*map(windows_table, estimate.runs))
+    say(BRACKETS)
     command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
     for line in (*map(str, estimate.remarks), *printing.status_lines(document)):
-        tables.say(f"Note: {line.replace(DIAGNOSE, command)}")
-
-
-def show_import(imported: Imported) -> None:
-    """Print what was read, and how."""
-    tables.show_tables(tables.rich_table(parts_table(imported)))
-    for line in imported.remarks():
-        tables.say(f"Note: {line}")
+        say(f"Note: {line.replace(DIAGNOSE, command)}")
 
 
 def parts_table(imported: Imported) -> TextTable:
-    """The runs of an import, a row for each.
-
-    Returns:
-        The file where there are several, samples, rate, the stretch of the record, the swing and the conditions.
-    """
-    unit = imported.campaign.sensor.unit
-    headings = (
-        "samples",
-        "rate\n[Hz]",
-        "from\n[s]",
-        "to\n[s]",
-        f"swing\n[{unit}]",
-        "V\n[m/s]",
-        "Kr\n[N m/rad]",
-    )
+    """The runs of an import: file where there are several, samples, rate, stretch, swing and conditions."""
+    swing = f"swing\n[{imported.campaign.sensor.unit}]"
+    headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, "V\n[m/s]", "Kr\n[N m/rad]")
     several = len(imported.sources) > 1
-    rows = tuple(
-        (part.id, *([part.raw.source.name] if several else []), *_figures(part)) for part in imported.parts
-    )
-    return TextTable("Read", ("run", *(["file"] if several else []), *headings), rows, right=headings)
-
-
-def _figures(part: ImportedRun) -> tuple[str, ...]:
-    time = part.raw.cleaned.time_s[part.piece.first : part.piece.last]
-    run = part.run
-    if run is None:
-        return (f"{time.size}", "left out", "", "", "", "", "")
-    return (
-        f"{time.size}",
-        f"{run.record.sample_rate:.4g}",
-        f"{time[0]:.2f}",
-        f"{time[-1]:.2f}",
-        f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
-        f"{run.wind_speed:g}",
-        "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
-    )
+    rows = []
+    for part in imported.parts:
+        time, run = part.raw.cleaned.time_s[part.piece.first : part.piece.last], part.run
+        cells = [f"{time.size}", "left out", "", "", "", "", ""]
+        if run is not None:
+            cells[1:] = [
+                f"{run.record.sample_rate:.4g}",
+                f"{time[0]:.2f}",
+                f"{time[-1]:.2f}",
+                f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
+                f"{run.wind_speed:g}",
+                "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+            ]
+        rows.append((part.id, *([part.raw.source.name] if several else []), *cells))
+    return TextTable("Read", ("run", *(["file"] if several else []), *headings), tuple(rows), right=headings)
 
 
 def budget_table(budget: Document) -> TextTable:
-    """Standard uncertainties, source by source.
+    """Standard uncertainties, a row for each source and one for all of them, in the quantities' units.
 
-    Returns:
-        A row for each source and one for all of them, in the quantities' units; a negative value is the
-        reduction by a correlation.
+    A negative value is the reduction by a correlation.
     """
-    names = _names(budget)
+    from identification.estimate import UNITS
+
+    names = [name for name in UNITS if name in budget["combined_std"]]
     headings = tuple(f"{SYMBOLS[name]}\n{unit(UNITS[name])}" for name in names)
-    rows = [
-        (component["name"], *(_cell(component, name) for name in names)) for component in budget["components"]
-    ]
+    rows = []
+    for component in budget["components"]:
+        cells = []
+        for variance in (float(component["variance"][name]) for name in names):
+            if variance == 0.0:
+                cells.append("0" if component["known"] else "–")
+            else:
+                cells.append(f"{'−' if variance < 0.0 else ''}{significant(sqrt(abs(variance)), 2)}")
+        rows.append((component["name"], *cells))
     rows.append(("all together", *(significant(budget["combined_std"][name], 2) for name in names)))
     title = "Uncertainty budget: one standard uncertainty each"
     return TextTable(title, ("source", *headings), tuple(rows), right=headings)
 
 
-def _names(budget: Document) -> list[str]:
-    return [name for name in UNITS if name in budget["combined_std"]]
-
-
-def _cell(component: Document, name: str) -> str:
-    variance = float(component["variance"][name])
-    if variance == 0.0:
-        return "0" if component["known"] else "–"
-    return f"{'−' if variance < 0.0 else ''}{significant(sqrt(abs(variance)), 2)}"
-
-
 def budget_lines(budget: Document) -> list[str]:
     """The dominant source of each quantity, and the notes of the sources."""
+    from identification.estimate import UNITS
+
     components = budget["components"]
-    notes = [f"{component['name']}: {component['note']}" for component in components if component["note"]]
-    return [*(_largest(components, name) for name in _names(budget)), *notes]
+    lines = []
+    for name in (name for name in UNITS if name in budget["combined_std"]):
+        variances = [float(component["variance"][name]) for component in components]
+        largest, total = max(variances), sum(variances)
+        share = largest / total if total > 0.0 else 0.0
+        verb = "dominates" if share > _DOMINANT else "is the largest source"
+        source = components[variances.index(largest)]["name"]
+        lines.append(f"{SYMBOLS[name]}: {source} {verb}, {100.0 * share:.0f} % of the variance")
+    return [*lines, *(f"{part['name']}: {part['note']}" for part in components if part["note"])]
 
 
-def _largest(components: Sequence[Document], name: str) -> str:
-    variances = [float(component["variance"][name]) for component in components]
-    largest, total = max(variances), sum(variances)
-    share = largest / total if total > 0.0 else 0.0
-    verb = "dominates" if share > _DOMINANT else "is the largest source"
-    source = components[variances.index(largest)]["name"]
-    return f"{SYMBOLS[name]}: {source} {verb}, {100.0 * share:.0f} % of the variance"
+@contextmanager
+def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """A progress bar on standard error, where that is a terminal; elsewhere nothing is printed.
+
+    Args:
+        total: number of items, where it is known beforehand.
+
+    Yields:
+        A function to call with the number finished, the total and, where it has one, the name of the last item. The
+        first call gives the number finished before, which does not count for the speed.
+    """
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    terminal = console(stderr=True)
+    columns = (
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left"), TimeRemainingColumn(elapsed_when_finished=False),
+    )  # fmt: skip
+    with Progress(
+        *columns, console=terminal, disable=not terminal.is_terminal, speed_estimate_period=600
+    ) as progress:
+        task = progress.add_task(what, total=total)
+
+        def advance(done: int, count: int, name: str = "") -> None:
+            # Rich leaves the first change out of the speed: what was finished before needs no treatment of its own.
+            progress.update(task, completed=done, total=count, description=f"{what} {name}".rstrip())
+
+        yield advance
+
+
+STEPS = {
+    "noise": "estimating the noise",
+    "nominal fit": "fitting the nominal model",
+    "where": "locating the gap",
+    "effects": "fitting sets of effects",
+    "random moments": "fitting random moments",
+    "pruning": "fitting the answer without each effect",
+    "polishing": "fitting the answer to convergence",
+    "how far it closes": "predicting held-out runs",
+    "what no effect explains": "estimating what no effect explains",
+}
+"""Steps of the study in words; any other progress message is a set of effects."""
+_sets_every: float | None = None
+
+
+def print_sets(every: float) -> None:
+    """From now on, print tried sets of effects too where no terminal shows them, at most one in so many seconds."""
+    global _sets_every
+    _sets_every = every
+
+
+@contextmanager
+def step_display() -> Iterator[Callable[[str], None]]:
+    """A spinner with the step, the effect tried and the time, or one line per step where no terminal shows it.
+
+    Yields:
+        The function to call with each step.
+    """
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    terminal = console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
+        task = progress.add_task("starting", total=None)
+        step, begun, printed = "", time.perf_counter(), 0.0
+
+        def show_step(text: str) -> None:
+            nonlocal step, printed
+            now = time.perf_counter() - begun
+            if text in STEPS:
+                step = STEPS[text]
+                progress.update(task, description=step)
+                if not terminal.is_terminal:
+                    terminal.print(f"{now:.1f} s: {step}", markup=False)
+            else:
+                progress.update(task, description=f"{step}: {text}")
+                if not terminal.is_terminal and _sets_every is not None and now - printed >= _sets_every:
+                    printed = now
+                    terminal.print(f"{now:.1f} s: {step}: {text}", markup=False, soft_wrap=True)
+
+        yield show_step

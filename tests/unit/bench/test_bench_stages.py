@@ -15,7 +15,7 @@ from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench.workspace import Session
 from tunnel_lab.report import advice
-from tunnel_lab.terminal import progress
+from tunnel_lab.terminal import outputs
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -53,11 +53,11 @@ def test_the_stage_and_the_set_are_read_from_what_is_printed() -> None:
 def test_sets_are_printed_where_they_are_asked_for(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], every: float | None, sets: int
 ) -> None:
-    monkeypatch.setattr(progress, "_sets_every", None)
+    monkeypatch.setattr(outputs, "_sets_every", None)
     if every is not None:
-        progress.print_sets(every)
+        outputs.print_sets(every)
     long = " + ".join(["coulomb_friction", "quadratic_damping", "nonlinear_yaw_moment", "vortex_shedding"])
-    with progress.step_display() as show:
+    with outputs.step_display() as show:
         show("effects")
         for name in ("free_play", "mains_hum", long):
             show(name)

@@ -18,7 +18,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 Outcome = tuple[int, str, str]
 Tunnel = Callable[..., Outcome]
 
-COMMANDS = tuple(command.NAME for command in cli.COMMANDS)
+COMMANDS = tuple(cli.COMMANDS)
 
 
 def assert_refused(outcome: Outcome, *parts: str) -> None:
@@ -87,7 +87,7 @@ def test_a_message_of_several_lines_becomes_one(tunnel: Tunnel, monkeypatch: pyt
     def refuse(*_: object) -> None:
         raise TunnelError("two\nlines", where="here", remedy="join\n\n them")
 
-    monkeypatch.setattr("tunnel_lab.commands.springs.show", refuse)
+    monkeypatch.setattr("tunnel_lab.commands.paper.show_springs", refuse)
     assert_refused(tunnel("springs"), "here: two lines; join them")
 
 
@@ -95,7 +95,7 @@ def test_an_error_of_the_disk_is_one_line(tunnel: Tunnel, monkeypatch: pytest.Mo
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied", "secret.csv")
 
-    monkeypatch.setattr("tunnel_lab.commands.springs.show", refuse)
+    monkeypatch.setattr("tunnel_lab.commands.paper.show_springs", refuse)
     assert_refused(tunnel("springs"), "secret.csv: permission denied")
 
 
@@ -104,11 +104,11 @@ def test_ctrl_c_ends_with_130_and_one_line() -> None:
     script = (
         "import sys, time\n"
         "from tunnel_lab import cli\n"
-        "from tunnel_lab.commands import springs\n"
+        "from tunnel_lab.commands import paper\n"
         "def wait(*_):\n"
         "    print('ready', flush=True)\n"
         "    time.sleep(60)\n"
-        "springs.show = wait\n"
+        "paper.show_springs = wait\n"
         "sys.exit(cli.main(['springs']))\n"
     )
     with subprocess.Popen(

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from identification import Status
-from tunnel_lab.commands.demo import SHOWN, show_simulated, simulated_part
+from tunnel_lab.commands.paper import SHOWN, show_simulated, simulated_part
 from tunnel_sim.files.plan_file import load_plan
 
 TINY = Path(__file__).parents[2] / "data" / "tiny-plan.toml"

@@ -14,8 +14,8 @@ import pytest
 from diagnosis import diagnose
 from identification import identify
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.commands import doctor
-from tunnel_lab.commands.schema import SCHEMAS, schema
+from tunnel_lab.commands import about
+from tunnel_lab.commands.about import SCHEMAS, schema_of
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, library
@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def check(name: str, value: object) -> None:
-    jsonschema.Draft202012Validator(schema(name)).validate(value)
+    jsonschema.Draft202012Validator(schema_of(name)).validate(value)
 
 
 def test_the_doctor_finds_that_all_works(tunnel: Tunnel) -> None:
@@ -50,13 +50,13 @@ def test_a_failure_is_named_and_ends_with_status_one(tunnel: Tunnel, monkeypatch
 
 
 def test_an_estimate_far_from_the_truth_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "LARGEST_ERROR", 1e-6)
-    assert [fine for name, _, fine in doctor.self_check() if name.startswith("cn_")] == [False, False]
+    monkeypatch.setattr(about, "LARGEST_ERROR", 1e-6)
+    assert [fine for name, _, fine in about.self_check() if name.startswith("cn_")] == [False, False]
 
 
 def test_a_missing_extra_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(EXTRAS, "film", ("imageio", "no_such_module"))
-    found = dict(doctor.extras())
+    found = dict(about.extras())
     assert found["extra film"] == "lacks no_such_module: pip install 'virtual-wind-tunnel[film]'"
     with pytest.raises(
         TunnelError, match=r"a film needs the package no_such_module; run: pip install .*\[film\]"
@@ -100,11 +100,11 @@ def test_the_extras_are_those_of_the_installation() -> None:
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_a_schema_is_one_and_is_printed(tunnel: Tunnel, tmp_path: Path, name: str) -> None:
-    jsonschema.Draft202012Validator.check_schema(schema(name))
+    jsonschema.Draft202012Validator.check_schema(schema_of(name))
     status, out, _ = tunnel("schema", name)
-    assert (status, json.loads(out)) == (0, schema(name))
+    assert (status, json.loads(out)) == (0, schema_of(name))
     assert tunnel("schema", name, "--out", tmp_path / "s.json")[0] == 0
-    assert json.loads((tmp_path / "s.json").read_text()) == schema(name)
+    assert json.loads((tmp_path / "s.json").read_text()) == schema_of(name)
 
 
 def test_documents_of_the_project_obey_their_schemas(tiny_campaign: Path) -> None:
@@ -122,7 +122,7 @@ def test_documents_of_the_project_obey_their_schemas(tiny_campaign: Path) -> Non
 def test_the_schema_of_a_diagnosis_has_its_fields_and_no_others(tiny_campaign: Path) -> None:
     found = diagnose(read_campaign(tiny_campaign), kinds=(effect_class("quadratic_damping"),)).to_json_dict()
     check("diagnosis", found)
-    assert set(schema("diagnosis")["properties"]) == set(found)
+    assert set(schema_of("diagnosis")["properties"]) == set(found)
 
 
 def test_an_unknown_document_is_refused(tunnel: Tunnel) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tunnel_lab.commands.plan import rig_time
+from tunnel_lab.commands.simulate import rig_time
 from tunnel_sim.files.plan_file import load_plan, read_plan
 
 Tunnel = Callable[..., tuple[int, str, str]]

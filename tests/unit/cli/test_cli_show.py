@@ -19,9 +19,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tunnel_lab.show.film import Look, backends, draw_trace, write_film
+from tunnel_lab.show.film import Look, Request, backends, draw_trace, shown_run, write_film
 from tunnel_lab.show.live import Controls, History, LiveRun, Puppet, missing_display, window_loop
-from tunnel_lab.show.request import Request, shown_run
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
@@ -204,7 +203,7 @@ def test_the_panel_shows_a_long_title_whole_and_the_history_of_the_physics() -> 
     overlay = pytest.importorskip("tunnel_lab.show.live")
     effects = ("coulomb_friction:friction_moment=0.01", "rod_flexibility:compliance=0.01")
     live = LiveRun(shown_run(Request(effects=effects)))
-    panel = overlay.overlay(live, "http://localhost:8080/")
+    panel = overlay.Overlay(live, "http://localhost:8080/")
     assert " ".join(panel._head) == live.run.title
     assert max(map(len, panel._head)) <= 54  # characters of Studio's font in a panel of 380 pixels
     assert panel._history is live.history

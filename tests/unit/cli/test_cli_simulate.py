@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from identification.estimate import Estimate, Quantity, Status
-from tunnel_lab.commands.demo import misses, truth_of
+from tunnel_lab.commands.paper import misses
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
@@ -91,7 +91,7 @@ def test_a_folder_below_a_file_is_refused(tunnel: Tunnel, tmp_path: Path) -> Non
 
 def exact(plan: CampaignPlan, name: str = "output_error") -> Estimate:
     values: dict[str, Any] = {
-        key: Quantity(value, 0.01 * abs(value), "") for key, value in truth_of(plan).items()
+        key: Quantity(value, 0.01 * abs(value), "") for key, value in vars(plan.truth).items()
     }
     return Estimate("tiny", name, (), **values)
 
@@ -117,7 +117,7 @@ def test_a_failed_check_ends_the_demo_with_status_one(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: CampaignPlan
 ) -> None:
     monkeypatch.setattr("tunnel_sim.files.plan_file.paper_plan", lambda: plan)
-    monkeypatch.setattr("tunnel_lab.commands.demo.misses", lambda *_: ["planted"])
+    monkeypatch.setattr("tunnel_lab.commands.paper.misses", lambda *_: ["planted"])
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
     status, out, err = tunnel("demo", "--out", tmp_path / "out")
     assert status == 1

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from tunnel_lab.terminal import progress
-from tunnel_lab.terminal.tables import is_too_wide, stacked, table
+from tunnel_lab.terminal import outputs
+from tunnel_lab.terminal.outputs import is_too_wide, stacked, table
 from tunnel_sim.files.reading import inside, nearest
 
 Tunnel = Callable[..., tuple[int, str, str]]
@@ -56,8 +56,8 @@ def test_what_was_finished_before_does_not_count_for_the_time_left(monkeypatch: 
     terminal = Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None)
     now = 0.0
     monkeypatch.setattr(terminal, "get_time", lambda: now)
-    monkeypatch.setattr(progress, "console", lambda **_: terminal)
-    with progress.bar("scoring") as advance:
+    monkeypatch.setattr(outputs, "console", lambda **_: terminal)
+    with outputs.bar("scoring") as advance:
         now = 5.0
         advance(90, 100)
         now = 25.0

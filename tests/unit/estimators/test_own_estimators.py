@@ -11,7 +11,7 @@ import pytest
 from identification import Estimate, RunEstimate, identify
 from identification.datasets import measured_campaign
 from identification.estimators import ALL_ESTIMATORS, ENTRY_POINTS, known_estimators, make_estimator
-from tunnel_lab.terminal.options import known_estimator
+from tunnel_lab.terminal.inputs import known_estimator
 from tunnel_sim import Campaign, TunnelError
 
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.experiments.sweep import read_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
-from tunnel_lab.experiments.sweep_shards import ONE_THREAD
+from tunnel_lab.experiments.sweep import ONE_THREAD
+from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 
 
 @pytest.fixture

@@ -19,9 +19,8 @@ from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
 from tunnel_lab.experiments import runner, sweep_summary
-from tunnel_lab.experiments.sweep import read_sweep, run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
-from tunnel_lab.experiments.sweep_shards import RESULT_COLUMNS
+from tunnel_lab.experiments.sweep import RESULT_COLUMNS, run_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_summary import Line, lines_of, summarise
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -319,7 +318,7 @@ def test_a_figure_without_quantities_to_draw_is_none() -> None:
 
 def test_the_sweep_package_loads_nothing_heavy() -> None:
     code = (
-        "import sys, tunnel_lab.commands.sweep, tunnel_lab.experiments.runner\n"
+        "import sys, tunnel_lab.commands.experiments, tunnel_lab.experiments.runner\n"
         "print(sorted({'mujoco', 'numpy', 'polars', 'dask', 'distributed'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

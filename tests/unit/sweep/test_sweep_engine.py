@@ -17,11 +17,11 @@ import pytest
 
 from tests.unit.killed import names_of_the_dead
 from tests.unit.sweep.small_sweep import SMALL, contents
+from tunnel_lab.experiments import sweep as shard_module
 from tunnel_lab.experiments import sweep as store_module
-from tunnel_lab.experiments import sweep_shards as shard_module
 from tunnel_lab.experiments.runner import lasting_processes
-from tunnel_lab.experiments.sweep import begin, open_store, read_sweep, run_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
+from tunnel_lab.experiments.sweep import begin, open_store, run_sweep
+from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROOT = Path(__file__).parents[3]

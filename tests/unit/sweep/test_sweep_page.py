@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from tunnel_lab.experiments.sweep import read_sweep, run_sweep
-from tunnel_lab.experiments.sweep_shards import RESULT_COLUMNS
+from tunnel_lab.experiments.sweep import RESULT_COLUMNS, run_sweep
+from tunnel_lab.experiments.sweep_cases import read_sweep
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "sweep.md"
 TEXT = PAGE.read_text(encoding="utf-8")

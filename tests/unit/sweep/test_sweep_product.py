@@ -12,9 +12,8 @@ import pytest
 import tomli_w
 
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.experiments.sweep import read_sweep
-from tunnel_lab.experiments.sweep_cases import Sweep
-from tunnel_lab.experiments.sweep_shards import run_shard
+from tunnel_lab.experiments.sweep import run_shard
+from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig

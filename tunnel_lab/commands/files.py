@@ -1,0 +1,218 @@
+"""``tunnel import`` and ``export``: a campaign from files as instruments write them, and as one file for others."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Argument, Option
+
+from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
+from tunnel_sim.vocabulary.errors import TunnelError
+
+_column = partial(Option, rich_help_panel="Columns")
+_unit = partial(Option, rich_help_panel="Units")
+_runs = partial(Option, rich_help_panel="Runs")
+_condition = partial(Option, rich_help_panel="Conditions")
+_output = partial(Option, rich_help_panel="Output")
+
+
+def import_files(
+    files: Annotated[list[Path], Argument(metavar="FILE...", help="Files of a data logger, of any format.")],
+    out: Annotated[
+        Path | None, _output("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")
+    ] = None,
+    angle: Annotated[
+        list[str] | None,
+        _column("--angle", metavar="NAME", help="Column of the angle, by name or number. May be repeated."),
+    ] = None,
+    unit: Annotated[
+        str | None, _unit("--unit", help="Unit of the angle: rad, mrad, deg, turns, counts, V, deg/s, …")
+    ] = None,
+    drive: Annotated[
+        str | None, _column("--input", metavar="NAME", help="Column of a driven run's input, or none.")
+    ] = None,
+    input_as: Annotated[
+        str | None,
+        _column("--input-as", metavar="COLUMN", help="What the input is: moment_nm, drive or base_rad."),
+    ] = None,
+    time: Annotated[
+        str | None, _column("--time", metavar="NAME", help="Column of the times, by name or number.")
+    ] = None,
+    time_unit: Annotated[
+        str | None, _unit("--time-unit", help="Unit of the times: s, ms, us, min, …")
+    ] = None,
+    rate: Annotated[float | None, _unit("--rate", help="Sample rate, Hz, where there are no times.")] = None,
+    counts_per_turn: Annotated[
+        float | None, _unit("--counts-per-turn", help="Counts of an encoder per turn.")
+    ] = None,
+    calibration: Annotated[
+        str | None,
+        _unit(
+            "--calibration", metavar="'a + b*V'", help="Volts to angle: a formula, or a file of two columns."
+        ),
+    ] = None,
+    conditions: Annotated[
+        Path | None,
+        _condition(
+            "--conditions", metavar="RUNS.csv", help="Table of conditions: file or run, wind_speed, …"
+        ),
+    ] = None,
+    name: Annotated[
+        str | None,
+        _condition(
+            "--name", metavar="PATTERN", help="Conditions in the file names: S{spring}_V{wind_speed}_*"
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        _condition(
+            "--set", metavar="KEY=NUMBER", help="A condition of all runs, or a size. May be repeated."
+        ),
+    ] = None,
+    start: Annotated[float | None, _runs("--start", help="Leave out earlier samples, s.")] = None,
+    end: Annotated[float | None, _runs("--end", help="Leave out later samples, s.")] = None,
+    rest: Annotated[
+        float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
+    ] = None,
+    cut: Annotated[
+        bool | None, _runs("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
+    ] = None,
+    delimiter: Annotated[
+        str | None,
+        Option("--delimiter", hidden=True, help="Delimiter of a text file: tab, blank, ';', ',' or '|'."),
+    ] = None,
+    decimal: Annotated[
+        str | None, Option("--decimal", hidden=True, help="Decimal sign of a text file.")
+    ] = None,
+    recipe: Annotated[
+        Path | None, _column("--recipe", metavar="import.toml", help="Choices of an earlier import.")
+    ] = None,
+    preview: Annotated[
+        Path | None, _output("--preview", metavar="FILE.png", help="Draw what was read; write no campaign.")
+    ] = None,
+    yes: Annotated[bool, _output("--yes", "-y", help="Write without asking.")] = False,
+    overwrite: Annotated[
+        bool, _output("--overwrite", help="Replace a campaign that is already in the folder.")
+    ] = False,
+) -> None:
+    """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
+
+    Text of any dialect, Excel, MAT, TDMS, HDF5 and Parquet are read. Columns, units,
+    sample rate, runs and releases are found; what was found, and why, is printed
+    before anything is written. Options correct what was found wrongly; a recipe also
+    states delimiter and decimal sign of a text file. The campaign gets a picture
+    (import.png), the choices made (import.toml, for --recipe), and comments in
+    campaign.toml on what the files do not state, such as the stiffness.
+
+    [bold]Examples[/bold]
+      tunnel import log.csv --out my-rig
+      tunnel import log.csv --preview import.png
+      tunnel import S*.csv --out my-rig --name "S{spring}_V{wind_speed}_*" --set air_density=1.2
+      tunnel import shaker.csv --out my-rig --input torque --input-as moment_nm
+      tunnel import rig.mat --out my-rig --angle "data[1]" --unit deg
+      tunnel import next.csv --out next --recipe my-rig/import.toml --yes
+
+    [bold]Exit status[/bold]
+      0 imported, 1 declined, 2 bad input; nothing is left half written.
+    """
+    from tunnel_lab.plotting.runs import import_picture
+    from tunnel_sim.files.importing.conditions import ImportChoices, parse_setting, read_recipe
+    from tunnel_sim.files.importing.records import read_records, write_imported
+    from tunnel_sim.files.toml_input import validate
+    from tunnel_sim.files.writing import refuse_unwritable, write_whole
+
+    if (out is None) == (preview is None):
+        raise TunnelError("give one of them", where="--out, --preview", remedy="name a folder or a picture")
+    if preview is not None:
+        refuse_unwritable(preview)
+    words: dict[str, float] = {}
+    for word in settings or ():
+        words |= parse_setting(word, "--set").model_dump(exclude_none=True)
+    stated = {
+        "angle": tuple(angle or ()) or None,
+        "unit": unit,
+        "input": drive,
+        "input_as": input_as,
+        "time": time,
+        "time_unit": time_unit,
+        "rate": rate,
+        "counts_per_turn": counts_per_turn,
+        "calibration": calibration,
+        "name": name,
+        "start": start,
+        "end": end,
+        "rest": rest,
+        "cut": cut,
+        "delimiter": delimiter,
+        "decimal": decimal,
+        "conditions": words or None,
+    }
+    kept = {} if recipe is None else read_recipe(recipe).model_dump(exclude_defaults=True)
+    given = kept | {key: value for key, value in stated.items() if value is not None}
+    choices = validate(ImportChoices, given, Path("options"))
+    imported = read_records(files, choices, conditions=conditions, name=out.resolve().name if out else "")
+    show_tables(rich_table(parts_table(imported)))
+    for line in imported.remarks():
+        say(f"Note: {line}")
+    if preview is not None:
+        write_whole(preview, import_picture(imported))
+        say(f"Written: {preview}")
+        return
+    assert out is not None
+    if not yes and not sys.stdin.isatty():
+        raise TunnelError("cannot be confirmed without a terminal", where=str(out), remedy="add --yes")
+    if not yes and not typer.confirm(f"Write {out}?", default=True):
+        raise typer.Exit(1)
+    write_imported(imported, out, overwrite=overwrite, picture=import_picture)
+    count = len(imported.campaign.runs)
+    say(f"Written: {out} ({count} run{'s' if count > 1 else ''}, {out / 'import.png'} shows them)")
+
+
+class ExportFormat(StrEnum):
+    """What the file is."""
+
+    MAT = "mat"
+    CSV = "csv"
+    XLSX = "xlsx"
+    HDF5 = "hdf5"
+
+
+def export(
+    campaign: Annotated[Path, Argument(help="Folder of the campaign: campaign.toml and its runs.")],
+    format: Annotated[ExportFormat, Option("--format", help="Format of the file.")],
+    out: Annotated[
+        Path | None,
+        Option(
+            "--out", "-o", metavar="FILE", help="The file. Default: the name of the campaign's folder, here."
+        ),
+    ] = None,
+) -> None:
+    """Write a campaign as one file: MAT, CSV, Excel or HDF5.
+
+    Times are in s, angles in rad, conditions in SI units. MAT holds a structure
+    array runs; HDF5 a group for each run with its conditions as attributes;
+    Excel a sheet for each run and one of conditions; CSV one row for each sample
+    with the run's id and conditions. tunnel import reads the same runs again.
+
+    [bold]Examples[/bold]
+      tunnel export my-campaign --format mat
+      tunnel export my-campaign --format csv --out all-runs.csv
+
+    [bold]Exit status[/bold]
+      0 written, 2 bad input; the file is written completely or not at all.
+    """
+    from tunnel_sim.files.campaign_folder import read_campaign
+    from tunnel_sim.files.exporting import export_campaign
+    from tunnel_sim.files.writing import refuse_unwritable
+
+    path = out or Path(f"{campaign.resolve().name}.{'h5' if format is ExportFormat.HDF5 else format.value}")
+    refuse_unwritable(path)
+    data = read_campaign(campaign)
+    export_campaign(data, path, format.value)
+    count = len(data.runs)
+    say(f"Written: {path} ({count} run{'s' if count > 1 else ''})")

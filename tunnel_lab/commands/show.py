@@ -1,0 +1,247 @@
+"""``tunnel plot``, ``view`` and ``render``: figures of a campaign; the rig in a window, a browser or a film."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from typer import Argument, Option
+
+from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
+from tunnel_lab.terminal.inputs import given_campaign, split_names
+from tunnel_lab.terminal.outputs import bar, say, say_written
+from tunnel_sim.vocabulary.errors import TunnelError, library, shown
+
+if TYPE_CHECKING:
+    from tunnel_sim.vocabulary.campaign import Campaign, Run
+
+_DEFAULT = (Path("tunnel-output/rig.mp4"), Path("tunnel-output/rig.png"))
+PlanArgument = Annotated[
+    Path | None,
+    Argument(help="Plan of a campaign (TOML). Default: the rig with its default spring at 10 m/s."),
+]
+RunOption = Annotated[str | None, Option("--run", metavar="ID", help="Run of the plan. Default: its first.")]
+SpringOption = Annotated[int | None, Option("--spring", help="Number of the spring in Table II.")]
+WindOption = Annotated[float | None, Option("--wind", help="Wind speed, m/s.")]
+AngleOption = Annotated[float | None, Option("--angle", help="Release angle, degrees.")]
+EffectOption = Annotated[
+    list[str] | None,
+    Option(
+        "--effect",
+        metavar="NAME:PARAMETER=VALUE",
+        help="Add an effect to the nominal model. May be repeated; tunnel effects lists them.",
+    ),
+]
+
+
+def plot(
+    campaign: Annotated[
+        Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its fit.")
+    ],
+    out: Annotated[
+        Path, Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder.")
+    ] = Path("tunnel-output"),
+    runs: Annotated[
+        list[str] | None, Option("--run", metavar="ID", help="Runs of a diagnosis to draw. Default: all.")
+    ] = None,
+) -> None:
+    """Draw a campaign: angle traces, spectra, and ζ and ωn against the amplitude.
+
+    Writes traces-1 (twelve runs to a page), spectrum and windows, each as a
+    picture (PNG) and for print (PDF), into FOLDER/<name of the campaign's
+    folder>. Angles in rad, times in s, spectral density in rad²/Hz.
+
+    Of a diagnosis it writes fit-1 and so on, two runs to a page: what was
+    measured, what the nominal model and the model with the causes predict, and
+    their residuals in degrees, in the cycles where the models differ most.
+
+    [bold]Examples[/bold]
+      tunnel plot my-campaign
+      tunnel plot my-campaign --out figures
+      tunnel plot answer.json --run r02
+
+    [bold]Exit status[/bold]
+      0 drawn, 1 no run could be identified (windows is left out), 2 bad
+      input.
+    """
+    from identification import identify
+    from tunnel_lab.plotting import runs as figures
+    from tunnel_lab.plotting.style import save_both
+    from tunnel_lab.report.diagnosis_file import read_document
+    from tunnel_lab.report.fit import fit_pages
+    from tunnel_sim.files.writing import output_folder
+
+    failure = ""
+    if campaign.suffix.lower() == ".json":
+        pages = fit_pages(read_document(campaign), split_names(runs))
+        if not pages:
+            remedy = "diagnose the campaign again"
+            raise TunnelError("has no curves to draw", where=shown(campaign), remedy=remedy)
+        drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
+        folder = output_folder(out / campaign.stem)
+    else:
+        if runs:
+            raise TunnelError("--run is for the file of a diagnosis", remedy="leave it out for a campaign")
+        data = given_campaign(campaign)
+        folder = output_folder(out / campaign.resolve().name)
+        drawn = {f"traces-{number}": page for number, page in enumerate(figures.trace_pages(data), 1)}
+        drawn["spectrum"] = figures.spectrum_figure(spread(data))
+        estimate = identify(data, "output_error", throw=False)
+        if any(run.windows for run in estimate.runs):
+            drawn["windows"] = figures.windows_figure(estimate)
+        failure = estimate.status.value if estimate.status.failed else ""
+    written = [save_both(figure, folder / f"{name}.png") for name, figure in drawn.items()]
+    say_written(*(path for pair in written for path in pair))
+    if failure:
+        say(f"Note: {failure}", stderr=True)
+        raise typer.Exit(1)
+
+
+def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:
+    """A few runs that differ in spring and wind, to keep a plot readable.
+
+    Args:
+        count: at most this many runs (a count).
+
+    Returns:
+        The first runs of distinct spring and wind speed; the first runs where conditions are not stated.
+    """
+    chosen: dict[object, Run] = {}
+    for run in campaign.runs:
+        stated = (run.spring_stiffness, run.wind_speed)
+        chosen.setdefault(run.id if run.spring_stiffness is None else stated, run)
+    return tuple(chosen.values())[:count]
+
+
+def view(
+    plan: PlanArgument = None,
+    run_id: RunOption = None,
+    spring: SpringOption = None,
+    wind: WindOption = None,
+    angle: AngleOption = None,
+    effect: EffectOption = None,
+    duration: Annotated[float | None, Option("--duration", help="Time until the next release, s.")] = None,
+    seed: Annotated[int | None, Option("--seed", min=0, help="Seed of random effects.")] = None,
+    speed: Annotated[
+        float, Option("--speed", min=0.01, max=100.0, help="Factor on real time; window only.")
+    ] = 1.0,
+    camera: Annotated[
+        str, Option("--camera", help="overview, above or side: where the view begins.")
+    ] = "overview",
+    web: Annotated[bool, Option("--web", help="Show it in a browser instead of a window.")] = False,
+    port: Annotated[
+        int, Option("--port", min=0, max=65535, help="Port of --web; 0 takes the first free one from 8080.")
+    ] = 0,
+    browser: Annotated[bool, Option("--browser", help="With --web: open a browser tab.")] = False,
+) -> None:
+    """Watch the rig in real time; the model is released again when a run is over.
+
+    In the window (MuJoCo's viewer) space pauses, R releases the model again and the
+    mouse turns the view; a figure shows the angle. The window needs a display.
+
+    --web serves the same to a browser (MuJoCo Studio's web viewer, WebGL 2), which
+    has controls for pause, speed and reset, and shows trace, wind speed and its
+    address. It needs no display. It listens on all network interfaces, asks for no
+    password and does not check the Origin of a page: use it only in a network that
+    you trust.
+
+    [bold]Examples[/bold]
+      tunnel view
+      tunnel view plan.toml --run s5-v10-a20 --speed 0.5
+      tunnel view --spring 8 --effect coulomb_friction:friction_moment=0.01
+      tunnel view --web --port 8080
+
+    [bold]Exit status[/bold]
+      0 closed, 2 bad input, no display or no free port, 130 interrupted.
+    """
+    from tunnel_lab.show.film import Request, checked_camera, shown_run
+
+    file, effects = None if plan is None else str(plan), tuple(effect or ())
+    request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
+    if not web and (port or browser):
+        raise TunnelError("needs --web", where="--port" if port else "--browser", remedy="add --web")
+    name = checked_camera(camera)
+    run = shown_run(request)
+    from tunnel_lab.show.live import view_in_browser, view_in_window  # refusals need no engine
+
+    if web:
+        view_in_browser(run, port=port, camera=name, open_browser=browser)
+    else:
+        view_in_window(run, camera=name, speed=speed)
+
+
+def render(
+    plan: PlanArgument = None,
+    out: Annotated[
+        list[Path] | None,
+        Option("--out", "-o", metavar="FILE", help="An .mp4 or .png file. May be repeated."),
+    ] = None,
+    run_id: RunOption = None,
+    spring: SpringOption = None,
+    wind: WindOption = None,
+    angle: AngleOption = None,
+    duration: Annotated[float | None, Option("--duration", help="Duration of the run, s.")] = None,
+    effect: EffectOption = None,
+    seed: Annotated[int | None, Option("--seed", min=0, help="Seed of the noise.")] = None,
+    at: Annotated[float, Option("--at", help="Time of the picture, s from the release.")] = 2.0,
+    fps: Annotated[int, Option("--fps", min=1, max=120, help="Frames per second of the film.")] = 25,
+    speed: Annotated[
+        float, Option("--speed", min=0.01, max=100.0, help="Speed of the film; 0.5 is half as fast.")
+    ] = 1.0,
+    size: Annotated[str, Option("--size", metavar="WIDTHxHEIGHT", help="Pixels.")] = "1280x720",
+    camera: Annotated[str, Option("--camera", help="overview, above or side.")] = "overview",
+) -> None:
+    """Film a run: the oscillating model, and the sensor's reading beside it.
+
+    Writes MP4 (H.264) and PNG files; by default tunnel-output/rig.mp4 and
+    tunnel-output/rig.png. Frames are drawn off-screen with EGL or OSMesa; no
+    display is needed. A frame takes about a fifth of a second without a graphics
+    card.
+
+    [bold]Examples[/bold]
+      tunnel render
+      tunnel render plan.toml --run s5-v10-a20 --out swing.mp4
+      tunnel render --spring 8 --wind 20 --angle 10 --out still.png --at 1.5
+
+    [bold]Exit status[/bold]
+      0 written, 2 bad input or no way to render here; nothing is written then.
+    """
+    from tunnel_lab.show.film import Look, Request, checked_camera, shown_run, write_film
+    from tunnel_sim.files.writing import output_folder
+
+    targets = out or list(_DEFAULT)
+    for path in targets:
+        _check_target(path)
+        if not out:
+            output_folder(path.parent)
+        elif not path.parent.is_dir():
+            remedy = "make the folder, or name another file"
+            raise TunnelError("its folder does not exist", where=f"--out {path}", remedy=remedy)
+    width, cross, height = size.lower().partition("x")
+    pixels = [int(part) if part.isdecimal() else 0 for part in (width, height)]
+    if not cross or any(n % 2 or not 160 <= n <= 3840 for n in pixels):
+        remedy = "give two even numbers from 160 to 3840, such as 1280x720"
+        raise TunnelError(f"{size!r} is not a size", where="--size", remedy=remedy)
+    look = Look(pixels[0], pixels[1], fps=fps, speed=speed, camera=checked_camera(camera))
+    file, effects = None if plan is None else str(plan), tuple(effect or ())
+    request = Request(file, run_id, spring, wind, angle, duration, effects, seed)
+    length = shown_run(request).settings.duration  # refuses bad input before anything is drawn
+    for path in targets:
+        if path.suffix.lower() == ".png":
+            write_film(request, look, path, at=min(at, length) if out is None else at)
+        else:
+            with bar("drawing frames") as progress:
+                write_film(request, look, path, progress)
+    say_written(*targets)
+
+
+def _check_target(path: Path) -> None:
+    """Refuse a file that cannot be written before the work is done."""
+    if path.suffix.lower() not in (".mp4", ".png"):
+        remedy = "name a file that ends in one of these"
+        raise TunnelError("is neither .mp4 nor .png", where=f"--out {path}", remedy=remedy)
+    if path.suffix.lower() == ".mp4":
+        library("imageio_ffmpeg", "a film", "film", f"--out {path}")
+    if path.is_dir():
+        raise TunnelError("is a folder", where=f"--out {path}", remedy="name a file")
