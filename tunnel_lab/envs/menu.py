@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from importlib import resources
 from itertools import product
 from math import degrees, isfinite, radians
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -75,10 +74,7 @@ class Menu:
         return len(self.springs), len(self.wind_speeds), len(self.release_angles), len(self.durations)
 
     def choice(self, action: Iterable[int]) -> Choice:
-        """The run that an action stands for.
-
-        Args:
-            action: indices of spring, speed, angle and duration.
+        """The run that an action stands for: indices of spring, speed, angle and duration.
 
         Raises:
             TunnelError: when it is not four indices within the menu.
@@ -87,11 +83,11 @@ class Menu:
         numbers = np.asarray(action)
         if numbers.shape != (4,) or not np.issubdtype(numbers.dtype, np.integer):
             raise TunnelError(f"{action!r} is not an action", where="Campaign-v0", remedy=remedy)
-        spring, speed, angle, duration = (int(i) for i in numbers)
-        if not all(0 <= i < n for i, n in zip((spring, speed, angle, duration), self.shape, strict=True)):
+        if np.any(numbers < 0) or np.any(numbers >= self.shape):
             raise TunnelError(
                 f"action {numbers.tolist()} is outside the menu", where="Campaign-v0", remedy=remedy
             )
+        spring, speed, angle, duration = numbers.tolist()
         number, stiffness = self.springs[spring]
         return Choice(
             number, stiffness, self.wind_speeds[speed], self.release_angles[angle], self.durations[duration]
@@ -99,8 +95,8 @@ class Menu:
 
     def actions(self) -> Iterator[tuple[int, int, int, int]]:
         """Every action, durations fastest, springs slowest."""
-        springs, speeds, angles, durations = (range(n) for n in self.shape)
-        return product(springs, speeds, angles, durations)
+        springs, speeds, angles, durations = self.shape
+        return product(range(springs), range(speeds), range(angles), range(durations))
 
 
 def make_menu(
@@ -110,25 +106,17 @@ def make_menu(
     release_angles_deg: Sequence[float],
     durations: Sequence[float],
 ) -> Menu:
-    """Check and convert the arguments of an environment.
-
-    Args:
-        rig: the rig whose springs the numbers refer to.
-        springs: numbers of the rig's springs.
-        wind_speeds: m/s, 0 or more.
-        release_angles_deg: degrees, above 0.
-        durations: s, above 0.
+    """Check and convert the arguments of an environment: springs by number, m/s, degrees and s.
 
     Raises:
         TunnelError: when a list is empty, repeats itself, or holds a value that the rig does not allow.
     """
-    lists = {
-        "springs": springs,
-        "wind_speeds": wind_speeds,
-        "release_angles_deg": release_angles_deg,
-        "durations": durations,
-    }
-    for name, values in lists.items():
+    for name, values in (
+        ("springs", springs),
+        ("wind_speeds", wind_speeds),
+        ("release_angles_deg", release_angles_deg),
+        ("durations", durations),
+    ):
         least = 0.0 if name == "wind_speeds" else np.nextafter(0.0, 1.0)
         if len(values) == 0 or len(set(values)) != len(values):
             raise TunnelError(
@@ -161,14 +149,7 @@ class Costs:
     speed_change: float = 60.0
 
     def of(self, choice: Choice, last: Choice | None) -> float:
-        """Rig time of a run.
-
-        Args:
-            last: the run before it; None for the first run, which needs a change of spring and speed.
-
-        Returns:
-            s.
-        """
+        """Rig time of a run after another, s; the first run (None) needs a change of spring and speed."""
         spring = last is None or choice.spring != last.spring
         speed = last is None or choice.wind_speed != last.wind_speed
         return self.setup + choice.duration + spring * self.spring_change + speed * self.speed_change
@@ -176,18 +157,13 @@ class Costs:
 
 @dataclass(frozen=True)
 class Preset:
-    """Default values of the arguments.
+    """Default values of the arguments of `CampaignEnv`.
 
     Args:
-        springs: numbers of the rig's table.
         wind_speeds: m/s.
-        release_angles_deg: degrees.
         durations: s.
         noise_std: rad.
         sample_rate: Hz.
-        max_runs: number of runs after which an episode is truncated.
-        severities: the vocabulary: each effect with the range its severity is drawn from, in its unit; empty:
-            none.
     """
 
     springs: tuple[int, ...]
@@ -197,30 +173,23 @@ class Preset:
     noise_std: float
     sample_rate: float
     max_runs: int
-    severities: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    severities: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
-def _load() -> dict[str, Preset]:
-    text = (resources.files("tunnel_lab") / "data" / "campaign-presets.toml").read_text(encoding="utf-8")
-    return {name: _preset(values) for name, values in tomllib.loads(text).items()}
-
-
-def _preset(values: Mapping[str, Any]) -> Preset:
-    severities = {name: (low, high) for name, (low, high) in values.get("severities", {}).items()}
-    plain = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
-    return Preset(**(plain | {"severities": MappingProxyType(severities)}))
-
-
-PRESETS = _load()
+_FILE = resources.files("tunnel_lab") / "data" / "campaign-presets.toml"
+_tables: dict[str, dict[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
+PRESETS = {
+    name: Preset(**{key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
+    for name, table in _tables.items()
+}
 
 
 def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | None) -> SensorModel:
-    """The preset's sensor with the given values; its reading is not quantised.
+    """The preset's sensor with the values that are not None; its reading is not quantised.
 
     Args:
-        preset: one of `PRESETS`.
-        noise_std: rad; None takes the preset's.
-        sample_rate: Hz; None takes the preset's.
+        noise_std: rad.
+        sample_rate: Hz.
 
     Raises:
         TunnelError: when a number is not positive, or the rate does not divide the rig's 1000 steps per second.
