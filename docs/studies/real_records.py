@@ -15,7 +15,7 @@ from typing import Any
 from diagnosis import diagnose
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
 from tunnel_lab.plotting.style import save
-from tunnel_lab.report.waterfall import waterfall_figure
+from tunnel_lab.report.figures import waterfall_figure
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

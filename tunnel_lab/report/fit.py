@@ -35,8 +35,6 @@ class Curves:
     """One run, in degrees where the readings are angles.
 
     Args:
-        id: of the run.
-        label: the run and its conditions.
         unit: of the readings.
         time: s, shape (n,).
         reading: in ``unit``, shape (n,).
@@ -56,11 +54,7 @@ class Curves:
 
 
 def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
-    """The runs of a diagnosis against time.
-
-    Args:
-        document: the diagnosis as JSON's types; without ``maps`` there are none.
-        ids: of the runs; empty: all, the largest gap first.
+    """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``.
 
     Raises:
         TunnelError: for a run that the diagnosis does not have.
@@ -69,37 +63,26 @@ def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
     unit, factor = unit_shown(maps.get("unit", "rad"))
     labels = {run["id"]: run_label(run) for run in maps["runs"]}
     traces = {trace["id"]: trace for trace in maps["traces"] if "reading_rad" in trace}
-    for name in ids:
+    runs = []
+    for name in ids or traces:
         if name not in traces:
             known = ", ".join(traces) or "none"
             raise TunnelError(f"the diagnosis has no run {name!r}", remedy=f"choose of its runs: {known}")
-    return [
-        Curves(
-            name,
-            labels.get(name, name),
-            unit,
-            array(trace["time_s"]),
-            factor * array(trace["reading_rad"]),
-            factor * array(trace["before_rad"]),
-            np.full(len(trace["time_s"]), np.nan)
-            if trace["after_rad"] is None
-            else factor * array(trace["after_rad"]),
-            (trace["differ_s"][0], trace["differ_s"][1]),
-        )
-        for name, trace in ((name, traces[name]) for name in ids or traces)
-    ]
+        trace = traces[name]
+        time = array(trace["time_s"])
+        reading, before = factor * array(trace["reading_rad"]), factor * array(trace["before_rad"])
+        after = trace["after_rad"]
+        after = np.full(time.size, np.nan) if after is None else factor * array(after)
+        first, last = trace["differ_s"]
+        runs.append(Curves(name, labels.get(name, name), unit, time, reading, before, after, (first, last)))
+    return runs
 
 
 def fit_figure(document: Document, ids: Sequence[str] = ()) -> Figure | None:
-    """The fit over the data of two runs.
+    """The fit over the data of the first two of `fitted_runs`; None without runs.
 
-    Args:
-        document: as for `fitted_runs`.
-        ids: of the runs, of which the first two are drawn; empty: those with the largest gap.
-
-    Returns:
-        A column for each run: the whole record, in which the cycles are marked where the models differ most; these
-        cycles with the reading and what both models predict; and the residuals there. None without runs.
+    A column for each run: the whole record, in which the cycles are marked where the models differ most; these
+    cycles with the reading and what both models predict; and the residuals there.
     """
     runs = fitted_runs(document, ids)[:_COLUMNS]
     return _drawn(runs) if runs else None
@@ -114,9 +97,7 @@ def fit_pages(document: Document, ids: Sequence[str] = ()) -> list[Figure]:
 def fit_sheets(document: Document) -> dict[str, Figure]:
     """The fit over the data of the two runs with the largest gap, in the heights that a printed page may have left.
 
-    Returns:
-        Figures by name, the highest first; the lower ones show the cycles where the models differ most and not the
-        whole record. None without runs.
+    The highest comes first; the lower ones show the cycles where the models differ most and not the whole record.
     """
     runs = fitted_runs(document)[:_COLUMNS]
     sheets = _SHEETS.items() if runs else ()
@@ -161,14 +142,9 @@ def _curves(axes: Axes, run: Curves, measured: Array | None, before: Array, afte
 
 
 def fit_charts(document: Document) -> dict[str, list[Chart]]:
-    """The charts of the fit over the data, which show the cycles first in which the models differ most.
+    """The readings of every run and, below them on the same axis, the residuals, under the name ``fit``.
 
-    Args:
-        document: as for `fitted_runs`.
-
-    Returns:
-        The readings of every run and, below them on the same axis, the residuals, under the name ``fit``; empty
-        where there are none.
+    They show the cycles first in which the models differ most; there are none without ``maps``.
     """
     runs = fitted_runs(document)
     if not runs:
@@ -179,21 +155,20 @@ def fit_charts(document: Document) -> dict[str, list[Chart]]:
     residuals = [_view(run, run.before, run.after) for run in runs]
     return {
         "fit": [
-            _chart("Reading", runs[0].unit, 300, [measured, *models], fits),
-            _chart("Residual", runs[0].unit, 200, models, residuals),
+            {
+                "kind": "lines",
+                "title": title,
+                "height": height,
+                "x": {"label": _TIME, "log": False},
+                "y": {"label": f"{title.lower()} [{runs[0].unit}]", "log": False},
+                "series": series,
+                "views": views,
+            }
+            for title, height, series, views in (
+                ("Reading", 300, [measured, *models], fits),
+                ("Residual", 200, models, residuals),
+            )
         ]
-    }
-
-
-def _chart(title: str, unit: str, height: int, series: list[Chart], views: list[Chart]) -> Chart:
-    return {
-        "kind": "lines",
-        "title": title,
-        "height": height,
-        "x": {"label": _TIME, "log": False},
-        "y": {"label": f"{title.lower()} [{unit}]", "log": False},
-        "series": series,
-        "views": views,
     }
 
 

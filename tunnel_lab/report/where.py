@@ -11,6 +11,7 @@ from tunnel_lab.plotting.style import INTERVAL, figure, grid, styled
 from tunnel_lab.report.drawing import (
     AFTER,
     BEFORE,
+    MARK,
     NARROW,
     NOISE,
     QUIET,
@@ -21,34 +22,28 @@ from tunnel_lab.report.drawing import (
     faded,
     misfit_scale,
     run_label,
-    shade,
 )
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 _ANGLE, _RATE = "angle β [rad]", "rate β̇/ω [rad]"
-_UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 Chart = dict[str, Any]
 _LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
-_ALL = "all runs together"
 PLACE_HEIGHT = 2.7
 """Height of the map of where the gap is, inches."""
 
 
 @styled
 def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | None:
-    """Where the gap is: misfit by amplitude and by wind speed, or by amplitude and time where there is one speed.
+    """Misfit by amplitude and by wind speed, or by amplitude and time where there is one speed.
+
+    The map is small enough for a phone; cells within the noise stay empty. It is None for maps without it.
 
     Args:
-        document: a diagnosis with its maps.
         height: of the figure, inches.
-
-    Returns:
-        A map small enough for a phone, in which cells within the noise stay empty; None for maps without it.
     """
     grid_of = document["maps"].get("grid")
     if grid_of is None:
@@ -78,14 +73,7 @@ def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | N
 
 @styled
 def runs_figure(document: Document) -> Figure:
-    """Excess of every run over time.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        A heat map on a logarithmic scale, in which cells within the noise stay empty.
-    """
+    """Excess of every run over time on a logarithmic scale; cells within the noise stay empty."""
     from matplotlib.colors import LogNorm
 
     maps = document["maps"]
@@ -93,7 +81,7 @@ def runs_figure(document: Document) -> Figure:
     fig = figure(NARROW, 1.4 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
     edges = array(maps["time"]["edges_s"])
-    cells, floor, top = run_cells(maps)
+    cells, floor, top = _run_cells(maps)
     extent = (float(edges[0]), float(edges[-1]), len(runs) - 0.5, -0.5)
     scale = LogNorm(floor, top)
     image = axes.imshow(
@@ -107,13 +95,8 @@ def runs_figure(document: Document) -> Figure:
     return fig
 
 
-def run_cells(maps: Document) -> tuple[Array, float, float]:
-    """The map of runs over time.
-
-    Returns:
-        Excess by run and bin of time, shape (runs, n), NaN within the noise; the least and the greatest value of
-        the scale. In noise variances.
-    """
+def _run_cells(maps: Document) -> tuple[Array, float, float]:
+    """Excess by run and bin of time, shape (runs, n), NaN within the noise; and the ends of its scale."""
     cells = np.stack([array(row) for row in maps["time"]["by_run"]])
     times = array(maps["time"]["edges_s"])
     run = min(maps["runs"], key=lambda entry: entry["std"])
@@ -126,79 +109,60 @@ def run_cells(maps: Document) -> tuple[Array, float, float]:
 def profiles_figure(document: Document) -> Figure:
     """Excess over time and amplitude, all runs together, and when a moment is missing.
 
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        Three panels; the shaded intervals hold four fifths of the gap.
+    The shaded intervals hold four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
     fig = figure(NARROW, 6.0)
-    axes = fig.subplot_mosaic([["time"], ["moment"], ["amplitude"]], height_ratios=(1.3, 0.8, 1.3))
-    _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
-    axes["time"].tick_params(labelbottom=False)
-    _moment(axes["moment"], maps["time"])
-    _profile(axes["amplitude"], maps["amplitude"], "edges_rad", where["amplitude_rad"])
-    axes["amplitude"].set_xlabel("amplitude of the motion [rad]")
+    by_time, moment, by_amplitude = fig.subplots(3, 1, height_ratios=(1.3, 0.8, 1.3))
+    for axes, values, bounds, interval in (
+        (by_time, maps["time"], array(maps["time"]["edges_s"]), where["time_s"]),
+        (by_amplitude, maps["amplitude"], array(maps["amplitude"]["edges_rad"]), where["amplitude_rad"]),
+    ):
+        mean, std = array(values["excess"]), array(values["std"])
+        if interval is not None:
+            axes.axvspan(*interval, color=MARK, alpha=0.28, linewidth=0)
+        axes.stairs(SIGMAS * std, bounds, baseline=-SIGMAS * std, fill=True, color=NOISE)
+        axes.stairs(mean, bounds, color=BEFORE, linewidth=1.4)
+        axes.set_xlim(0.0, float(bounds[-1]))
+        axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
+        axes.set_ylabel("excess (noise variances)")
+        grid(axes)
+    by_time.tick_params(labelbottom=False)
+    # The missing moment's energy shows when a moment acts, not how long the motion after it lasts.
+    edges, share = array(maps["time"]["edges_s"]), 100.0 * array(maps["time"]["moment_share"])
+    moment.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
+    moment.set_xlim(0.0, float(edges[-1]))
+    moment.set_ylim(0.0, 1.05 * max(float(share.max()), 20.0))
+    moment.set_ylabel("missing moment\n[% of its energy]")
+    moment.set_xlabel("time since the start of the record [s]")
+    grid(moment)
+    by_amplitude.set_xlabel("amplitude of the motion [rad]")
     return fig
-
-
-def _profile(axes: Axes, values: Document, edges: str, interval: list[float] | None) -> None:
-    bounds, mean, std = array(values[edges]), array(values["excess"]), array(values["std"])
-    shade(axes, interval)
-    axes.stairs(SIGMAS * std, bounds, baseline=-SIGMAS * std, fill=True, color=NOISE)
-    axes.stairs(mean, bounds, color=BEFORE, linewidth=1.4)
-    axes.set_xlim(0.0, float(bounds[-1]))
-    axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
-    axes.set_ylabel("excess (noise variances)")
-    grid(axes)
-
-
-def _moment(axes: Axes, values: Document) -> None:
-    """The missing moment's energy: it shows when a moment acts, not how long the motion after it lasts."""
-    edges, share = array(values["edges_s"]), 100.0 * array(values["moment_share"])
-    axes.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
-    axes.set_xlim(0.0, float(edges[-1]))
-    axes.set_ylim(0.0, 1.05 * max(float(share.max()), 20.0))
-    axes.set_ylabel("missing moment\n[% of its energy]")
-    axes.set_xlabel("time since the start of the record [s]")
-    grid(axes)
 
 
 @styled
 def spectrum_figure(document: Document) -> Figure:
-    """Residual power over frequency, all runs together, before and after.
+    """Residual power over frequency, all runs together, before and after, on logarithmic axes.
 
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        One panel with logarithmic axes; the shaded interval holds four fifths of the gap.
+    The shaded interval holds four fifths of the gap.
     """
-    values = document["maps"]["frequency"]
+    values, interval = document["maps"]["frequency"], document["where"]["frequency_hz"]
     fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
-    edges, centre = spectrum_axis(values)
-    before, std = array(values["excess"]) + 1.0, array(values["std"])
-    known = np.isfinite(before)
-    shade(axes, document["where"]["frequency_hz"])
+    edges, centre = _spectrum_axis(values)
+    known = np.isfinite(array(values["excess"]))
+    centre, noise = centre[known], SIGMAS * array(values["std"])[known]
+    if interval is not None:
+        axes.axvspan(*interval, color=MARK, alpha=0.28, linewidth=0)
     low, high = values["resonance_hz"]
     axes.axvspan(0.985 * low, 1.015 * high, ymax=0.035, color=QUIET, linewidth=0)
-    axes.fill_between(
-        centre[known],
-        np.maximum(1.0 - SIGMAS * std[known], 0.3),
-        1.0 + SIGMAS * std[known],
-        color=NOISE,
-        linewidth=0,
-        label="noise (3σ)",
-    )
-    floor = 0.3
-    axes.plot(centre[known], np.maximum(before[known], floor), color=BEFORE, label="nominal model")
+    floor = np.maximum(1.0 - noise, _LEAST_POWER)
+    axes.fill_between(centre, floor, 1.0 + noise, color=NOISE, linewidth=0, label="noise (3σ)")
+    before = np.maximum((array(values["excess"]) + 1.0)[known], _LEAST_POWER)
+    axes.plot(centre, before, color=BEFORE, label="nominal model")
     if values["after"] is not None:
-        after = array(values["after"]) + 1.0
-        axes.plot(
-            centre[known], np.maximum(after[known], floor), color=AFTER, lw=1.2, label="with the causes"
-        )
+        after = np.maximum((array(values["after"]) + 1.0)[known], _LEAST_POWER)
+        axes.plot(centre, after, color=AFTER, lw=1.2, label="with the causes")
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(float(edges[0]), float(edges[-1]))
@@ -209,16 +173,8 @@ def spectrum_figure(document: Document) -> Figure:
     return fig
 
 
-def spectrum_axis(values: Document) -> tuple[Array, Array]:
-    """The axis of a spectrum for a logarithmic scale.
-
-    Args:
-        values: ``frequency`` of the maps.
-
-    Returns:
-        Edges of the bins, the first one half the second instead of zero, shape (n + 1,), Hz; their centres,
-        shape (n,), Hz.
-    """
+def _spectrum_axis(values: Document) -> tuple[Array, Array]:
+    """Edges of the bins for a logarithmic scale, the first one half the second instead of zero; and centres, Hz."""
     edges = array(values["edges_hz"])
     positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
     return positive, np.sqrt(positive[:-1] * positive[1:])
@@ -226,26 +182,18 @@ def spectrum_axis(values: Document) -> tuple[Array, Array]:
 
 @styled
 def phase_plane_figure(document: Document) -> Figure | None:
-    """The missing moment over angle and rate.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        A map; None where the maps hold none.
-    """
+    """The missing moment over angle and rate; None where the maps hold none."""
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
-    edges = array(plane["edges_rad"])
-    clear, reach, unit, _ = plane_cells(plane)
+    low, *_, high = plane["edges_rad"]
+    clear, reach, unit, _ = _plane_cells(plane)
     fig = figure(NARROW, 4.4)
     axes = fig.add_subplot()
-    extent = (float(edges[0]), float(edges[-1]), float(edges[0]), float(edges[-1]))
-    colours = faded(AFTER, BEFORE)
     image = axes.imshow(
-        clear, origin="lower", extent=extent, cmap=colours, vmin=-reach, vmax=reach, interpolation="nearest"
-    )
+        clear, origin="lower", extent=(low, high, low, high), cmap=faded(AFTER, BEFORE),
+        vmin=-reach, vmax=reach, interpolation="nearest",
+    )  # fmt: skip
     axes.set_xlabel(_ANGLE)
     axes.set_ylabel(_RATE)
     fig.colorbar(image, ax=axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)
@@ -254,27 +202,18 @@ def phase_plane_figure(document: Document) -> Figure | None:
 
 @styled
 def moment_figure(document: Document) -> Figure | None:
-    """Means of the missing moment over all rates and over all angles.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        Two profiles with their 95 % bands; None where the maps hold none.
-    """
+    """Means of the missing moment over all rates and over all angles; None where the maps hold none."""
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
     edges = array(plane["edges_rad"])
-    _, _, unit, factor = plane_cells(plane)
+    _, _, unit, factor = _plane_cells(plane)
     fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
     for axes, name, label in zip(fig.subplots(2, 1), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
-        mean, spread = factor * array(plane[name]), factor * array(plane[f"{name}_std"])
+        mean, band = factor * array(plane[name]), INTERVAL * (factor * array(plane[f"{name}_std"]))
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
-        axes.fill_between(
-            centre, mean - INTERVAL * spread, mean + INTERVAL * spread, color=BEFORE, alpha=0.2, lw=0
-        )
+        axes.fill_between(centre, mean - band, mean + band, color=BEFORE, alpha=0.2, lw=0)
         axes.plot(centre, mean, color=BEFORE, marker="o", ms=3)
         axes.set_xlabel(label)
         axes.set_ylabel(f"mean over all {'rates' if name == 'by_angle' else 'angles'} [{unit}]")
@@ -282,53 +221,30 @@ def moment_figure(document: Document) -> Figure | None:
     return fig
 
 
-def plane_cells(plane: Document) -> tuple[Array, float, str, float]:
-    """The map of the missing moment.
+def _plane_cells(plane: Document) -> tuple[Array, float, str, float]:
+    """The missing moment by rate (rows) and angle (columns), NaN within three standard deviations of zero.
 
-    Args:
-        plane: of the maps.
-
-    Returns:
-        The moment by rate (rows) and angle (columns), shape (n, n), NaN within three standard deviations of zero;
-        the greatest value of the scale; their unit; and the factor from the document's unit to it.
+    Also the greatest value of its scale, a unit in which the values are neither thousands nor thousandths, and the
+    factor from the document's unit to that one.
     """
     moment = np.stack([array(row) for row in plane["moment"]])
     std = np.stack([array(row) for row in plane["std"]])
-    unit, factor = _readable(plane, np.abs(moment))
     known = np.abs(moment[np.isfinite(moment)])
+    unit, factor = plane["unit"].replace("rad/s2", "rad/s²"), 1.0
+    if known.size and known.max() < 0.1:
+        unit, factor = f"10⁻³ {unit}", 1e3
     reach = float(np.quantile(known, 0.98)) * factor if known.size else 1.0
     return np.where(np.abs(moment) > SIGMAS * std, moment * factor, np.nan), reach, unit, factor
 
 
-def _readable(plane: Document, size: Array) -> tuple[str, float]:
-    """A unit in which the values are neither thousands nor thousandths."""
-    unit = _UNITS.get(plane["unit"], str(plane["unit"]))
-    greatest = float(np.nanmax(size)) if np.isfinite(size).any() else 1.0
-    return (f"10⁻³ {unit}", 1e3) if greatest < 0.1 else (unit, 1.0)
-
-
 def charts(document: Document) -> dict[str, list[Chart]]:
-    """The charts of a diagnosis.
-
-    Args:
-        document: the diagnosis as JSON's types; without ``maps`` there are none.
-
-    Returns:
-        Charts by the name of the figure that they replace on a screen.
-    """
+    """The charts of a diagnosis by the name of the figure that they replace on a screen; none without ``maps``."""
     maps = document.get("maps")
     if not maps:
         return {}
-    by_figure = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
-    if maps["phase_plane"] is not None:
-        by_figure["where-phase-plane"] = [_plane(maps["phase_plane"])]
-    return by_figure
-
-
-def _runs(maps: Document) -> Chart:
-    cells, low, high = run_cells(maps)
+    cells, low, high = _run_cells(maps)
     ids = [str(run["id"]) for run in maps["runs"]]
-    return {
+    runs = {
         "kind": "cells",
         "title": "Excess of every run over time",
         "x": {"label": "time since the start of the record [s]", "edges": maps["time"]["edges_s"]},
@@ -339,30 +255,31 @@ def _runs(maps: Document) -> Chart:
         "range": [low, high],
         "log": True,
     }
-
-
-def _plane(plane: Document) -> Chart:
-    cells, reach, unit, _ = plane_cells(plane)
-    edges = plane["edges_rad"]
-    return {
-        "kind": "cells",
-        "title": "Missing moment",
-        "x": {"label": "angle β [rad]", "edges": edges},
-        "y": {"label": "rate β̇/ω [rad]", "edges": edges},
-        "values": [rounded(row) for row in cells],
-        "unit": unit,
-        "range": [-reach, reach],
-        "log": False,
-    }
+    by_figure: dict[str, list[Chart]] = {"where-runs": [runs], "where-spectrum": [_spectrum(maps)]}
+    plane = maps["phase_plane"]
+    if plane is not None:
+        cells, reach, unit, _ = _plane_cells(plane)
+        missing = {
+            "kind": "cells",
+            "title": "Missing moment",
+            "x": {"label": _ANGLE, "edges": plane["edges_rad"]},
+            "y": {"label": _RATE, "edges": plane["edges_rad"]},
+            "values": [rounded(row) for row in cells],
+            "unit": unit,
+            "range": [-reach, reach],
+            "log": False,
+        }
+        by_figure["where-phase-plane"] = [missing]
+    return by_figure
 
 
 def _spectrum(maps: Document) -> Chart:
     given = maps["frequency"]
-    centre = spectrum_axis(given)[1]
+    centre = _spectrum_axis(given)[1]
     nothing = np.full(centre.size, np.nan)
     excess, std = array(given["excess"]), SIGMAS * array(given["std"])
     after = nothing if given["after"] is None else array(given["after"])
-    views = [_filled(_ALL, centre, -std, std, excess, after)]
+    views = [_filled("all runs together", centre, -std, std, excess, after)]
     for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
         views.append(_filled(run_label(run), centre, nothing, nothing, array(by_bin), nothing, run=run["id"]))
     return {
@@ -397,7 +314,6 @@ def rounded(values: Array, digits: int = 4) -> list[float | None]:
     """Numbers for JSON, as many digits as a screen shows; null where a value is not known.
 
     Args:
-        values: of any unit and shape, flattened, shape (n,).
-        digits: significant ones (count).
+        values: of any shape; they are flattened.
     """
     return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]
