@@ -77,11 +77,7 @@ def typed(session: Session) -> Cells:
 
 
 def faults(cells: Cells, *, plausible: bool) -> Words:
-    """What is wrong, as a command would print it; empty where the campaign can be read.
-
-    Args:
-        plausible: whether values that look like a wrong unit are wrong.
-    """
+    """What is wrong, as a command would print it; with ``plausible`` also values that look like a wrong unit."""
     faults_by_cell = {}
     for row, texts in cells.items():
         where = f"run '{row}'" if row else "the rig"
@@ -173,9 +169,7 @@ def restore(session: Session, before: Cells) -> None:
 def pasted(cells: Cells, columns: list[str], row: str, key: str, text: str) -> Cells:
     """Cells with a block from a spreadsheet put in, its upper left cell at a place.
 
-    Args:
-        columns: keys of the table's columns, in their order.
-        text: rows on lines, cells separated by tabs; what lies outside the table is left out.
+    The block has rows on lines and cells separated by tabs; what lies outside the table is left out.
     """
     rows = [name for name in cells if name != RIG]
     result = {name: dict(texts) for name, texts in cells.items()}

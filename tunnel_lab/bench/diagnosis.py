@@ -10,6 +10,7 @@ from datetime import datetime
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
+import tomli_w
 from nicegui import ui
 
 from diagnosis.decision import plain
@@ -388,17 +389,16 @@ def show_run(run: Mapping[str, float]) -> None:
             (f"{run['separation']:.0f} standard deviations", "expected difference, in the noise's"),
         ]
     )
+
+    def download() -> None:
+        """The table that ``campaign.toml`` takes once the record is there."""
+        stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
+        head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
+        table = head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
+        ui.download(table.encode(), "next-run.toml")
+
     with ui.element("p").classes("buttons"):
-        button("Download the plan", lambda: ui.download(run_table(run).encode(), "next-run.toml"))
-
-
-def run_table(run: Mapping[str, float]) -> str:
-    """A run to make, as the table that ``campaign.toml`` takes once its record is there."""
-    import tomli_w
-
-    stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
-    head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
-    return head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
+        button("Download the plan", download)
 
 
 class ReportPage:

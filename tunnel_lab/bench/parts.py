@@ -59,13 +59,7 @@ def address(session: Session, stage: str) -> str:
 
 
 class Frame:
-    """The head of a page: where one is, and which stages are open.
-
-    Args:
-        title: of the page.
-        session: whose pages they are; None for pages beside the stages.
-        stage: the present one.
-    """
+    """The head of a page: where one is, and which stages of the session are open; without one, neither."""
 
     def __init__(self, title: str, session: Session | None = None, stage: str = "") -> None:
         self._session, self._stage = session, stage

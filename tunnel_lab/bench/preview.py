@@ -350,12 +350,7 @@ def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaita
 def show_choices(
     session: Session, columns: list[str], changed: Callable[[str, Any], Awaitable[None]]
 ) -> None:
-    """The fields of the choices.
-
-    Args:
-        columns: names of the columns in the files.
-        changed: called with the name of a choice and its new value; None: found from the files.
-    """
+    """The fields of the choices; a changed one calls with its name and new value, None: found from the files."""
     from tunnel_sim.files.importing.tables import UNITS
 
     now = choices_of(session)

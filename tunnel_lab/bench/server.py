@@ -34,12 +34,7 @@ _LENGTH = re.compile(r"[0-9]{1,20}")
 
 
 def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
-    """Serve the bench until interrupted.
-
-    Args:
-        folder: the workspace, as it is shown and typed.
-        port: TCP port; 0 takes a free one.
-        first: path of the page to open.
+    """Serve a workspace until interrupted, on a TCP port or a free one (0), with the path of the page to open.
 
     Raises:
         TunnelError: when the port is taken.

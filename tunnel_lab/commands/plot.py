@@ -78,7 +78,7 @@ def run(
 def _fit(path: Path, ids: Sequence[str]) -> dict[str, Figure]:
     """The pages of a diagnosis' fit, by name."""
     from tunnel_lab.report.diagnosis_file import read_document
-    from tunnel_lab.report.fit import fit_pages
+    from tunnel_lab.report.where import fit_pages
     from tunnel_sim.vocabulary.errors import TunnelError, shown
 
     pages = fit_pages(read_document(path), ids)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from identification.campaign.belief import information_gain
 from identification.estimate import PARAMETERS
 from identification.printing import SYMBOLS
-from tunnel_lab.envs.menu import PRESETS, Costs, make_menu, preset_sensor
+from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor, refusal
 from tunnel_lab.envs.session import (
     LARGE,
     CampaignSession,
@@ -84,31 +84,13 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         render_mode: str | None = None,
     ) -> None:
         if preset not in PRESETS:
-            raise TunnelError(
-                f"unknown preset {preset!r}", where="Campaign-v0", remedy=did_you_mean(preset, PRESETS)
-            )
+            raise refusal(f"unknown preset {preset!r}", did_you_mean(preset, PRESETS))
         base = PRESETS[preset]
-        if severities is not None and not (base.severities and severities):
-            remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
-            raise TunnelError(
-                "severities are for the diagnosis preset only", where="Campaign-v0", remedy=remedy
-            )
-        self.severities: dict[str, tuple[float, float]] = {}
-        for name, (low, high) in (base.severities if severities is None else severities).items():
-            severity = effect_class(name).parameters()[0]
-            if not 0.0 < low <= high < np.inf:
-                remedy = f"give the range of {severity.name} in {severity.unit}"
-                what = f"{name}: ({low!r}, {high!r}) is not a range above 0"
-                raise TunnelError(what, where="Campaign-v0", remedy=remedy)
-            self.severities[name] = (float(low), float(high))
+        self.severities = _checked_severities(base, severities)
         if simulation not in (None, "linear", "full"):
-            raise TunnelError(
-                f"unknown simulation {simulation!r}", where="Campaign-v0", remedy="give 'linear' or 'full'"
-            )
+            raise refusal(f"unknown simulation {simulation!r}", "give 'linear' or 'full'")
         if simulation == "linear" and self.severities:
-            raise TunnelError(
-                "a diagnosis needs the full simulation", where="Campaign-v0", remedy="leave simulation out"
-            )
+            raise refusal("a diagnosis needs the full simulation", "leave simulation out")
         runs = base.max_runs if max_runs is None else max_runs
         loaded = load_rig(None if rig is None else Path(rig))
         for name, value, most in (
@@ -120,9 +102,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         ):
             if isinstance(value, bool) or not 0.0 < value <= most:
                 bound = "above 0" if most == np.inf else f"above 0 and at most {most:g}"
-                raise TunnelError(
-                    f"{name} = {value!r} must be {bound}", where="Campaign-v0", remedy="correct it"
-                )
+                raise refusal(f"{name} = {value!r} must be {bound}", "correct it")
         self.conditions = Conditions(
             rig=loaded,
             sensor=preset_sensor(base, noise_std, sample_rate),
@@ -203,7 +183,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             TunnelError: when the action is not in the menu, or there was no reset.
         """
         if self._session is None:
-            raise TunnelError("there is no episode", where="Campaign-v0", remedy="call reset() first")
+            raise refusal("there is no episode", "call reset() first")
         before = self.known
         self.known = self._session.perform(before, self.conditions.menu.choice(action))
         if self.conditions.effects:
@@ -249,6 +229,22 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         if self.expose_truth and self._session is not None:
             info["truth"] = self._session.truth.to_json_dict()
         return info
+
+
+def _checked_severities(
+    preset: Preset, given: Mapping[str, tuple[float, float]] | None
+) -> dict[str, tuple[float, float]]:
+    if given is not None and not (preset.severities and given):
+        remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
+        raise refusal("severities are for the diagnosis preset only", remedy)
+    ranges = {}
+    for name, (low, high) in (preset.severities if given is None else given).items():
+        severity = effect_class(name).parameters()[0]
+        if not 0.0 < low <= high < np.inf:
+            remedy = f"give the range of {severity.name} in {severity.unit}"
+            raise refusal(f"{name}: ({low!r}, {high!r}) is not a range above 0", remedy)
+        ranges[name] = (float(low), float(high))
+    return ranges
 
 
 def reached(known: Knowledge, targets: tuple[float, float], probability: float) -> bool:
@@ -299,8 +295,7 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
     figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
     angles, right = figure.subplots(1, 2)
-    angles.set_xlabel("time [s]")
-    angles.set_ylabel("angle β [rad]")
+    angles.set(xlabel="time [s]", ylabel="angle β [rad]")
     if known.last is None or not known.runs:
         angles.set_title("no run yet", fontsize=10)
     else:
@@ -312,16 +307,14 @@ def picture(known: Knowledge, targets: tuple[float, float], probability: float) 
         names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
         right.bar(names, probabilities(known), color=COLOURS[0])
         right.axhline(probability, color=COLOURS[1], linestyle="--", linewidth=1)
-        right.set_ylim(0.0, 1.0)
-        right.set_ylabel("probability")
+        right.set(ylim=(0.0, 1.0), ylabel="probability")
         right.tick_params(axis="x", labelsize=7)
     else:
         for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
             spread = [100.0 * belief.relative_std(name) for belief in known.beliefs]
             right.semilogy(range(len(spread)), spread, "o-", color=COLOURS[place], label=SYMBOLS[name])
             right.axhline(100.0 * target, color=COLOURS[place], linestyle="--", linewidth=1)
-        right.set_xlabel("informative runs")
-        right.set_ylabel("standard deviation [%]")
+        right.set(xlabel="informative runs", ylabel="standard deviation [%]")
         right.set_xticks(range(0, len(known.beliefs), 1 + len(known.beliefs) // 10))
         right.legend(loc="upper right")
     right.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)

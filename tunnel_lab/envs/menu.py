@@ -8,13 +8,17 @@ from dataclasses import dataclass, field
 from importlib import resources
 from itertools import product
 from math import degrees, isfinite, radians
-from typing import Any
 
 import numpy as np
 
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import Condition, SensorModel
 from tunnel_sim.vocabulary.rig import Rig
+
+
+def refusal(what: str, remedy: str) -> TunnelError:
+    """The error of an argument or an action of the environment."""
+    return TunnelError(what, where="Campaign-v0", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -82,11 +86,9 @@ class Menu:
         remedy = f"give four whole numbers from 0 to below {', '.join(map(str, self.shape))}"
         numbers = np.asarray(action)
         if numbers.shape != (4,) or not np.issubdtype(numbers.dtype, np.integer):
-            raise TunnelError(f"{action!r} is not an action", where="Campaign-v0", remedy=remedy)
+            raise refusal(f"{action!r} is not an action", remedy)
         if np.any(numbers < 0) or np.any(numbers >= self.shape):
-            raise TunnelError(
-                f"action {numbers.tolist()} is outside the menu", where="Campaign-v0", remedy=remedy
-            )
+            raise refusal(f"action {numbers.tolist()} is outside the menu", remedy)
         spring, speed, angle, duration = numbers.tolist()
         number, stiffness = self.springs[spring]
         return Choice(
@@ -166,10 +168,10 @@ class Preset:
         sample_rate: Hz.
     """
 
-    springs: tuple[int, ...]
-    wind_speeds: tuple[float, ...]
-    release_angles_deg: tuple[float, ...]
-    durations: tuple[float, ...]
+    springs: Sequence[int]
+    wind_speeds: Sequence[float]
+    release_angles_deg: Sequence[float]
+    durations: Sequence[float]
     noise_std: float
     sample_rate: float
     max_runs: int
@@ -177,11 +179,7 @@ class Preset:
 
 
 _FILE = resources.files("tunnel_lab") / "data" / "campaign-presets.toml"
-_tables: dict[str, dict[str, Any]] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-PRESETS = {
-    name: Preset(**{key: tuple(value) if isinstance(value, list) else value for key, value in table.items()})
-    for name, table in _tables.items()
-}
+PRESETS = {name: Preset(**table) for name, table in tomllib.loads(_FILE.read_text("utf-8")).items()}
 
 
 def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | None) -> SensorModel:
@@ -198,13 +196,8 @@ def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | 
     rate = preset.sample_rate if sample_rate is None else sample_rate
     for name, value, unit in (("noise_std", noise, "rad"), ("sample_rate", rate, "Hz")):
         if isinstance(value, bool) or not (isfinite(value) and value > 0.0):
-            raise TunnelError(
-                f"{name} = {value!r} must be above 0", where="Campaign-v0", remedy=f"give it in {unit}"
-            )
+            raise refusal(f"{name} = {value!r} must be above 0", f"give it in {unit}")
     if rate > 1000.0 or abs(1000.0 / rate - round(1000.0 / rate)) > 1e-9:
-        raise TunnelError(
-            f"sample_rate = {rate:g} Hz does not divide the rig's 1000 steps per second",
-            where="Campaign-v0",
-            remedy="give 1000, 500, 250, 200, 125, 100 Hz or another divisor of 1000 Hz",
-        )
+        what = f"sample_rate = {rate:g} Hz does not divide the rig's 1000 steps per second"
+        raise refusal(what, "give 1000, 500, 250, 200, 125, 100 Hz or another divisor of 1000 Hz")
     return SensorModel(sample_rate=float(rate), noise_std=float(noise), resolution=0.0)

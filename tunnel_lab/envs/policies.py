@@ -20,7 +20,7 @@ from diagnosis.answer.next_run import planned_run, separation
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.investigate import Study
 from identification.campaign.belief import expected_belief, information_gain
-from tunnel_lab.envs.menu import Choice, Menu
+from tunnel_lab.envs.menu import Choice, Menu, refusal
 from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -125,11 +125,7 @@ def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
 def run_campaign(
     env: Any, policy: Policy, *, seed: int, options: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Play one episode.
-
-    Args:
-        env: a ``tunnel_sim/Campaign-v0``, wrapped or not.
-        seed: of truth and noise.
+    """Play one episode of a ``tunnel_sim/Campaign-v0``, wrapped or not.
 
     Returns:
         The last ``info``, whose ``campaign`` goes to `identify` and `diagnose`.
@@ -144,11 +140,10 @@ def run_campaign(
 
 
 def features(observation: Mapping[str, Array]) -> Array:
-    """The observation of the identification preset in numbers of order one to ten.
+    """The observation of the identification preset in numbers of order one to ten, shape (20,).
 
-    Returns:
-        Estimate [SI], ln of its four standard deviations, their six correlations, the last run [SI], runs made and
-        rig time [s]; shape (20,).
+    Estimate [SI], ln of its four standard deviations, their six correlations, the last run [SI], runs made and rig
+    time [s].
     """
     covariance = observation["covariance"].reshape(4, 4)
     std = np.sqrt(np.maximum(np.diag(covariance), _SMALLEST**2))
@@ -180,11 +175,8 @@ class Agent:
             TunnelError: when the menu is not that of the training.
         """
         if menu_text(menu) != self.menu:
-            raise TunnelError(
-                "the agent was trained with another menu",
-                where="Campaign-v0",
-                remedy="use the menu of the identification preset, or train an agent with yours",
-            )
+            remedy = "use the menu of the identification preset, or train an agent with yours"
+            raise refusal("the agent was trained with another menu", remedy)
         spread = np.sqrt(self.variance + 1e-8)  # as NormalizeObservation
         values = (features(observation) - self.mean) / spread
         for weight, bias in self.layers[:-1]:
@@ -249,10 +241,5 @@ def trained(known: Knowledge) -> Action:
     return packaged_agent().action(known.observation(), known.conditions.menu)
 
 
-POLICIES: dict[str, Policy] = {
-    "scripted": scripted,
-    "greedy": greedy,
-    "separating": separating,
-    "trained": trained,
-}
+POLICIES: dict[str, Policy] = {one.__name__: one for one in (scripted, greedy, separating, trained)}
 """By name."""

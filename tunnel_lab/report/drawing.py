@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.closure import Misfit, misfit_of, unit_shown
-from tunnel_lab.plotting.style import figure_text, styled
+from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -72,11 +72,6 @@ def run_label(run: Document) -> str:
         parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
         parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0 else "wind off")
     return " · ".join(parts)
-
-
-def drawn_label(run: Document) -> str:
-    """`run_label` for matplotlib."""
-    return figure_text(run_label(run))
 
 
 def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:

@@ -38,11 +38,10 @@ from tunnel_lab.report.drawing import (
     SIGMAS,
     Document,
     array,
-    drawn_label,
     faded,
     misfit_scale,
+    run_label,
 )
-from tunnel_lab.report.fit import fit_figure, fit_sheets
 from tunnel_lab.report.view import WITHIN_THE_NOISE
 from tunnel_sim.vocabulary.record import Array
 
@@ -70,7 +69,7 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
     figures: dict[str, Figure | None] = dict(_first_figures(document))
     if document.get("maps"):
         figures |= {
-            "fit": fit_figure(document),
+            "fit": where.fit_figure(document),
             "where-runs": where.runs_figure(document),
             "where-profiles": where.profiles_figure(document),
             "where-spectrum": where.spectrum_figure(document),
@@ -89,7 +88,7 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
 
 def summary_figures(document: Document) -> dict[str, Figure]:
     """The figures of the printed summary; the fit over the data in several heights, of which the page shows one."""
-    return _first_figures(document, _LOW) | fit_sheets(document)
+    return _first_figures(document, _LOW) | where.fit_sheets(document)
 
 
 def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure]:
@@ -128,8 +127,7 @@ def waterfall_figure(document: Document) -> Figure | None:
         axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
     names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
     axes.set_yticks(rows, ["nominal model", *names, "the rest"])
-    axes.set_ylim(left.size + 0.5, -0.5)
-    axes.set_xlabel(f"root mean square misfit [{unit}]")
+    axes.set(ylim=(left.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
     axes.locator_params(axis="x", nbins=6)
     axes.spines["left"].set_visible(False)
     axes.tick_params(axis="y", length=0)
@@ -198,9 +196,7 @@ def candidates_figure(document: Document) -> Figure | None:
         axes.text(value + 0.01, index, probability(value), va="center")
     axes.set_yticks(range(len(shown)), names)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.12)
-    axes.set_xticks(np.linspace(0.0, 1.0, 6))
-    axes.set_xlabel("probability")
+    axes.set(xlim=(0.0, 1.12), xticks=np.linspace(0.0, 1.0, 6), xlabel="probability")
     grid(axes, "x")
     return fig
 
@@ -218,8 +214,8 @@ def closure_figure(document: Document) -> Figure:
     stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
     noise = size(SIGMAS * max(stds) if stds else _LEAST_NOISE)
     axes.axvspan(0.0, noise, color=NOISE, lw=0, label="noise (3σ)")
-    axes.set_xlim(0.0, 1.05 * float(max(before.max(), after.max())) or 1.0)
-    axes.set_xlabel(f"root mean square misfit [{unit}]")
+    most = 1.05 * float(max(before.max(), after.max())) or 1.0
+    axes.set(xlim=(0.0, most), xlabel=f"root mean square misfit [{unit}]")
     axes.hlines(rows, after, before, color=LINE, linewidth=2.5)
     axes.plot(before, rows, "s", color=BEFORE, ms=5, clip_on=False, label="nominal model")
     if not np.array_equal(before, after):
@@ -239,11 +235,8 @@ def closure_figure(document: Document) -> Figure:
 def coefficients_figure(document: Document) -> Figure | None:
     """The coefficients that the runs determine, before and after, with 95 % intervals; None where there is none."""
     before, after = (document["coefficients"][key] for key in ("before", "after"))
-    names = [
-        name
-        for name in before
-        if name in after and all(given[name].get("determined", True) for given in (before, after))
-    ]
+    both = [name for name in before if name in after]
+    names = [n for n in both if all(given[n].get("determined", True) for given in (before, after))]
     if not names:
         return None
     fig = figure(NARROW, 0.3 + 1.3 * len(names))
@@ -256,8 +249,7 @@ def coefficients_figure(document: Document) -> Figure | None:
                 marker=marker, ms=6, capsize=4,
             )  # fmt: skip
         axes.set_yticks([0, 1], ["before", "after"])
-        axes.set_ylim(1.6, -0.6)
-        axes.set_xlabel(coefficient_label(name, before[name]["unit"]))
+        axes.set(ylim=(1.6, -0.6), xlabel=coefficient_label(name, before[name]["unit"]))
         axes.locator_params(axis="x", nbins=5)
         grid(axes)
     return fig
@@ -271,7 +263,7 @@ def backbone_figure(document: Document) -> Figure:
     named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
     # the runs that show the gap first, in the campaign's order, and then the rest for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
-    labels = {run["id"]: drawn_label(run) for run in maps["runs"]}
+    labels = {run["id"]: figure_text(run_label(run)) for run in maps["runs"]}
     fig = figure(NARROW, 7.0)
     frequency, damping = fig.subplots(2, 1)
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}

@@ -23,9 +23,8 @@ from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
-from tunnel_lab.report.fit import fit_charts, fit_figure
 from tunnel_lab.report.view import Document
-from tunnel_lab.report.where import Chart, charts
+from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -118,10 +117,7 @@ def render_report(
     answer, kind = view.headline(document)
     provenance = document.get("provenance") or {}
     alarms = significant(document["gap"]["false_alarm_rate"], 2)
-    versions = [
-        *provenance.get("versions", {}).items(),
-        ("schema of the document", document["schema_version"]),
-    ]
+    schema = ("schema of the document", document["schema_version"])
     context = {
         "document": document,
         "campaign": campaign,
@@ -155,7 +151,7 @@ def render_report(
         "false_alarms": f"{alarms} of the campaigns without a gap",
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
         "noise": noise_rows(document),
-        "versions": versions,
+        "versions": [*provenance.get("versions", {}).items(), schema],
         "hashes": list(provenance.get("sha256", {}).items()),
     }
     if summary:
@@ -186,9 +182,8 @@ def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
         return drawn
     figures = diagnosis_figures(document)
     if what not in figures:
-        raise TunnelError(
-            f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {', '.join(figures)}"
-        )
+        known = ", ".join(figures)
+        raise TunnelError(f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {known}")
     return figures[what]
 
 
@@ -196,12 +191,9 @@ def _rendered(name: str, context: dict[str, Any]) -> str:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         loader=FunctionLoader(_resource),
-    )
+    )  # fmt: skip
     return environment.get_template(name).render(context)
 
 
@@ -220,12 +212,9 @@ def _parts(
 
     figures = {}
     for name, figure in drawn.items():
-        described = (
-            name if name in DESCRIPTIONS else name.partition("-")[0]
-        )  # another height, as ``fit-near-1``
-        figures[name] = Markup(
-            inline_svg(figure, name, DESCRIPTIONS[described])
-        )  # the SVG is already escaped
+        # A figure in another height has the text of the first, as ``fit-near-1``. The SVG is already escaped.
+        text = DESCRIPTIONS.get(name) or DESCRIPTIONS[name.partition("-")[0]]
+        figures[name] = Markup(inline_svg(figure, name, text))
     font = font_face(shown_text("".join(figures.values())))
     return {
         "figures": figures,
@@ -346,7 +335,6 @@ def write_summary(document: Document, campaign: Campaign, path: Path, byline: By
             subprocess.run([browser, *arguments], capture_output=True, timeout=_TIMEOUT, check=True)
             content = printed.read_bytes()
         except (OSError, subprocess.SubprocessError) as error:
-            raise TunnelError(
-                "Chromium could not print", where="--summary", remedy="print the report"
-            ) from error
+            what, remedy = "Chromium could not print", "print the report"
+            raise TunnelError(what, where="--summary", remedy=remedy) from error
         return write_whole(path, content)
