@@ -21,6 +21,7 @@ from mujoco import rollout, sysid
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.throughput import numbers
 from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.prepare import prepare
@@ -221,9 +222,8 @@ def against_sysid(console: Console, wanted: int) -> None:
     begin = time.perf_counter()
     nominal = fit(Problem(prepared), nominal_start(prepared))
     own_total, other_total, candidates = time.perf_counter() - begin, 0.0, 0
-    table = Table(title="Nominal model and one effect, 6 runs of 4 s at 250 Hz")
-    for head in ("candidate", "own s", "sysid s", "ratio", "own χ²", "sysid χ²"):
-        table.add_column(head, justify="left" if head == "candidate" else "right")
+    heads = ("candidate", "own s", "sysid s", "ratio", "own χ²", "sysid χ²")
+    table = numbers("Nominal model and one effect, 6 runs of 4 s at 250 Hz", *heads)
     for kind in ALL_EFFECTS:
         starts = starting_points(nominal, kind) if kind.fitted and kind.tries < 3 else []
         if not starts or candidates >= wanted:

@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
-from benchmarks.throughput import interleaved, ratio
+from benchmarks.throughput import interleaved, numbers, ratio
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.envs.conditions import FreeDecayConfig, plan_run
 from tunnel_sim.files.rig_file import load_rig
@@ -104,11 +104,10 @@ def main() -> None:
     parser.add_argument("--repetitions", type=int, default=9, help="repetitions of each side")
     options = parser.parse_args()
 
-    table = Table(
-        title="FreeDecay-v0, control periods of 10 ms (ten RK4 steps) per second, all runs together"
-    )
-    for head in ("comparison", "runs", "baseline", "subject", "ratio (median)", "ratio (best)", "target"):
-        table.add_column(head, justify="left" if head == "comparison" else "right")
+    table = numbers(
+        "FreeDecay-v0, control periods of 10 ms (ten RK4 steps) per second, all runs together",
+        "comparison", "runs", "baseline", "subject", "ratio (median)", "ratio (best)", "target",
+    )  # fmt: skip
 
     def line(name: str, count: int, one: Callable[[], float], other: Callable[[], float], aim: str) -> None:
         times = interleaved(one, other, options.repetitions)
@@ -118,15 +117,9 @@ def main() -> None:
 
     for preset in ("plain", "operator"):
         envs = vector(options.count, "vector_entry_point", preset)
-        alone = bare(options.count, options.periods, 10)
+        sides = (bare(options.count, options.periods, 10), stepping(envs, options.periods))
         aim = "≥ 0.7" if preset == "plain" else ""
-        line(
-            f"{preset}: native against mujoco.batch",
-            options.count,
-            alone,
-            stepping(envs, options.periods),
-            aim,
-        )
+        line(f"{preset}: native against mujoco.batch", options.count, *sides, aim)
         envs.close()
     for preset in ("plain", "operator"):
         native = vector(options.workers, "vector_entry_point", preset)

@@ -15,13 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from benchmarks.peers import Method, present
+from benchmarks.throughput import numbers
 from identification.estimators import ALL_ESTIMATORS, make_estimator
 from identification.estimators.output_error import OutputError
 from identification.signal.run_fit import NO_WINDOWS
-from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+from identification.uncertainty.cramer_rao import SinusoidBound, damped_sinusoid_bound
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
@@ -57,6 +57,15 @@ def records(count: int, seed: int) -> Iterator[tuple[tuple[float, ...], int, Cam
             yield (zeta, frequency, share, phase), number, Campaign("b", RigProperties(), sensor, (run,))
 
 
+def bound_of(cell: tuple[float, ...], campaign: Campaign) -> SinusoidBound:
+    """The Cramér–Rao bound of a record in its noise."""
+    zeta, frequency, share, phase = cell
+    return damped_sinusoid_bound(
+        campaign.runs[0].record.time_s, amplitude=AMPLITUDE, phase=phase, frequency=frequency, zeta=zeta,
+        noise_std=share * AMPLITUDE,
+    )  # fmt: skip
+
+
 def own(name: str) -> Method:
     """One of ours as a method of one record; output error also without windows, which the others do not have."""
     plain = name.endswith(", no windows")
@@ -88,11 +97,8 @@ def measure(methods: dict[str, Method], count: int, seed: int) -> dict[str, Tall
     """Run everything on everything."""
     tallies = {name: Tally() for name in methods}
     for place, (cell, number, campaign) in enumerate(records(count, seed)):
-        zeta, frequency, share, phase = cell
-        bound = damped_sinusoid_bound(
-            campaign.runs[0].record.time_s, amplitude=AMPLITUDE, phase=phase, frequency=frequency, zeta=zeta,
-            noise_std=share * AMPLITUDE,
-        )  # fmt: skip
+        zeta, frequency, *_ = cell
+        bound = bound_of(cell, campaign)
         for name, method in methods.items():
             if name in SLOW and (number > 0 or place // count % 3):
                 continue
@@ -131,9 +137,10 @@ def beats(mine: Tally, peer: Tally) -> bool:
 
 def show(console: Console, tallies: dict[str, Tally], ours: list[str]) -> None:
     """The table, and which methods are better."""
-    table = Table(title="RMSE over the Cramér–Rao bound; 20 s at 1 kHz, ζ 0.002–0.05, 0.8–4 Hz, S/A 0.1–1 %")
-    for head in ("method", "ζ", "ωn", "ζ, worst cell", "95 % held", "failed", "ms per record", "records"):
-        table.add_column(head, justify="left" if head == "method" else "right")
+    table = numbers(
+        "RMSE over the Cramér–Rao bound; 20 s at 1 kHz, ζ 0.002–0.05, 0.8–4 Hz, S/A 0.1–1 %",
+        "method", "ζ", "ωn", "ζ, worst cell", "95 % held", "failed", "ms per record", "records",
+    )  # fmt: skip
     for name, tally in tallies.items():
         held = f"{100 * np.mean(tally.held):.1f} %" if tally.held else ""
         worst = max((rms(errors) for errors in tally.cells.values()), default=np.nan)

@@ -69,34 +69,23 @@ def tables(truths: Mapping[str, Any], answers: Mapping[str, Any]) -> list[Table]
     }
     state = {n: v for n, v in gaps.items() if RIGHT[v[0]] in (STATE, ("wind",))}
     empty = [a for t, a in seen.values() if not t["form"]]
-    rows: dict[str, Proportion] = {
-        "kind right, of the gaps detected": Proportion.of(
-            [f["kind"] in RIGHT[form] for form, f in gaps.values()]
-        ),
-        "kind right, of moments of state": Proportion.of(
-            [f["kind"] in RIGHT[form] for form, f in state.values()]
-        ),
-        "law closes 0.8 of the closable, of moments of state": Proportion.of(
-            [_closes(f) >= 0.8 for _, f in state.values()]
-        ),
-        "a law where there is no gap": Proportion.of(
-            [bool(a["closable"] and a["closable"]["law"]) for a in empty]
-        ),
+    rows = {
+        "kind right, of the gaps detected": [f["kind"] in RIGHT[form] for form, f in gaps.values()],
+        "kind right, of moments of state": [f["kind"] in RIGHT[form] for form, f in state.values()],
+        "law closes 0.8 of the closable, of moments of state": [_closes(f) >= 0.8 for _, f in state.values()],
+        "a law where there is no gap": [bool(a["closable"] and a["closable"]["law"]) for a in empty],
     }
-    figures = Table(
-        title=f"{len(seen)} campaigns, {sum(a['detected'] for _, a in seen.values())} gaps detected"
-    )
-    for head in ("figure", "count", "of", "share", "95 %"):
-        figures.add_column(head)
-    for name, share in rows.items():
+    found = sum(a["detected"] for _, a in seen.values())
+    heads = ("figure", "count", "of", "share", "95 %")
+    figures = Table(*heads, title=f"{len(seen)} campaigns, {found} gaps detected")
+    for name, values in rows.items():
+        share = Proportion.of(values)
         low, high = share.interval
         shown = "–" if share.value is None else f"{100 * share.value:.1f} %"
-        figures.add_row(
-            name, str(share.count), str(share.total), shown, f"{100 * low:.1f}–{100 * high:.1f} %"
-        )
-    forms = Table(title="By form")
-    for head in ("form", "gaps", "kind right", "kinds", "law closes of the closable (median)"):
-        forms.add_column(head)
+        interval = f"{100 * low:.1f}–{100 * high:.1f} %"
+        figures.add_row(name, str(share.count), str(share.total), shown, interval)
+    heads = ("form", "gaps", "kind right", "kinds", "law closes of the closable (median)")
+    forms = Table(*heads, title="By form")
     for form in sorted({form for form, _ in gaps.values()}):
         own = [f for other, f in gaps.values() if other == form]
         kinds = sorted({str(f["kind"]) for f in own})

@@ -19,12 +19,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.estimators import AMPLITUDE, records
+from benchmarks.estimators import bound_of, records
 from identification import identify
 from identification.estimators.neural_posterior import NeuralPosterior
 from identification.neural.posterior import distribution, forward, variances
 from identification.neural.rivals import CAMPAIGN_NAMES, RECORD_NAMES
-from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.experiments.training import INPUTS, FitSpec, fit, losses, start_state, usable
 from tunnel_lab.experiments.training_samples import read_shards
 from tunnel_sim.files.campaign_folder import read_campaign
@@ -49,11 +48,9 @@ def unrefusing() -> NeuralPosterior:
 def clean_rows(count: int, seed: int) -> Iterator[Row]:
     """Damped sinusoids in white noise: errors over the bound, and whether the interval holds the truth."""
     estimator = NeuralPosterior()
-    for (zeta, frequency, share, phase), number, campaign in records(count, seed):
-        bound = damped_sinusoid_bound(
-            campaign.runs[0].record.time_s, amplitude=AMPLITUDE, phase=phase, frequency=frequency, zeta=zeta,
-            noise_std=share * AMPLITUDE,
-        )  # fmt: skip
+    for cell, number, campaign in records(count, seed):
+        zeta, frequency, share, _ = cell
+        bound = bound_of(cell, campaign)
         run = estimator.estimate(campaign).runs[0]
         row: Row = {"cell": f"{zeta:g}, {frequency:g} Hz, {share:g}", "number": number}
         truths = {"zeta": zeta, "omega_n": 2.0 * np.pi * frequency / np.sqrt(1.0 - zeta**2)}
@@ -192,8 +189,7 @@ def show_blind(console: Console, rows: Sequence[Row]) -> None:
         "two to four effects": [row for row in rows if row["kind"] in ("pair", "three", "four")],
         "outside the vocabulary": [row for row in rows if row["kind"] == "outside"],
     }
-    table = Table(title="Median absolute error, 1/rad; 95 % intervals that hold the truth")
-    for head in (
+    heads = (
         "campaigns",
         "number",
         "",
@@ -203,8 +199,8 @@ def show_blind(console: Console, rows: Sequence[Row]) -> None:
         "held by OE",
         "held by neural",
         "refused",
-    ):
-        table.add_column(head)
+    )
+    table = Table(*heads, title="Median absolute error, 1/rad; 95 % intervals that hold the truth")
     for title, own in groups.items():
         for name in NAMES:
             both = [r for r in own if name in r["output_error"] and name in r["neural_posterior"]]

@@ -53,9 +53,10 @@ def integrating(effect: Effect) -> Callable[[], float]:
 
 def speeds(repetitions: int) -> Table:
     """Steps per second of each form relative to the built-in one."""
-    table = Table(title="Cubic stiffness built in (baseline) against other forms, RK4 steps per second")
-    for head in ("subject", "baseline", "subject", "ratio (median)", "ratio (best)", "target"):
-        table.add_column(head)
+    heads = ("subject", "baseline", "subject", "ratio (median)", "ratio (best)", "target")
+    table = Table(
+        *heads, title="Cubic stiffness built in (baseline) against other forms, RK4 steps per second"
+    )
     built_in = effect_class("cubic_stiffness")(1.0)
     model = {
         e: build_model(load_rig(), e.on_run(RUN, RUN, None)).mj for e in (built_in, CUBIC(1.0), DETENT(1.0))
@@ -84,9 +85,8 @@ def answers() -> Table:
     )
     campaign = simulate_campaign(plan)
     others = tuple(effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "sensor_drift"))
-    table = Table(title="One campaign with cubic stiffness of 0.3 /rad², diagnosed with each form")
-    for head in ("form", "answer", "probability", "κ, 1/rad²", "closed", "seconds (CPU)"):
-        table.add_column(head)
+    heads = ("form", "answer", "probability", "κ, 1/rad²", "closed", "seconds (CPU)")
+    table = Table(*heads, title="One campaign with cubic stiffness of 0.3 /rad², diagnosed with each form")
     for form, kind in (("built in", CubicStiffness), ("class", OwnCubic), ("expression", CUBIC)):
         begin = time.process_time()
         found = diagnose(campaign, kinds=(kind, *others))

@@ -21,12 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from benchmarks.estimators import AMPLITUDE, records
+from benchmarks.estimators import bound_of, records
 from benchmarks.neural_posterior import Row, show_clean
 from identification.neural.demodulated import WINDOWS, Demodulated, demodulate
 from identification.neural.rivals import record_features
 from identification.signal.frequency import starting_frequency
-from identification.uncertainty.cramer_rao import damped_sinusoid_bound
 from tunnel_lab.experiments.training import FAR
 from tunnel_lab.experiments.training_samples import (
     ShardSpec,
@@ -150,16 +149,14 @@ def judged(posterior: Any, variant: str, box: Array, cells: Sequence[Any]) -> It
     drawn = posterior.sample_batched((DRAWS,), x=x, reject_outside_prior=False, show_progress_bars=False)
     seconds = (time.process_time() - begun) / len(cells)
     samples = iter(np.moveaxis(drawn.detach().numpy(), 1, 0).astype(np.float64))
-    for ((zeta, frequency, share, phase), number, campaign), one in zip(cells, seen, strict=True):
+    for (cell, number, campaign), one in zip(cells, seen, strict=True):
+        zeta, frequency, share, _ = cell
         row: Row = {"cell": f"{zeta:g}, {frequency:g} Hz, {share:g}", "number": number, "s": seconds}
         own = next(samples) if one is not None else np.zeros((0, 2))
         own = own[np.all((own >= box[0]) & (own <= box[1]), axis=1)]
         row["outside"] = 1.0 - len(own) / DRAWS
         if one is not None and len(own):
-            bound = damped_sinusoid_bound(
-                campaign.runs[0].record.time_s, amplitude=AMPLITUDE, phase=phase, frequency=frequency, zeta=zeta,
-                noise_std=share * AMPLITUDE,
-            )  # fmt: skip
+            bound = bound_of(cell, campaign)
             truths = (zeta, 2.0 * np.pi * frequency / np.sqrt(1.0 - zeta**2))
             for name, truth, values in zip(NAMES, truths, one.natural(own).T, strict=True):
                 low, middle, high = np.quantile(values, (0.025, 0.5, 0.975))

@@ -135,6 +135,17 @@ def write(folder: Path, runs: int, estimators: str) -> Path:
     return file
 
 
+def between(
+    file: Path, out: Path, options: argparse.Namespace, workers: int, threads: int
+) -> tuple[dict[str, float], float, float]:
+    """A sweep between two bare simulations, and its rate over theirs: elapsed and CPU."""
+    before = apart("--bare", file, "--workers", options.workers)
+    took = apart("--sweep", file, out, "--workers", workers, "--threads", threads)
+    after = apart("--bare", file, "--workers", options.workers)
+    wall, cpu = ((before[key] + after[key]) / 2.0 / took[key] for key in ("wall", "cpu"))
+    return took, wall, cpu
+
+
 def compare(folder: Path, options: argparse.Namespace) -> None:
     """Each kind of sweep and the bare rate, in turn."""
     kinds = {
@@ -148,12 +159,7 @@ def compare(folder: Path, options: argparse.Namespace) -> None:
     for turn in range(options.turns):
         for name, (estimators, workers, threads) in kinds.items():
             file = write(folder, options.small, estimators)
-            before = apart("--bare", file, "--workers", options.workers)
-            took = apart(
-                "--sweep", file, folder / f"{turn}-{name}", "--workers", workers, "--threads", threads
-            )
-            after = apart("--bare", file, "--workers", options.workers)
-            rates = [(before[key] + after[key]) / 2.0 / took[key] for key in ("wall", "cpu")]
+            took, *rates = between(file, folder / f"{turn}-{name}", options, workers, threads)
             found.setdefault(name, []).append((*rates, 1e3 * took["cpu"]))
     print(f"{options.small} runs of 10 s on {options.workers} processors, median of {options.turns} turns")
     for name, turns in found.items():
@@ -165,10 +171,7 @@ def grow(folder: Path, options: argparse.Namespace) -> None:
     """Rate and peak memory at two sizes."""
     for runs in (options.large // 10, options.large):
         file = write(folder, runs, "conventional")
-        before = apart("--bare", file, "--workers", options.workers)
-        took = apart("--sweep", file, folder / f"grow-{runs}", "--workers", options.workers)
-        after = apart("--bare", file, "--workers", options.workers)
-        wall, cpu = ((before[key] + after[key]) / 2.0 / took[key] for key in ("wall", "cpu"))
+        took, wall, cpu = between(file, folder / f"grow-{runs}", options, options.workers, 1)
         print(
             f"{runs} runs, conventional: rate / bare {wall:.2f} elapsed, {cpu:.2f} CPU; "
             f"{1e3 * took['wall']:.1f} ms elapsed and {1e3 * took['cpu']:.1f} ms CPU a run; "

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from mujoco import batch as mujoco_batch
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from tunnel_sim.engine.model import build_model, build_spec
 from tunnel_sim.files.rig_file import load_rig
@@ -93,6 +93,11 @@ def plain_threads(model: mujoco.MjModel, steps: int, threads: int) -> Callable[[
     return repetition
 
 
+def numbers(title: str, name: str, *heads: str) -> Table:
+    """A table of numbers, aligned to the right of a name."""
+    return Table(name, *(Column(head, justify="right") for head in heads), title=title)
+
+
 def interleaved(
     one: Callable[[], float], other: Callable[[], float], repetitions: int
 ) -> tuple[list[float], list[float]]:
@@ -136,9 +141,8 @@ def main() -> None:
     linear = build_model(rig, LINEAR).mj
     busy = build_model(rig, RunSettings(**{**vars(LINEAR), "parameters": EVERYTHING})).mj
     rod = RunSettings(**{**vars(LINEAR), "rod_twist": twist})
-    table = Table(title="Throughput, RK4 steps per second")
-    for head in ("comparison", "baseline", "subject", "ratio (median)", "ratio (best)", "target"):
-        table.add_column(head, justify="left" if head == "comparison" else "right")
+    heads = ("comparison", "baseline", "subject", "ratio (median)", "ratio (best)", "target")
+    table = numbers("Throughput, RK4 steps per second", *heads)
 
     def single(name: str, subject: mujoco.MjModel, settings: RunSettings, target: str) -> None:
         bare = stepping(without_plugin(settings), steps)

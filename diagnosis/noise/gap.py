@@ -344,7 +344,9 @@ def noise_remarks(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Remar
     found = []
     runs = tuple(noise.variance)
     if test.within_step:
-        what = "the model departs from the readings by less than their own steps do, whose error may follow the motion"
+        what = (
+            "the model departs from the readings by less than their steps, whose error may follow the motion"
+        )
         found.append(Remark(Outcome.NOTED, runs, what, "read the angle more finely to see smaller gaps"))
     if noise.colour is not None:
         span = noise.colour.frequency[-1] / noise.colour.frequency[0]

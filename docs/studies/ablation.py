@@ -97,10 +97,10 @@ class Case:
         if self.nominal is None:
             return [(self.causes, 1.0)]
         found = decide.weigh([s for s in self.sets if withheld not in s.effects], self.nominal)
-        return [(self._named(answer), answer.probability) for answer in found]
-
-    def _named(self, answer: Weighed) -> Names:
-        return UNKNOWN if answer.effects == UNKNOWN else tuple(sorted({*self.read_off, *answer.effects}))
+        return [
+            (UNKNOWN if a.effects == UNKNOWN else tuple(sorted({*self.read_off, *a.effects})), a.probability)
+            for a in found
+        ]
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,6 @@ def read_case(
     """Diagnose a campaign, and keep the sets that are weighed last.
 
     Args:
-        folder: of the campaign.
         truth: names of the effects that act and matter.
         small: names of those that act and need not be found.
         only: names of the effects to try; None: all.
@@ -218,12 +217,7 @@ def read_case(
 
 
 def read_cases(folder: Path, count: int) -> list[Case]:
-    """The first campaigns of an opened set.
-
-    Args:
-        folder: of the set, with its key.
-        count: of campaigns.
-    """
+    """The first campaigns of an opened set, with its key."""
     return [read_case(folder / name, effects, small) for name, effects, small in _truths(folder, count)]
 
 
@@ -242,33 +236,27 @@ def fitted_odds(cases: Sequence[Case]) -> dict[str, float]:
     """
     start = [getattr(policy, name) for name in ODDS]
 
+    def log_probability(case: Case) -> float:
+        """Of the truth, and half of that of ``unknown`` with every true effect withheld in turn."""
+        right = sum(p for names, p in case.answers() if case.right(names))
+        total = float(np.log(max(right, _LEAST)))
+        if case.truth != UNKNOWN:
+            for effect in set(case.truth) - set(case.read_off):
+                total += 0.5 * float(np.log(max(dict(case.answers(effect))[UNKNOWN], _LEAST)))
+        return total
+
     def loss(values: Array) -> float:
         with ExitStack() as stack:
             for name, value, before in zip(ODDS, values, start, strict=True):
                 stack.enter_context(changed(name, float(value) / before))
-            return -sum(_log_probability(case) for case in cases if case.nominal is not None)
+            return -sum(log_probability(case) for case in cases if case.nominal is not None)
 
     found = minimize(loss, start, method="Nelder-Mead", options={"xatol": 0.01, "fatol": 0.01})
     return dict(zip(ODDS, found.x.tolist(), strict=True))
 
 
-def _log_probability(case: Case) -> float:
-    """Of the truth, and half of that of ``unknown`` with every true effect withheld in turn."""
-    right = sum(p for names, p in case.answers() if case.right(names))
-    total = float(np.log(max(right, _LEAST)))
-    if case.truth != UNKNOWN:
-        for effect in set(case.truth) - set(case.read_off):
-            total += 0.5 * float(np.log(max(dict(case.answers(effect))[UNKNOWN], _LEAST)))
-    return total
-
-
 def misses(folder: Path, count: int) -> Iterator[str]:
-    """A line for every wrong answer: whether the search or the weighing missed the truth.
-
-    Args:
-        folder: of the set.
-        count: of campaigns.
-    """
+    """A line for every wrong answer: whether the search or the weighing missed the truth."""
     for name, effects, small in _truths(folder, count):
         case = read_case(folder / name, effects, small)
         answer = case.answers()[0][0]
@@ -281,13 +269,7 @@ def misses(folder: Path, count: int) -> Iterator[str]:
 
 
 def table(folder: Path, count: int, rerun: Sequence[str]) -> Iterator[str]:
-    """The table, line by line.
-
-    Args:
-        folder: of the set.
-        count: of campaigns.
-        rerun: further constants, by whole diagnoses.
-    """
+    """The table, line by line; ``rerun`` are further constants, by whole diagnoses."""
     cases = read_cases(folder, count)
     yield "| constant | exact | false | log score | wrong set stated |\n|---|---|---|---|---|"
     yield tally(cases).row("as they are")

@@ -18,13 +18,11 @@ import numpy as np
 from gymnasium.wrappers.vector import NormalizeObservation
 
 import tunnel_sim.envs  # noqa: F401  registers the environments
-from docs.studies.campaign_policies import Row, from_csv, play, replaced, table, to_csv
+from docs.studies.campaign_policies import Row, from_csv, play_all, replaced, table, to_csv
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.policies import FEATURES, LAYERS, Agent, features, menu_text
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.record import Array
 
-SEEDS = 50  # of the score: 0 to 49, as in docs/campaign-design.md
 TRAINED_FROM = 1_000_000  # first seed of the training, far from those of the score
 STEPS = 90_000
 CAMPAIGNS = 16  # in parallel, so that the network is evaluated for all of them at once
@@ -79,30 +77,12 @@ def train(steps: int, seed: int) -> Agent:
         device="cpu",
     )
     model.learn(steps)
+    parts = (*model.policy.mlp_extractor.policy_net, model.policy.action_net)
+    linear = [part for part in parts if hasattr(part, "weight")]
+    layers = tuple((part.weight.detach().numpy(), part.bias.detach().numpy()) for part in linear)
+    assert len(layers) == LAYERS
     menu = CampaignEnv(**TRAINING).conditions.menu
-    return Agent(envs.obs_rms.mean, envs.obs_rms.var, _layers(model), menu_text(menu))
-
-
-def _layers(model: Any) -> tuple[tuple[Array, Array], ...]:
-    """Weights and biases of the policy's network."""
-    linear = [part for part in (*model.policy.mlp_extractor.policy_net, model.policy.action_net)]
-    pairs = [
-        (part.weight.detach().numpy(), part.bias.detach().numpy())
-        for part in linear
-        if hasattr(part, "weight")
-    ]
-    assert len(pairs) == LAYERS
-    return tuple(pairs)
-
-
-def score() -> list[Row]:
-    """Play the seeds of the score with the trained agent in the full simulation."""
-    rows = []
-    for seed in range(SEEDS):
-        rows.append(play("identification", "trained", seed))
-        print(f"\rtrained {seed + 1}/{SEEDS}  ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    return rows
+    return Agent(envs.obs_rms.mean, envs.obs_rms.var, layers, menu_text(menu))
 
 
 def write_score(docs: Path, rows: Sequence[Row]) -> None:
@@ -124,11 +104,7 @@ def fill(page: str, docs: Path) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train or score.
-
-    Args:
-        arguments: those of the process when None.
-    """
+    """Train or score."""
     parser = argparse.ArgumentParser(description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     training = commands.add_parser("train", help="train an agent and write it")
@@ -141,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.command == "train":
         write_whole(given.out, train(given.steps, given.seed).to_bytes())
     else:
-        write_score(given.docs, score())
+        write_score(given.docs, play_all("identification", "trained"))
     return 0
 
 

@@ -23,8 +23,8 @@ from identification.estimate import PARAMETERS
 from identification.statistics import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
 from tunnel_lab.envs.policies import POLICIES, run_campaign
-from tunnel_lab.envs.session import Knowledge, answers, probabilities
-from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, styled
+from tunnel_lab.envs.session import answers, probabilities
+from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.record import Array
 
@@ -84,7 +84,8 @@ def play(preset: str, policy: str, seed: int) -> Row:
     error = (known.belief.values - exact) / np.sqrt(np.diag(known.belief.covariance))
     right = bool(np.all(np.abs(error[:2]) < 3.0))
     if preset == "diagnosis":
-        right = done and _answer(known) == "".join(truth["effects"])
+        answer = answers(known.conditions.effects)[int(np.argmax(probabilities(known)))]
+        right = done and answer == "".join(truth["effects"])
         error = np.zeros(4)
     return Row(
         preset,
@@ -100,8 +101,14 @@ def play(preset: str, policy: str, seed: int) -> Row:
     )
 
 
-def _answer(known: Knowledge) -> str:
-    return answers(known.conditions.effects)[int(np.argmax(probabilities(known)))]
+def play_all(preset: str, policy: str) -> list[Row]:
+    """Play all seeds of a preset."""
+    rows = []
+    for seed in range(SEEDS[preset]):
+        rows.append(play(preset, policy, seed))
+        print(f"\r{preset} {policy} {seed + 1}/{SEEDS[preset]}  ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return rows
 
 
 def to_csv(rows: Sequence[Row]) -> str:
@@ -219,13 +226,6 @@ def example(seed: int = 0) -> dict[str, tuple[Array, Array]]:
     return found
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
-    """Draw the figure of the page."""
-    from tunnel_lab.plotting.style import save
-
-    save(policies_figure(rows, example()), path)
-
-
 @styled
 def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Array]]) -> Figure:
     """One campaign of each policy, and how many of all have reached the goal, against the rig time.
@@ -267,11 +267,7 @@ def policies_figure(rows: Sequence[Row], followed: Mapping[str, tuple[Array, Arr
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Play the episodes and write the page's numbers, tables and figure.
-
-    Args:
-        arguments: those of the process when None.
-    """
+    """Play the episodes and write the page's numbers, tables and figure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("docs", type=Path, help="the folder docs of the source tree")
     parser.add_argument(
@@ -285,24 +281,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         kept = from_csv(table_of_episodes.read_text(encoding="utf-8"))
         rows = [row for row in kept if row.preset != given.preset]
     for preset in CONTESTS if given.preset is None else (given.preset,):
-        rows += _played(preset)
+        for policy in CONTESTS[preset]:
+            rows += play_all(preset, policy)
     rows.sort(key=lambda row: (list(CONTESTS).index(row.preset), row.policy, row.seed))
     write_whole(table_of_episodes, to_csv(rows).encode())
     if {row.preset for row in rows} == set(CONTESTS):
         page = docs / "campaign-design.md"
         write_whole(page, fill(page.read_text(encoding="utf-8"), rows).encode())
-        draw(rows, docs / "images" / "campaign-design.png")
+        save(policies_figure(rows, example()), docs / "images" / "campaign-design.png")
     return 0
-
-
-def _played(preset: str) -> list[Row]:
-    rows = []
-    for policy in CONTESTS[preset]:
-        for seed in range(SEEDS[preset]):
-            rows.append(play(preset, policy, seed))
-            print(f"\r{preset} {policy} {seed + 1}/{SEEDS[preset]}  ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    return rows
 
 
 if __name__ == "__main__":

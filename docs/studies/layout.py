@@ -32,8 +32,6 @@ class Room:
     """A folder of a package, or a module at its top.
 
     Args:
-        package: of which it is part.
-        name: of the folder or module.
         layer: its place in the package's contract; it imports only from rooms of a greater number.
         summary: first line of its docstring.
     """
@@ -53,28 +51,20 @@ def rooms() -> list[Room]:
     """All rooms named in the import contracts of the packages drawn."""
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
     layers = {c["containers"][0]: c["layers"] for c in contracts if "containers" in c}
-    return [
-        _room(package, name, depth)
-        for package in PACKAGES
-        for depth, together in enumerate(layers[package])
-        for name in together.split(" | ")
-    ]
-
-
-def _room(package: str, name: str, layer: int) -> Room:
-    folder = ROOT / package / name
-    file = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
-    summary = (ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or "").splitlines()[0]
-    return Room(package, name, layer, summary.replace("`", ""))
+    found = []
+    for package in PACKAGES:
+        for depth, together in enumerate(layers[package]):
+            for name in together.split(" | "):
+                folder = ROOT / package / name
+                file = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
+                words = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+                found.append(Room(package, name, depth, words.splitlines()[0].replace("`", "")))
+    return found
 
 
 @styled
 def draw(path: Path) -> None:
-    """Draw the rooms, folders as boxes, the lowest on the left.
-
-    Args:
-        path: of the picture, SVG.
-    """
+    """Draw the rooms as an SVG, folders as boxes, the lowest on the left."""
     import matplotlib as mpl
 
     fig = figure(11.0, 6.2)

@@ -96,7 +96,17 @@ def noise_row(
                 found[method].append(estimate.zeta)
             if method == NETWORK and estimate.windows:
                 first.append(estimate.windows[0].zeta)
-    whole, three = _bounds(zeta, omega_n, noise, time, angle)
+    root = float(np.sqrt(1.0 - zeta**2))
+    bound = partial(
+        damped_sinusoid_bound, frequency=omega_n * root / (2.0 * np.pi), zeta=zeta, noise_std=noise
+    )
+    lag = -float(np.arctan2(zeta, root))
+    whole = bound(time, amplitude=angle / root, phase=lag).zeta
+    # Three cycles after the first zero crossing.
+    crossing = (0.5 * np.pi - lag) / (omega_n * root)
+    size = angle / root * float(np.exp(-zeta * omega_n * crossing))
+    t3 = 6.0 * np.pi / (omega_n * root)
+    three = bound(time[time < t3], amplitude=size, phase=-0.5 * np.pi).zeta
     own = found[NETWORK]
     errors = {method: np.array([one.value - zeta for one in values]) for method, values in found.items()}
     return NoiseRow(
@@ -105,18 +115,3 @@ def noise_row(
         runs={m: ratio_of(e, whole) if e.size == trials else None for m, e in errors.items()},
         coverage=float(np.mean([abs(one.value - zeta) < 1.96 * one.std for one in own])),
     )
-
-
-def _bounds(zeta: float, omega_n: float, noise: float, time: Array, angle: float) -> tuple[float, float]:
-    # Of ζ: from the whole record, and from three cycles after its first zero crossing.
-    root = float(np.sqrt(1.0 - zeta**2))
-    bound = partial(
-        damped_sinusoid_bound, frequency=omega_n * root / (2.0 * np.pi), zeta=zeta, noise_std=noise
-    )
-    lag = -float(np.arctan2(zeta, root))
-    whole = bound(time, amplitude=angle / root, phase=lag)
-    crossing = (0.5 * np.pi - lag) / (omega_n * root)
-    size = angle / root * float(np.exp(-zeta * omega_n * crossing))
-    t3 = 6.0 * np.pi / (omega_n * root)
-    three = bound(time[time < t3], amplitude=size, phase=-0.5 * np.pi)
-    return whole.zeta, three.zeta

@@ -23,7 +23,6 @@ from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import EffectTable, PlanDocument, plan_from, read_plan
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.plan import CampaignPlan
 
 SEEDS = 40
 LIMITS = Limits(moment=0.5, angle=radians(20.0))  # the angle is that of the releases
@@ -102,32 +101,24 @@ def compare(name: str, *, buffeted: bool, seeds: int = SEEDS) -> Case:
     if best.drive.frequencies_hz:
         drive += f", {len(best.drive.frequencies_hz)} frequencies"
     estimator = "filter_error" if buffeted else "output_error"
-    found = [error for plan in plans for error in _errors(plan, estimator, seeds)] if seeds else []
-    air = "buffeting" if buffeted else "still"
-    return Case(
-        name, air, drive, (bounds[0], bounds[1], bounds[2], bounds[3]), _of_wrong_guess(*plans), tuple(found)
-    )
-
-
-def _of_wrong_guess(free: CampaignPlan, driven: CampaignPlan) -> tuple[float, float]:
-    rig, ratios, peaks = load_rig(), [], []
+    found: list[float] = []
+    for plan in plans if seeds else ():
+        errors = []
+        for seed in range(seeds):
+            estimate = identify(simulate_campaign(replace(plan, seed=seed)), estimator)
+            assert estimate.cn_beta is not None
+            assert estimate.cn_r is not None
+            truth = plan.truth
+            errors.append([estimate.cn_beta.value - truth.cn_beta, estimate.cn_r.value - truth.cn_r])
+        found += np.sqrt(np.mean(np.square(errors), axis=0)).tolist()
+    ratios, peaks = [], []
     for factor in (1.0 - MISTAKE, 1.0 + MISTAKE):
-        truth = replace(free.truth, yaw_inertia=factor * free.truth.yaw_inertia)
-        decays, moved = replace(free, truth=truth), replace(driven, truth=truth)
+        truth = replace(plans[0].truth, yaw_inertia=factor * plans[0].truth.yaw_inertia)
+        decays, moved = (replace(plan, truth=truth) for plan in plans)
         ratios.append(plan_bound(decays, rig).std("cn_r") / plan_bound(moved, rig).std("cn_r"))
         peaks.append(peak_response(moved, rig))
-    return min(ratios), max(peaks)
-
-
-def _errors(plan: CampaignPlan, estimator: str, seeds: int) -> list[float]:
-    errors = []
-    for seed in range(seeds):
-        estimate = identify(simulate_campaign(replace(plan, seed=seed)), estimator)
-        assert estimate.cn_beta is not None
-        assert estimate.cn_r is not None
-        errors.append([estimate.cn_beta.value - plan.truth.cn_beta, estimate.cn_r.value - plan.truth.cn_r])
-    mean: list[float] = np.sqrt(np.mean(np.square(errors), axis=0)).tolist()
-    return mean
+    air, all_bounds = "buffeting" if buffeted else "still", (bounds[0], bounds[1], bounds[2], bounds[3])
+    return Case(name, air, drive, all_bounds, (min(ratios), max(peaks)), tuple(found))
 
 
 def table(cases: Sequence[Case]) -> str:
@@ -155,11 +146,7 @@ def _both(case: Case, form: str, place: int, over: int | None = None) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compare the plans and fill the page.
-
-    Args:
-        arguments: those of the process when None.
-    """
+    """Compare the plans and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("docs", type=Path, help="the folder docs of the source tree")
     page: Path = parser.parse_args(arguments).docs / "campaign-design.md"

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 from diagnosis import diagnose
 from identification.datasets import MEASURED_CAMPAIGNS, measured_campaign
 from tunnel_lab.plotting.style import save
-from tunnel_lab.report.waterfall import waterfall_figure
+from tunnel_lab.report.figures import waterfall_figure
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -77,28 +76,14 @@ EXPECTED: Mapping[str, Expected] = {
 
 
 def judge(expected: Expected, document: Mapping[str, Any]) -> bool:
-    """Whether an answer is right.
-
-    Args:
-        document: of the diagnosis.
-
-    Returns:
-        True where all expected causes and no others are named, and the expected words are said.
-    """
+    """Whether all expected causes and no others are named, and the expected words are said."""
     named = set(document["causes"])
     said = " ".join((document["verdict"], *document["cautions"]))
     return expected.causes <= named <= expected.causes | expected.also and expected.words in said
 
 
 def records(folder: Path | None) -> dict[str, Campaign]:
-    """The packaged records, and those of a folder.
-
-    Args:
-        folder: of campaigns; None: the packaged ones only.
-
-    Returns:
-        Campaigns by name, those with an entry in `EXPECTED`.
-    """
+    """The packaged records and the campaigns of a folder that have an entry in `EXPECTED`, by name."""
     found = {name: measured_campaign(name) for name in MEASURED_CAMPAIGNS}
     for path in sorted(folder.iterdir()) if folder is not None else ():
         if path.name in EXPECTED and path.name not in found:
@@ -107,11 +92,7 @@ def records(folder: Path | None) -> dict[str, Campaign]:
 
 
 def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple[str, str]:
-    """One record's part of the page.
-
-    Args:
-        document: of its diagnosis, or why it was refused.
-    """
+    """One record's row and part of the page, by the document of its diagnosis or why it was refused."""
     expected = EXPECTED[name]
     if isinstance(document, str):
         row = f"| [{name}](#{name}) | {_names(expected.causes)} | refused | | wrong |"
@@ -129,9 +110,10 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
         f"The diagnosis ({right}): {document['verdict']}\n",
     ]
     parts += [f"It adds: {text}\n" for text in caution]
-    parts += [
-        f"- `{key}`: {_value(given)}" for key, given in list(best["parameters"].items())[:_KEY_PARAMETERS]
-    ]
+    for key, given in list(best["parameters"].items())[:_KEY_PARAMETERS]:
+        std = "" if given["std"] is None else f" ± {given['std']:.1g}"
+        unit = "" if given["unit"] == "1" else f" {given['unit']}"
+        parts.append(f"- `{key}`: {given['value']:.4g}{std}{unit}")
     figure = waterfall_figure(document)
     if figure is not None:
         path = images / f"real-records-{name}.png"
@@ -141,27 +123,11 @@ def section(name: str, document: Mapping[str, Any] | str, images: Path) -> tuple
 
 
 def _names(causes: Sequence[str] | frozenset[str]) -> str:
-    return " + ".join(re.sub("_", " ", name) for name in sorted(causes)) or "none"
-
-
-def _value(given: Mapping[str, Any]) -> str:
-    std = "" if given["std"] is None else f" ± {given['std']:.1g}"
-    return f"{given['value']:.4g}{std}" + ("" if given["unit"] == "1" else f" {given['unit']}")
-
-
-def _answer(campaign: Campaign) -> Mapping[str, Any] | str:
-    try:
-        return diagnose(campaign).to_json_dict()
-    except TunnelError as refused:
-        return str(refused)
+    return " + ".join(name.replace("_", " ") for name in sorted(causes)) or "none"
 
 
 def page(parts: Sequence[tuple[str, str]]) -> str:
-    """The whole page.
-
-    Args:
-        parts: rows and sections of the records.
-    """
+    """The whole page of the rows and sections of the records."""
     right = sum(row.endswith("right |") for row, _ in parts)
     head = (
         "# Real records\n\nWhat the diagnosis says of measured records, and what their sources or energy balances "
@@ -183,12 +149,14 @@ def main() -> None:
     found = records(parser.parse_args().data)
     parts = []
     for name, campaign in found.items():
-        row, text = section(name, _answer(campaign), images)
+        try:
+            answer: Mapping[str, Any] | str = diagnose(campaign).to_json_dict()
+        except TunnelError as refused:
+            answer = str(refused)
+        row, text = section(name, answer, images)
         mark = "" if name in MEASURED_CAMPAIGNS else "*"
         parts.append((row.replace(f"(#{name})", f"(#{name}){mark}", 1), text))
-        PAGE.write_text(
-            page(parts), encoding="utf-8"
-        )  # after each record, since a diagnosis may take minutes
+        PAGE.write_text(page(parts), encoding="utf-8")  # after each, since a diagnosis may take minutes
         print(row, flush=True)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import log
 
 import numpy as np
@@ -98,13 +99,7 @@ class WindowDiagnosis:
         return sum(e.probability for e in held)
 
     def explanation(self, *names: str) -> Explanation:
-        """The hypothesis that holds just these effects.
-
-        Args:
-            names: of its effects, in any order; none is the linear model.
-
-        Returns:
-            Its fit.
+        """The hypothesis that holds just these effects, in any order; none is the linear model.
 
         Raises:
             TunnelError: when it was not weighed: one of its effects moves neither column.
@@ -174,7 +169,12 @@ def diagnose_windows(
                 pair = task.fit(*task.together(a, b))
                 found += [] if pair is None else [pair]
     flat = {kind.name for kind in kinds} - {e.name for e in moving}
-    return WindowDiagnosis(task.state, measured, std, _weighed(found), tuple(sorted(flat)))
+    unique = {frozenset(e.kinds): e for e in sorted(found, key=lambda e: -e.bic)}  # the best of each set
+    ordered = sorted(unique.values(), key=lambda e: e.bic)
+    weight = np.exp(-0.5 * np.array([e.bic - ordered[0].bic for e in ordered]))
+    weight /= weight.sum()
+    weighed = [dataclasses.replace(e, probability=float(w)) for e, w in zip(ordered, weight, strict=True)]
+    return WindowDiagnosis(task.state, measured, std, tuple(weighed), tuple(sorted(flat)))
 
 
 def has_trend(kind: type[Effect]) -> bool:
@@ -188,14 +188,6 @@ def _moves_zeta(e: Explanation, none: Explanation) -> bool:
 
 def _moves_omega(e: Explanation, none: Explanation) -> bool:
     return none.chi2_omega - e.chi2_omega > _MOVES
-
-
-def _weighed(found: Sequence[Explanation]) -> tuple[Explanation, ...]:
-    unique = {frozenset(e.kinds): e for e in sorted(found, key=lambda e: -e.bic)}  # the best of each set
-    ordered = sorted(unique.values(), key=lambda e: e.bic)
-    weight = np.exp(-0.5 * np.array([e.bic - ordered[0].bic for e in ordered]))
-    weight /= weight.sum()
-    return tuple(dataclasses.replace(e, probability=float(w)) for e, w in zip(ordered, weight, strict=True))
 
 
 def _residuals(columns: Columns, target: Columns, std: Columns) -> Array:
@@ -269,15 +261,13 @@ class _Task:
     def fit(self, kinds: Kinds, start: Array) -> Explanation | None:
         """Least squares from a start that can be simulated."""
         infos = [kind.parameters()[0] for kind in kinds]
-        omega, zeta = float(self.measured.omega_n.mean()), float(self.measured.zeta.mean())
-        base = (
-            np.array([[_SLOWEST * omega - omega, -_LEAST_ZETA - zeta], [omega, _MOST_ZETA - zeta]]) / _SCALES
-        )
+        mean, ratio = float(self.measured.omega_n.mean()), float(self.measured.zeta.mean())
+        least = [_SLOWEST * mean - mean, -_LEAST_ZETA - ratio]
+        base = np.array([least, [mean, _MOST_ZETA - ratio]]) / _SCALES
         lower = np.array([info.fit_lower / info.scale for info in infos] + base[0].tolist())
         upper = np.array([info.fit_upper / info.scale for info in infos] + base[1].tolist())
 
-        def residuals(x: Array) -> Array:
-            return self.residuals(kinds, x)
+        residuals = partial(self.residuals, kinds)
 
         def jacobian(x: Array) -> Array:
             here = residuals(x)
@@ -294,9 +284,7 @@ class _Task:
             x_scale="jac",
             max_nfev=25,
         )
-        return self._explanation(kinds, solution.x)
-
-    def _explanation(self, kinds: Kinds, x: Array) -> Explanation | None:
+        x = solution.x
         columns = self.columns(kinds, x)
         if columns is None:
             return None

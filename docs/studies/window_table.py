@@ -156,7 +156,23 @@ def simulate_windows(
         duration=round(1.1 * count * CYCLES * 2.0 * pi / omega_n * _RATE) / _RATE,
         timestep=REPORT_STEP,
     )
-    return _windowed(*_read(rig, stated, effects), zeta, count)
+    chain = EffectChain(stated, tuple(effects), (None,) * len(effects))
+    try:
+        motion = forward_motion(rig, chain.physics(), _RATE)
+    except ValueError:  # grows without bound
+        return None
+    reading = chain.reading(chain.angle(motion.angle, motion.time_s))
+    curve, begin = CubicSpline(motion.time_s, reading), 0.0
+    decay = _first_guess(motion.time_s, reading, zeta)
+    rows: list[Decay] = []
+    for place in range(-1, count):  # the first window twice: its guess may be of another length
+        decay = None if decay is None else _window(curve, begin, decay)
+        if decay is None:
+            return None
+        if place >= 0:
+            rows.append(decay)
+            begin += _length(decay)
+    return Columns(np.array([row.zeta for row in rows]), np.array([row.omega_n for row in rows]))
 
 
 def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tuple[float, float]:
@@ -172,30 +188,6 @@ def base_dynamics(state: RigState, omega_n: float, zeta: float, rig: Rig) -> tup
     air = rig.body.flow(state.air_density, state.wind_speed)
     inertia = (state.spring_stiffness - aerodynamic_stiffness(state.derivatives.cn_beta, **air)) / omega_n**2
     return inertia, 2.0 * zeta * omega_n * inertia + aerodynamic_damping(state.derivatives.cn_r, **air)
-
-
-def _read(rig: Rig, stated: RunSettings, effects: Sequence[Effect]) -> tuple[Array, Array]:
-    chain = EffectChain(stated, tuple(effects), (None,) * len(effects))
-    try:
-        motion = forward_motion(rig, chain.physics(), _RATE)
-    except ValueError:  # grows without bound
-        return np.arange(2.0), np.zeros(2)
-    return motion.time_s, chain.reading(chain.angle(motion.angle, motion.time_s))
-
-
-def _windowed(time: Array, reading: Array, zeta: float, count: int) -> Columns | None:
-    curve, begin = CubicSpline(time, reading), 0.0
-    decay = _first_guess(time, reading, zeta)
-    rows: list[Decay] = []
-    for place in range(-1, count):  # the first window twice: its guess may be of another length
-        fitted = None if decay is None else _window(curve, begin, decay)
-        if fitted is None:
-            return None
-        decay = fitted
-        if place >= 0:
-            rows.append(decay)
-            begin += _length(decay)
-    return Columns(np.array([row.zeta for row in rows]), np.array([row.omega_n for row in rows]))
 
 
 def _length(decay: Decay) -> float:

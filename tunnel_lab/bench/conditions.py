@@ -9,8 +9,7 @@ from typing import Any
 
 from nicegui import events, ui
 
-from tunnel_lab.bench.parts import Fault, Frame
-from tunnel_lab.bench.words import page_words
+from tunnel_lab.bench.parts import Fault, Frame, page_words, show_items
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document
 from tunnel_sim.files.importing.conditions import RIG_KEYS, RUN_KEYS, Conditions
@@ -24,29 +23,19 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 Cells = dict[str, dict[str, str]]
 """Texts by run and key; those of the rig under `RIG`."""
-
+Words = dict[tuple[str, str], str]
+"""A line for each cell, by row and key."""
 RIG = ""
 """The row of the rig's sizes: no run has an empty name."""
-
-UNITS = {
-    "wind_speed": "m/s",
-    "spring_stiffness": "N m/rad",
-    "air_density": "kg/m³",
-    "release_angle": "rad",
-    "yaw_inertia": "kg m²",
-    "frontal_area": "m²",
-    "reference_length": "m",
-    "width": "m",
-}
 WORDS = {
-    "wind_speed": "wind speed V",
-    "spring_stiffness": "stiffness Kr",
-    "air_density": "air density ρ",
-    "release_angle": "release angle",
-    "yaw_inertia": "nominal inertia Izz",
-    "frontal_area": "frontal area A",
-    "reference_length": "reference length l",
-    "width": "width",
+    "wind_speed": "wind speed V [m/s]",
+    "spring_stiffness": "stiffness Kr [N m/rad]",
+    "air_density": "air density ρ [kg/m³]",
+    "release_angle": "release angle [rad]",
+    "yaw_inertia": "nominal inertia Izz [kg m²]",
+    "frontal_area": "frontal area A [m²]",
+    "reference_length": "reference length l [m]",
+    "width": "width [m]",
 }
 MISSING = {
     "spring_stiffness": "needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
@@ -69,22 +58,14 @@ _SHORT = (
 
 
 def stated(session: Session) -> Cells:
-    """The conditions in ``campaign.toml``.
-
-    Raises:
-        TunnelError: when it cannot be read.
-    """
+    """The conditions in ``campaign.toml``."""
     document = _document(session)
     rows = {run["id"]: _texts(run, RUN_KEYS) for run in document["runs"]}
     return {RIG: _texts(document.get("rig", {}), RIG_KEYS), **rows}
 
 
 def typed(session: Session) -> Cells:
-    """The conditions as they were typed last, saved in the campaign or not.
-
-    Raises:
-        TunnelError: when they cannot be read.
-    """
+    """The conditions as they were typed last, saved in the campaign or not."""
     saved = stated(session)
     if not session.draft.is_file():
         return saved
@@ -95,15 +76,8 @@ def typed(session: Session) -> Cells:
     }
 
 
-def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str]:
-    """What is wrong, by row and key.
-
-    Args:
-        plausible: whether values that look like a wrong unit are wrong.
-
-    Returns:
-        One line for each cell, as a command would print it; empty where the campaign can be read.
-    """
+def faults(cells: Cells, *, plausible: bool) -> Words:
+    """What is wrong, as a command would print it; with ``plausible`` also values that look like a wrong unit."""
     faults_by_cell = {}
     for row, texts in cells.items():
         where = f"run '{row}'" if row else "the rig"
@@ -128,14 +102,7 @@ def faults(cells: Cells, *, plausible: bool = True) -> dict[tuple[str, str], str
 
 
 def number(text: str, where: str) -> float | None:
-    """The number that a cell holds; None where it is empty.
-
-    Args:
-        text: with a decimal point or comma.
-
-    Raises:
-        TunnelError: when it is not a number.
-    """
+    """The number that a cell holds, with a decimal point or comma; None where it is empty."""
     if not text.strip():
         return None
     try:
@@ -146,17 +113,14 @@ def number(text: str, where: str) -> float | None:
         ) from None
 
 
-def save(session: Session, cells: Cells) -> dict[tuple[str, str], str]:
-    """Save conditions in the campaign, or as a draft beside it while something is wrong.
-
-    Returns:
-        What is wrong (`faults`).
+def save(session: Session, cells: Cells) -> Words:
+    """Save conditions in the campaign, or as a draft beside it while something is wrong (`faults`).
 
     Raises:
         TunnelError: when the campaign would not be readable for another reason.
     """
     document = _document(session)
-    wrong = faults(cells, plausible=_is_judged(document))
+    wrong = faults(cells, plausible=is_judged(session))
     if wrong:
         write_json(session.draft, cells)
         return wrong
@@ -183,11 +147,7 @@ def judge(session: Session, plausible: bool) -> None:
 
 def is_judged(session: Session) -> bool:
     """Whether values that look like a wrong unit are refused."""
-    return _is_judged(_document(session))
-
-
-def _is_judged(document: Mapping[str, Any]) -> bool:
-    return document.get("sensor", {}).get("plausible") is not False
+    return _document(session).get("sensor", {}).get("plausible") is not False
 
 
 def _write(session: Session, document: dict[str, Any]) -> None:
@@ -198,18 +158,10 @@ def _write(session: Session, document: dict[str, Any]) -> None:
 
 
 def restore(session: Session, before: Cells) -> None:
-    """State again what was stated before a campaign was written anew, for the runs that it still has.
-
-    Args:
-        before: of `stated`.
-
-    Raises:
-        TunnelError: as `save`.
-    """
-    now = stated(session)
+    """State again what was stated before a campaign was written anew, for the runs that it still has."""
     kept = {
         row: {key: before.get(row, {}).get(key) or text for key, text in cells.items()}
-        for row, cells in now.items()
+        for row, cells in stated(session).items()
     }
     save(session, kept)
 
@@ -217,11 +169,7 @@ def restore(session: Session, before: Cells) -> None:
 def pasted(cells: Cells, columns: list[str], row: str, key: str, text: str) -> Cells:
     """Cells with a block from a spreadsheet put in, its upper left cell at a place.
 
-    Args:
-        columns: keys of the table's columns, in their order.
-        row: where the block begins.
-        key: likewise.
-        text: rows on lines, cells separated by tabs; what lies outside the table is left out.
+    The block has rows on lines and cells separated by tabs; what lies outside the table is left out.
     """
     rows = [name for name in cells if name != RIG]
     result = {name: dict(texts) for name, texts in cells.items()}
@@ -251,12 +199,7 @@ def _with(table: Mapping[str, Any], cells: Mapping[str, str], keys: tuple[str, .
     return others | {key: value for key, value in values.items() if value is not None}
 
 
-def build(session: Session, frame: Frame) -> None:
-    """Build the page."""
-    _Conditions(session, frame)
-
-
-class _Conditions:
+class ConditionsPage:
     """The page: every change is checked, and saved in the campaign or as a draft."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
@@ -267,13 +210,21 @@ class _Conditions:
             "Type, or paste a block from a spreadsheet into a cell. Valid values are saved at once in "
             f"{session.campaign / 'campaign.toml'}; nothing else of the campaign changes."
         ).classes("soft")
-        self._all_runs()
+        if len(self._runs) > 1:
+            with ui.element("div").classes("fields"):
+                keys = {key: WORDS[key] for key in RUN_KEYS}
+                self._key = ui.select(keys, label="Same for all runs", value="air_density").props("dense")
+                self._value = ui.input("Value").props("dense").on("change", self._fill)
         self._grid = self._table()
-        self._rig = self._sizes()
+        with ui.element("h2"):
+            ui.html("The rig", sanitize=False, tag="span")
+        self._rig: dict[str, ui.input] = {}
+        with ui.element("div").classes("fields"):
+            for key, text in self._cells[RIG].items():
+                field = ui.input(WORDS[key], value=text).props("dense bottom-slots")
+                self._rig[key] = field.on("change", partial(self._resize, key, field))
         ui.checkbox(
-            "Keep values that look like a wrong unit",
-            value=not is_judged(session),
-            on_change=self._judge,
+            "Keep values that look like a wrong unit", value=not is_judged(session), on_change=self._judge
         )
         self._fault = Fault()
         self._lines = ui.element("ul").classes("notes").props("role=status aria-live=polite")
@@ -289,7 +240,7 @@ class _Conditions:
             columns.append(
                 {
                     "field": key,
-                    "headerName": f"{WORDS[key]} [{UNITS[key]}]",
+                    "headerName": WORDS[key],
                     "editable": True,
                     "minWidth": 150,
                     "wrapHeaderText": True,
@@ -302,6 +253,7 @@ class _Conditions:
                     ":valueFormatter": _SHORT,
                 }
             )
+        short = len(self._runs) <= _MOST_ROWS
         grid = ui.aggrid(
             {
                 "columnDefs": columns,
@@ -312,13 +264,11 @@ class _Conditions:
                 "stopEditingWhenCellsLoseFocus": True,
                 "enterNavigatesVerticallyAfterEdit": True,
                 "enterNavigatesVertically": True,
-                "domLayout": "autoHeight" if len(self._runs) <= _MOST_ROWS else "normal",
+                "domLayout": "autoHeight" if short else "normal",
                 "tooltipShowDelay": 300,
             }
         )
-        grid.classes("grid" if len(self._runs) <= _MOST_ROWS else "grid tall").props(
-            'aria-label="Conditions of the runs"'
-        )
+        grid.classes("grid" if short else "grid tall").props('aria-label="Conditions of the runs"')
         grid.on("cellValueChanged", self._edited, ["data", "colId", "newValue"])
         grid.on("paste", self._pasted, js_handler=_PASTE)
         return grid
@@ -344,38 +294,16 @@ class _Conditions:
         if key in RUN_KEYS:
             texts_by_run = pasted(self._cells, list(RUN_KEYS), row, key, event.args["text"])
             changed = {
-                (run, column): text for run, texts in texts_by_run.items() for column, text in texts.items()
+                (run, column): text
+                for run, texts in texts_by_run.items()
+                for column, text in texts.items()
+                if self._cells[run][column] != text
             }
-            self._put(
-                {(run, column): t for (run, column), t in changed.items() if self._cells[run][column] != t}
-            )
+            self._put(changed)
 
-    def _all_runs(self) -> None:
+    def _fill(self) -> None:
         """Fill a column at once."""
-        if len(self._runs) < 2:
-            return
-        with ui.element("div").classes("fields"):
-            key = ui.select(
-                {key: f"{WORDS[key]} [{UNITS[key]}]" for key in RUN_KEYS},
-                label="Same for all runs",
-                value="air_density",
-            ).props("dense")
-            value = ui.input("Value").props("dense")
-
-            def fill() -> None:
-                self._put({(row, str(key.value)): str(value.value or "") for row in self._runs})
-
-            value.on("change", fill)
-
-    def _sizes(self) -> dict[str, ui.input]:
-        sizes = {}
-        with ui.element("h2"):
-            ui.html("The rig", sanitize=False, tag="span")
-        with ui.element("div").classes("fields"):
-            for key, text in self._cells[RIG].items():
-                field = ui.input(f"{WORDS[key]} [{UNITS[key]}]", value=text).props("dense bottom-slots")
-                sizes[key] = field.on("change", partial(self._resize, key, field))
-        return sizes
+        self._put({(row, str(self._key.value)): str(self._value.value or "") for row in self._runs})
 
     def _resize(self, key: str, field: ui.input) -> None:
         self._put({(RIG, key): str(field.value or "")})
@@ -386,53 +314,40 @@ class _Conditions:
             self._check()
 
     def _check(self) -> None:
-        """Save what is right, and mark what is not."""
-        wrong = save(self._session, self._cells)
-        missing = _missing(self._cells)
-        self._grid.options["rowData"] = [self._row(run, wrong, missing) for run in self._runs]
+        """Save what is right, and mark what is not: in the table, in the fields and in words."""
+        cells = self._cells
+        wrong = save(self._session, cells)
+        windy = any(cells[run]["wind_speed"].strip() not in ("", "0") for run in self._runs)
+        missing = {
+            (row, key): MISSING[key]
+            for row, texts in cells.items()
+            for key, text in texts.items()
+            if key in MISSING and not text.strip() and (row != RIG or windy)
+        }
+        why = missing | wrong
+        self._grid.options["rowData"] = [
+            {
+                "run": run,
+                **cells[run],
+                "wrong": [key for key in RUN_KEYS if (run, key) in wrong],
+                "missing": [key for key in RUN_KEYS if (run, key) in missing and (run, key) not in wrong],
+                **{f"{key}_why": why.get((run, key), "") for key in RUN_KEYS},
+            }
+            for run in self._runs
+        ]
         self._grid.update()
         for key, field in self._rig.items():
-            field.value = self._cells[RIG][key]
+            field.value = cells[RIG][key]
             field.error = wrong.get((RIG, key))
             field.props["hint"] = missing.get((RIG, key), "")
-        self._list(wrong, missing)
-        self._frame.refresh()
-        self._on.clear()
-        with self._on:
-            self._frame.way_on()
-
-    def _row(
-        self, run: str, wrong: dict[tuple[str, str], str], missing: dict[tuple[str, str], str]
-    ) -> dict[str, Any]:
-        why = wrong or {}
-        return {
-            "run": run,
-            **self._cells[run],
-            "wrong": [key for key in RUN_KEYS if (run, key) in wrong],
-            "missing": [key for key in RUN_KEYS if (run, key) in missing and (run, key) not in wrong],
-            **{f"{key}_why": why.get((run, key)) or missing.get((run, key), "") for key in RUN_KEYS},
-        }
-
-    def _list(self, wrong: dict[tuple[str, str], str], missing: dict[tuple[str, str], str]) -> None:
-        """Say in words what the marks say."""
+        unstated = [(WORDS[key].partition(" [")[0], said) for (_, key), said in missing.items()]
+        notes = dict.fromkeys(f"{words} is not stated: {said}" for words, said in unstated)
+        lines = [(page_words(line), "fault") for line in wrong.values()] + [(line, "") for line in notes]
         self._lines.clear()
-        kinds = {f"{WORDS[key]} is not stated: {why}": None for (_, key), why in missing.items()}
-        lines = [(page_words(line), "fault") for line in wrong.values()] + [(line, "") for line in kinds]
         with self._lines:
             for line, style in lines[:_MOST_LINES]:
                 with ui.element("li"):
                     ui.label(line).classes(style)
             if len(lines) > _MOST_LINES:
-                with ui.element("li"):
-                    ui.label(f"and {len(lines) - _MOST_LINES} more")
-
-
-def _missing(cells: Cells) -> dict[tuple[str, str], str]:
-    """What could be stated, by row and key; the rig's sizes only where the wind is on."""
-    windy = any(texts["wind_speed"].strip() not in ("", "0") for row, texts in cells.items() if row != RIG)
-    return {
-        (row, key): MISSING[key]
-        for row, texts in cells.items()
-        for key, text in texts.items()
-        if key in MISSING and not text.strip() and (row != RIG or windy)
-    }
+                show_items([f"and {len(lines) - _MOST_LINES} more"])
+        self._frame.refresh(self._on)

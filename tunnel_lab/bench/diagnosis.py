@@ -1,4 +1,4 @@
-"""The stages of the diagnosis: Diagnose and Next run, with causes switched on and off by hand."""
+"""The stages of the diagnosis: Diagnose, with causes switched on and off by hand, Next run, and Report."""
 
 from __future__ import annotations
 
@@ -10,13 +10,26 @@ from datetime import datetime
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
+import tomli_w
 from nicegui import ui
 
 from diagnosis.decision import plain
 from tunnel_lab.bench import work
-from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
+from tunnel_lab.bench.parts import (
+    Fault,
+    Frame,
+    address,
+    button,
+    heading,
+    show_command,
+    show_facts,
+    show_items,
+    show_parts,
+)
 from tunnel_lab.bench.workspace import Session, is_current, read_result
 from tunnel_lab.terminal.outputs import STEPS
+from tunnel_sim.files.reading import read_json
+from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
@@ -36,12 +49,7 @@ _CONVERGE = "Free the forms, and fit to convergence (up to a minute)"
 _NO_SPRING = "no run can be planned without a stated spring"
 
 
-def build_diagnose(session: Session, frame: Frame) -> None:
-    """Build the page."""
-    _Diagnose(session, frame)
-
-
-class _Diagnose:
+class DiagnosePage:
     """The page: it follows the log of the command, whoever has started it."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
@@ -50,7 +58,8 @@ class _Diagnose:
         self._shown: object = None
         self._tried = ""
         self._before = ""
-        show_command(" ".join(("tunnel", *_words(session))))
+        self._command = ["diagnose", str(session.campaign), "--json", str(session.diagnosis)]
+        show_command(" ".join(("tunnel", *self._command)))
         self._fault = Fault()
         self._buttons = ui.element("p").classes("buttons")
         self._clock = ui.label().classes("soft")
@@ -65,87 +74,70 @@ class _Diagnose:
         result = self._session.diagnosis
         written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
         stages, self._tried = stages_of(state.lines)
-        if not state.running and (seconds := work.seconds_taken(self._log)) is not None:
-            self._before = f"; the last diagnosis took {seconds:.0f} s"
+        if not state.running and (took := work.seconds_taken(self._log)) is not None:
+            self._before = f"; the last diagnosis took {took:.0f} s"
         now = (replace(state, lines=()), stages, written)
+        self._show_clock(state)
         if now == self._shown:
-            self._show_clock(state)
             return
         self._shown = now
-        self._show_buttons(state)
-        self._show_clock(state)
-        self._show_progress(state, stages)
-        if state.error:
-            self._fault.show(f"{state.error}{_AFTER_STOP if state.status == STOPPED else ''}")
-        self._show_result(state)
-
-    def _show_buttons(self, state: work.Work) -> None:
         self._buttons.clear()
         with self._buttons:
             if not state.running:
-                button(
-                    "Diagnose again" if self._session.diagnosis.is_file() else "Diagnose",
-                    self._start,
-                    main=True,
-                )
-                return
-            if state.paused:
+                words = "Diagnose again" if result.is_file() else "Diagnose"
+                button(words, self._start, main=True)
+            elif state.paused:
                 button("Go on", lambda: work.go_on(self._log), main=True)
             else:
                 button("Pause", lambda: work.pause(self._log))
-            button("Stop", self._stop)
-
-    def _show_clock(self, state: work.Work) -> None:
-        tried = f", now with {self._tried}" if self._tried else ""
-        since = (
-            f"{_elapsed(state):.0f} s so far{self._before}{tried}. "
-            "It runs in a process of its own: this page may be closed."
-        )
-        words = "Paused; it goes on where it was." if state.paused else since
-        self._clock.set_text(f"{words} {_STOP}" if state.running else "")
-
-    async def _start(self) -> None:
-        with self._fault.around():
-            await asyncio.to_thread(work.start, _words(self._session), self._log)
-
-    async def _stop(self) -> None:
-        await asyncio.to_thread(work.stop, self._log)
-
-    def _show_progress(self, state: work.Work, stages: tuple[tuple[str, str], ...]) -> None:
+            if state.running:
+                button("Stop", self._stop)
         self._progress.clear()
-        if not state.running:
-            return
         with self._progress:
-            for place, (seconds, words) in enumerate(stages):
-                last = place == len(stages) - 1
+            for place, (seconds, words) in enumerate(stages if state.running else (), 1):
+                last = place == len(stages)
                 with ui.element("li").classes("now" if last else "done"):
                     ui.label(f"{words} … since {seconds} s" if last else f"{words}, from {seconds} s on")
-
-    def _show_result(self, state: work.Work) -> None:
+        if state.error:
+            self._fault.show(f"{state.error}{_AFTER_STOP if state.status == STOPPED else ''}")
         self._result.clear()
         self._on.clear()
         if state.running:
             return
         with self._result:
-            document = read_result(self._session.diagnosis)
-            if document is not None and is_current(self._session, self._session.diagnosis):
-                _Answer(self._session, document)
+            document = read_result(result)
+            if document is not None and is_current(self._session, result):
+                Answer(self._session, document)
             elif document is not None:
-                ui.label("The campaign has changed since it was diagnosed; diagnose it again.").classes(
-                    "fault"
-                )
-        self._frame.refresh()
-        with self._on:
-            self._frame.way_on()
+                words = "The campaign has changed since it was diagnosed; diagnose it again."
+                ui.label(words).classes("fault")
+        self._frame.refresh(self._on)
+
+    def _show_clock(self, state: work.Work) -> None:
+        if not state.running:
+            self._clock.set_text("")
+            return
+        words = "Paused; it goes on where it was."
+        if not state.paused:
+            begun = datetime.fromisoformat(state.started)
+            elapsed = (datetime.now().astimezone() - begun).total_seconds()
+            tried = f", now with {self._tried}" if self._tried else ""
+            words = (
+                f"{elapsed:.0f} s so far{self._before}{tried}. "
+                "It runs in a process of its own: this page may be closed."
+            )
+        self._clock.set_text(f"{words} {_STOP}")
+
+    async def _start(self) -> None:
+        with self._fault.around():
+            await asyncio.to_thread(work.start, self._command, self._log)
+
+    async def _stop(self) -> None:
+        await asyncio.to_thread(work.stop, self._log)
 
 
 def stages_of(lines: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], str]:
-    """How far a diagnosis has come, by what it has printed.
-
-    Returns:
-        The stages begun, each with the time of its begin (s, as printed) and its name; and the set of effects that
-        the last one tries, in words, empty where there is none.
-    """
+    """The stages begun, by what was printed: time (s) and name of each; and the set of effects tried, in words."""
     stages: list[tuple[str, str]] = []
     tried = ""
     for line in lines:
@@ -159,93 +151,69 @@ def stages_of(lines: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], str]:
     return tuple(stages), tried
 
 
-def _elapsed(state: work.Work) -> float:
-    """Time since a command was started, s."""
-    if not state.started:
-        return 0.0
-    return (datetime.now().astimezone() - datetime.fromisoformat(state.started)).total_seconds()
-
-
-def _words(session: Session) -> list[str]:
-    return ["diagnose", str(session.campaign), "--json", str(session.diagnosis)]
-
-
-class _Answer:
+class Answer:
     """The answer: in words, in figures, and by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
+        from diagnosis import printing
+        from diagnosis.closure import closable_table, closable_words
         from tunnel_lab.report import view
 
         answer, kind = view.headline(document)
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
             ui.label(answer).classes("answer")
             ui.label(document["verdict"])
-            with ui.element("div").classes("facts"):
-                for fact in view.facts(document):
-                    with ui.element("div"):
-                        ui.label(fact.value).classes("value")
-                        ui.label(fact.label).classes("soft")
-                        ui.label(fact.note).classes("soft")
+            show_facts((fact.value, fact.label, fact.note) for fact in view.facts(document))
         if (document.get("maps") or {}).get("traces"):
-            ui.html("The fit over the data", sanitize=False, tag="h2")
+            heading("The fit over the data")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
             ui.element("iframe").classes("fit-frame").props(
                 f'src="{source}" title="The fit over the data" loading=lazy'
             )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(document), once=True)
-        self._words(document)
-        if document["gap"]["detected"]:
-            ByHandPart(session, document)
-
-    async def _draw(self, document: dict[str, Any]) -> None:
-        drawings = await asyncio.to_thread(figures, document)
-        if self._figures.is_deleted:
-            return
-        with self._figures:
-            for drawing in drawings:
-                ui.html(drawing, sanitize=False, tag="figure")  # drawn here, its texts escaped
-
-    def _words(self, document: dict[str, Any]) -> None:
-        from diagnosis import printing
-        from diagnosis.closure import closable_table, closable_words
-
         show_parts([printing.where_line(document), *printing.rival_lines(document)])
         show_parts([printing.candidates_table(document), printing.parameters_table(document)])
         show_parts([printing.waterfall_table(document), printing.coefficients_table(document)])
         with ui.expansion("What remains, the runs, and caveats"):
             show_parts([document["rest"]["words"], closable_words(document), closable_table(document)])
             show_parts([printing.gap_table(document), *printing.closing_lines(document)])
+        if document["gap"]["detected"]:
+            ByHandPart(session, document)
 
+    async def _draw(self, document: dict[str, Any]) -> None:
+        """The figures of the report's summary."""
 
-def figures(document: dict[str, Any]) -> list[str]:
-    """The report's figures of the summary, as elements of a page."""
-    from tunnel_lab.report.drawing import inline_svg
-    from tunnel_lab.report.page import DESCRIPTIONS
-    from tunnel_lab.report.waterfall import waterfall_figure
-    from tunnel_lab.report.where import runs_figure
+        def drawings() -> list[str]:
+            from tunnel_lab.report.drawing import inline_svg
+            from tunnel_lab.report.figures import waterfall_figure
+            from tunnel_lab.report.page import DESCRIPTIONS
+            from tunnel_lab.report.where import runs_figure
 
-    drawn = {"waterfall": waterfall_figure(document)}
-    if document.get("maps"):
-        drawn["where-runs"] = runs_figure(document)
-    return [
-        inline_svg(figure, name, DESCRIPTIONS[name]) for name, figure in drawn.items() if figure is not None
-    ]
+            drawn = {"waterfall": waterfall_figure(document)}
+            if document.get("maps"):
+                drawn["where-runs"] = runs_figure(document)
+            return [
+                inline_svg(fig, name, DESCRIPTIONS[name]) for name, fig in drawn.items() if fig is not None
+            ]
+
+        figures = await asyncio.to_thread(drawings)
+        if self._figures.is_deleted:
+            return
+        with self._figures:
+            for figure in figures:
+                ui.html(figure, sanitize=False, tag="figure")  # drawn here, its texts escaped
 
 
 class ByHandPart:
-    """Switches for the causes, and the closure with those that are on.
-
-    Args:
-        document: of its diagnosis; its causes are on at first.
-    """
+    """Switches for the causes, of which those of the diagnosis are on at first, and the closure with them."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
         from tunnel_sim.effects import known_effects
 
         self._session, self._document = session, document
         self._waiting = self._converged = False
-        ui.html("By hand", sanitize=False, tag="h2")
+        heading("By hand")
         ui.label(_ABOUT).classes("soft")
         listed = [name for candidate in document["candidates"] for name in candidate["effect"].split(" + ")]
         known = [kind for kind in known_effects() if kind.fitted]
@@ -271,20 +239,26 @@ class ByHandPart:
         self._converged = True
         await self._fit_chosen()
 
-    def _chosen(self) -> tuple[list[str], bool]:
-        return [name for name, box in self._boxes.items() if box.value], self._converged
-
     async def _fit_chosen(self) -> None:
         """Fit what is chosen; changes made meanwhile are fitted together afterwards."""
         if self._waiting:
             return
         self._waiting, shown = True, None
         self._place.classes(add="waiting")
-        while shown != (now := self._chosen()):
-            shown = now
-            closure = await self._closure(*now)
+        while True:
+            effects = [name for name, box in self._boxes.items() if box.value]
+            if shown == (effects, self._converged):
+                break
+            shown = (effects, self._converged)
+            campaign, state = self._session.campaign, self._session.state()
+            closure, fault = None, ""
+            try:
+                closure = await work.closure(campaign, state, effects, converged=self._converged)
+            except TunnelError as error:
+                fault = str(error)
             if self._place.is_deleted:  # the page was left
                 return
+            self._fault.show(fault)
             self._place.clear()
             with self._place:
                 if closure is not None:
@@ -292,55 +266,36 @@ class ByHandPart:
         self._waiting = False
         self._place.classes(remove="waiting")
 
-    async def _closure(self, effects: list[str], converged: bool) -> Closure | None:
-        try:
-            closure = await work.closure(
-                self._session.campaign, self._session.state(), effects, converged=converged
-            )
-        except TunnelError as error:
-            self._fault.show(error)
-            return None
-        self._fault.clear()
-        return closure
-
 
 def show_closure(closure: Closure, document: dict[str, Any]) -> None:
-    """The closure with causes chosen by hand.
-
-    Args:
-        document: of the diagnosis, whose units it is shown in.
-    """
+    """The closure with causes chosen by hand, in the units of the diagnosis' document."""
     from tunnel_lab.report.view import estimate, misfit_shown, percent
 
-    with ui.element("div").classes("facts"):
-        for value, label in (
+    show_facts(
+        [
             (percent(closure.closed), f"share closed, {closure.held_out}"),
             (misfit_shown(document, closure.after), "left of the misfit, root mean square"),
             (misfit_shown(document, closure.before), "with the nominal model"),
-        ):
-            with ui.element("div"):
-                ui.label(value).classes("value")
-                ui.label(label).classes("soft")
+        ]
+    )
     ui.linear_progress(closure.closed, show_value=False).props('aria-label="share of the gap closed"')
     with ui.element("ul").classes("notes"):
-        for name, given in closure.parameters.items():
-            with ui.element("li"):
-                words = name.replace("_", " ").replace(".", ": ")
-                ui.label(f"{words} = {estimate(given.to_json_dict())}")
+        show_items(
+            f"{name.replace('_', ' ').replace('.', ': ')} = {estimate(given.to_json_dict())}"
+            for name, given in closure.parameters.items()
+        )
 
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
     from diagnosis.printing import rival_lines
-    from tunnel_lab.report.advice import next_steps, run_to_make, unplannable
+    from tunnel_lab.report.view import next_steps, run_to_make, unplannable
 
     document = read_result(session.diagnosis)
     assert document is not None  # else the stage is closed
-    ui.html("What to do next", sanitize=False, tag="h2")
+    heading("What to do next")
     with ui.element("ol"):
-        for step in next_steps(document):
-            with ui.element("li"):
-                ui.label(step)
+        show_items(next_steps(document))
     lines, run = rival_lines(document), run_to_make(document)
     if run is None and document["next_run"] is not None:
         lines[-1] = _too_close(document["next_run"])
@@ -374,7 +329,7 @@ class _Rivals:
             for candidate in document["candidates"]
         ]
         answers = [answer for answer in answers if answer] or [[next(iter(fitted))]]
-        ui.html("Which run would distinguish two answers?", sanitize=False, tag="h2")
+        heading("Which run would distinguish two answers?")
         with ui.element("div").classes("fields"):
             self._first, self._second = (
                 ui.select(fitted, label=label, value=answer, multiple=True).props("dense use-chips")
@@ -389,7 +344,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from tunnel_lab.report.advice import LEAST_SEPARATION
+        from tunnel_lab.report.view import LEAST_SEPARATION
 
         self._place.clear()
         with self._fault.around():
@@ -423,31 +378,79 @@ def _too_close(run: Mapping[str, float]) -> str:
 
 
 def show_run(run: Mapping[str, float]) -> None:
-    """A run to make.
-
-    Args:
-        run: spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and separation.
-    """
+    """A run to make: its conditions (SI units), duration and separation."""
     wind = "off" if run["wind_speed"] == 0.0 else f"{run['wind_speed']:g} m/s"
-    with ui.element("div").classes("facts"):
-        for value, label in (
+    show_facts(
+        [
             (f"{run['spring_stiffness']:.4g} N m/rad", "spring"),
             (wind, "wind"),
             (f"{run['release_angle']:.2g} rad ({degrees(run['release_angle']):.0f}°)", "release"),
             (f"{run['duration']:.3g} s", "length of the record"),
             (f"{run['separation']:.0f} standard deviations", "expected difference, in the noise's"),
-        ):
-            with ui.element("div"):
-                ui.label(value).classes("value")
-                ui.label(label).classes("soft")
+        ]
+    )
+
+    def download() -> None:
+        """The table that ``campaign.toml`` takes once the record is there."""
+        stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
+        head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
+        table = head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
+        ui.download(table.encode(), "next-run.toml")
+
     with ui.element("p").classes("buttons"):
-        button("Download the plan", lambda: ui.download(run_table(run).encode(), "next-run.toml"))
+        button("Download the plan", download)
 
 
-def run_table(run: Mapping[str, float]) -> str:
-    """A run to make, as the table that ``campaign.toml`` takes once its record is there."""
-    import tomli_w
+class ReportPage:
+    """The page: the report is written anew when author or notes change."""
 
-    stated = {name: run[name] for name in ("wind_speed", "spring_stiffness", "release_angle")}
-    head = f"# Record {run['duration']:g} s from the release; state air_density where the wind is on.\n"
-    return head + tomli_w.dumps({"runs": [{"id": "next", "file": "runs/next.csv", **stated}]})
+    def __init__(self, session: Session, _: Frame) -> None:
+        self._session = session
+        stated = {"author": "", "notes": ""}
+        if session.byline.is_file():
+            stated |= read_json(session.byline, remedy="delete it")
+        with ui.element("div").classes("fields wide"):
+            self._author = ui.input("Author", value=str(stated["author"])).props("dense")
+            self._notes = ui.textarea(
+                "Notes, shown at the head of the report", value=str(stated["notes"])
+            ).props("dense autogrow")
+        self._author.on("change", self._write)
+        self._notes.on("change", self._write)
+        self._fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Download the report", self._download, main=True)
+            ui.link("Open in a tab", address(session, "report.html"), new_tab=True).classes("button")
+        ui.label(f"Written: {session.report}").classes("soft")
+        show_command(
+            f"tunnel diagnose {session.campaign} --report {session.report} --author NAME --notes TEXT"
+        )
+        self._place = ui.element("div").classes("preview")
+        ui.timer(0.0, self._write, once=True)
+
+    async def _write(self) -> None:
+        author, notes = str(self._author.value or ""), str(self._notes.value or "")
+        with self._fault.around():
+            write_json(self._session.byline, {"author": author, "notes": notes})
+            await asyncio.to_thread(write_session_report, self._session, author, notes)
+            if self._place.is_deleted:  # the page was left
+                return
+            self._place.clear()
+            source = f"{address(self._session, 'report.html')}?{time.time_ns()}"
+            with self._place:
+                ui.element("iframe").props(f'src="{source}" title="Preview of the report"')
+
+    async def _download(self) -> None:
+        ui.download(self._session.report, f"{self._session.name}-report.html")
+
+
+def write_session_report(session: Session, author: str, notes: str) -> None:
+    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does."""
+    from diagnosis.diagnosable import diagnosable
+    from tunnel_lab.report import Byline, write_report
+    from tunnel_sim.files.campaign_folder import read_campaign
+
+    document = read_result(session.diagnosis)
+    assert document is not None  # else the stage is closed
+    made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
+    campaign = diagnosable(read_campaign(session.campaign)).campaign
+    write_report(document, campaign, session.report, Byline(made, author, notes))

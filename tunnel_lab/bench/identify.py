@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,8 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES
-from identification.printing import SYMBOLS, TextTable, unit, with_std
+from identification.printing import SYMBOLS, TextTable, status_lines, unit, with_std
+from identification.status import Remark
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
@@ -38,12 +38,7 @@ Document = Mapping[str, Any]
 _MOST_RUNS = 50
 
 
-def build(session: Session, frame: Frame) -> None:
-    """Build the page."""
-    _Identify(session, frame)
-
-
-class _Identify:
+class IdentifyPage:
     """The page: it looks at the files until every command has ended."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
@@ -58,7 +53,7 @@ class _Identify:
             }
         self._fault = Fault()
         with ui.element("p").classes("buttons"):
-            button("Identify", self._start, main=True)
+            button("Identify", self._identify, main=True)
         show_command(
             f"tunnel identify {session.campaign} --estimator {ESTIMATOR} --json {session.estimate(ESTIMATOR)}"
         )
@@ -66,21 +61,43 @@ class _Identify:
         self._result = ui.element("div")
         self._on = ui.element("p").classes("buttons")
         with ui.expansion("Uncertainty budget"):
-            self._budget()
+            words = "Standard uncertainties of what is stated, in per cent; an empty field is exact."
+            ui.label(words).classes("soft")
+            self._stated: dict[str, float] = {}
+            if session.uncertainties.is_file():
+                common = load_toml(session.uncertainties, missing="").get("common", {})
+                self._stated = {key: 100.0 * float(value) for key, value in common.items()}
+            with ui.element("div").classes("fields"):
+                self._percents = {
+                    key: ui.number(f"{name} [%]", value=self._stated.get(key), min=0.0)
+                    for key, name in _INPUTS.items()
+                }
+                for field in self._percents.values():
+                    field.props("dense step=any")
+            self._budget_fault = Fault()
+            with ui.element("p").classes("buttons"):
+                button("Make the budget", self._make_budget)
         self._look()
         ui.timer(_POLL_S, self._look)
 
-    def _start(self) -> None:
+    def _identify(self) -> None:
         names = [name for name, box in self._chosen.items() if box.value]
         with self._fault.around():
             if ESTIMATOR not in names:
-                raise TunnelError(
-                    f"{ESTIMATOR} is not chosen", remedy="choose it: its estimate opens the diagnosis"
-                )
-            orders = [
-                (name, ("--estimator", name, "--json", str(self._session.estimate(name)))) for name in names
-            ]
-            self._run(orders)
+                remedy = "choose it: its estimate opens the diagnosis"
+                raise TunnelError(f"{ESTIMATOR} is not chosen", remedy=remedy)
+            results = {name: str(self._session.estimate(name)) for name in names}
+            self._run([(name, ("--estimator", name, "--json", file)) for name, file in results.items()])
+
+    def _make_budget(self) -> None:
+        with self._budget_fault.around():
+            percents = self._stated | {key: field.value for key, field in self._percents.items()}
+            kept = {key: value / 100.0 for key, value in percents.items() if value}
+            document = {"schema_version": 1, "common": kept}
+            write_whole(self._session.uncertainties, tomli_w.dumps(document).encode())
+            models = [word for name in _FIRST if name != ESTIMATOR for word in ("--model", name)]
+            words = ("--uncertainties", str(self._session.uncertainties), "--json")
+            self._run([(_BUDGET, (*words, str(self._session.estimate(_BUDGET)), *models))])
 
     def _run(self, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
         for name, _ in orders:
@@ -88,87 +105,36 @@ class _Identify:
                 raise TunnelError(f"{name} is running already", remedy="wait for it")
         background_tasks.create(run_commands(self._session, orders), name="identify")
 
-    def _budget(self) -> None:
-        ui.label("Standard uncertainties of what is stated, in per cent; an empty field is exact.").classes(
-            "soft"
-        )
-        self._stated = _stated(self._session)
-        with ui.element("div").classes("fields"):
-            for key, words in _INPUTS.items():
-                field = ui.number(f"{words} [%]", value=self._stated.get(key), min=0.0).props(
-                    "dense step=any"
-                )
-
-                field.on("change", partial(self._state, key, field))
-        fault = Fault()
-
-        def start() -> None:
-            with fault.around():
-                kept = {key: value / 100.0 for key, value in self._stated.items() if value}
-                document = {"schema_version": 1, "common": kept}
-                write_whole(self._session.uncertainties, tomli_w.dumps(document).encode())
-                words = ("--uncertainties", str(self._session.uncertainties), "--json")
-                others = [name for name in _FIRST if name != ESTIMATOR]
-                models = [word for name in others for word in ("--model", name)]
-                result = str(self._session.estimate(_BUDGET))
-                self._run([(_BUDGET, (*words, result, *models))])
-
-        with ui.element("p").classes("buttons"):
-            button("Make the budget", start)
-
-    def _state(self, key: str, field: ui.number) -> None:
-        self._stated[key] = field.value
-
     def _look(self) -> None:
-        works = {name: work.work_of(self._session.log(name)) for name in (*ALL_ESTIMATORS, _BUDGET)}
-        estimates = [self._session.estimate(name) for name in (*ALL_ESTIMATORS, _BUDGET)]
+        session, names = self._session, (*ALL_ESTIMATORS, _BUDGET)
+        works = {name: work.work_of(session.log(name)) for name in names}
+        estimates = [session.estimate(name) for name in names]
         state = (works, [path.stat().st_mtime_ns for path in estimates if path.is_file()])
         if state == self._shown:
             return
         self._shown = state
         self._progress.clear()
         with self._progress:
-            for name, progress in works.items():
-                _progress(name, progress)
-        with self._fault.around():
-            self._show()
-        self._frame.refresh()
-        self._on.clear()
-        with self._on:
-            self._frame.way_on()
-
-    def _show(self) -> None:
+            for name, one in works.items():
+                if one.running or one.error:
+                    said, style = ("running …", "") if one.running else (one.error, "fault")
+                    with ui.element("li"):
+                        ui.label(f"{name}: {said}").classes(style)
         self._result.clear()
-        paths = [self._session.estimate(name) for name in ALL_ESTIMATORS]
-        documents = [read_result(path) for path in paths if is_current(self._session, path)]
-        shown = [document for document in documents if document is not None]
-        with self._result:
+        with self._fault.around(), self._result:
+            *results, budget_file = estimates
+            documents = [read_result(path) for path in results if is_current(session, path)]
+            shown = [document for document in documents if document is not None]
             if shown:
                 show_parts(side_by_side(shown))
-            budget = read_result(self._session.estimate(_BUDGET))
-            if (
-                budget is not None
-                and "budget" in budget
-                and is_current(self._session, self._session.estimate(_BUDGET))
-            ):
+            budget = read_result(budget_file) if is_current(session, budget_file) else None
+            if budget is not None and "budget" in budget:
                 show_parts([budget_table(budget["budget"]), *budget_lines(budget["budget"])])
-
-
-def _progress(name: str, state: work.Work) -> None:
-    if not state.running and not state.error:
-        return
-    with ui.element("li"):
-        ui.label(f"{name}: {'running …' if state.running else state.error}").classes(
-            "" if state.running else "fault"
-        )
+        self._frame.refresh(self._on)
 
 
 async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, ...]]]) -> None:
-    """Run ``tunnel identify`` several times, as many at a time as there are processors.
-
-    Args:
-        orders: name of the log and options of each.
-    """
+    """Run ``tunnel identify`` several times, each with the name of its log and options, one per processor."""
     free = asyncio.Semaphore(os.cpu_count() or 1)
 
     async def one(name: str, options: tuple[str, ...]) -> None:
@@ -181,23 +147,8 @@ async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, 
     await asyncio.gather(*(one(*order) for order in orders))
 
 
-def _stated(session: Session) -> dict[str, float | None]:
-    """The uncertainties stated before, in per cent."""
-    if not session.uncertainties.is_file():
-        return {}
-    common = load_toml(session.uncertainties, missing="").get("common", {})
-    return {key: 100.0 * float(value) for key, value in common.items()}
-
-
 def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
-    """Estimates of one campaign by several estimators.
-
-    Args:
-        documents: one for each estimator.
-
-    Returns:
-        The coefficients, ωn and ζ of the runs, and what the estimators say.
-    """
+    """Estimates of one campaign: the coefficients, ωn and ζ of the runs, and what the estimators say."""
     names = tuple(str(document["estimator"]) for document in documents)
     given = [name for name in UNITS if any(document[name] for document in documents)]
     rows = tuple(
@@ -206,7 +157,8 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
     )
     notes: dict[str, list[str]] = {}
     for document in documents:
-        for line in _notes(document):
+        remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
+        for line in [*remarks, *status_lines(document)]:
             notes.setdefault(line, []).append(document["estimator"])
     return [
         TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),
@@ -225,11 +177,3 @@ def _runs(title: str, key: str, documents: Sequence[Document], names: tuple[str,
 
 def _cell(quantity: Document | None) -> str:
     return "–" if quantity is None else with_std(quantity["value"], quantity["std"])
-
-
-def _notes(document: Document) -> list[str]:
-    from identification.printing import status_lines
-    from identification.status import Remark
-
-    notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-    return [*notes, *status_lines(document)]

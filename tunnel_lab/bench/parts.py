@@ -1,29 +1,43 @@
-"""Parts that several pages share: the frame with the stages, errors, tables, links, charts and the drop zone."""
+"""Parts that several pages share: the frame with the stages, errors, tables, links, charts and the drop zone.
+
+What a command says is shown in the words of the page: fields instead of options.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from nicegui import events, ui
 
 from identification.printing import TextTable, as_html
-from tunnel_lab.bench.words import page_words
-from tunnel_lab.bench.workspace import (
-    STAGES,
-    Session,
-    closed,
-    safe_name,
-)
+from tunnel_lab.bench.workspace import STAGES, Session, closed, safe_name
+from tunnel_sim.files.writing import output_folder, write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
+FIELDS = {
+    "angle": "Column of the angle",
+    "unit": "Unit of the angle",
+    "time": "Column of the times",
+    "time-unit": "Unit of the times",
+    "rate": "Sample rate",
+    "counts-per-turn": "Counts of an encoder per turn",
+    "calibration": "Angle of a voltage",
+    "start": "Leave out samples before",
+    "end": "Leave out samples after",
+    "rest": "Reading at rest",
+    "name": "Conditions in the file names",
+    "delimiter": "Delimiter of a text file",
+    "decimal": "Decimal sign of a text file",
+    "no-cut": "Cut records at releases",
+}
+"""The label of the field, without its example and unit, by the option that states the same."""
+_OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"[^\"]*\"))?")
 
 _THEME = "bench-theme"
 _HEAD = """
@@ -33,19 +47,19 @@ _HEAD = """
 """
 
 
+def page_words(text: str) -> str:
+    """A line of a command with the names of fields in place of options, and without the command's name."""
+    plain = text.removeprefix("tunnel: ").replace("with --no-cut", "by switching off --no-cut")
+    return _OPTION.sub(lambda found: f"“{FIELDS[found[1]]}”" if found[1] in FIELDS else found[0], plain)
+
+
 def address(session: Session, stage: str) -> str:
     """Path of a stage's page."""
     return f"/{quote(session.name)}/{stage}"
 
 
 class Frame:
-    """The head of a page: where one is, and which stages are open.
-
-    Args:
-        title: of the page.
-        session: whose pages they are; None for pages beside the stages.
-        stage: the present one.
-    """
+    """The head of a page: where one is, and which stages of the session are open; without one, neither."""
 
     def __init__(self, title: str, session: Session | None = None, stage: str = "") -> None:
         self._session, self._stage = session, stage
@@ -59,7 +73,7 @@ class Frame:
                 ui.label(session.name).classes("name")
             ui.element("span").classes("space")
             ui.link("Try it", "/try")
-            _theme_button()
+            self._theme_button()
         if session is not None:
             self.steps = ui.element("nav").props('aria-label="Stages"').classes("steps")
             self.refresh()
@@ -67,63 +81,65 @@ class Frame:
         with self.main, ui.element("h1"):
             ui.html(title, sanitize=False, tag="span")
 
-    def refresh(self) -> None:
-        """Show the stages as the files allow them now, and the way on."""
+    def _theme_button(self) -> None:
+        """Automatic, light, dark: kept in a cookie, so that it is the same on every page."""
+        names: dict[str, bool | None] = {"automatic": None, "light": False, "dark": True}
+        now = str(ui.context.client.request.cookies.get(_THEME, "automatic"))
+        dark = ui.dark_mode(names.get(now))
+        button = ui.element("button").props("type=button")
+
+        def show(name: str) -> None:
+            button.clear()
+            with button:
+                ui.html(f"Theme: {name}", sanitize=False, tag="span")
+
+        def turn() -> None:
+            nonlocal now
+            order = list(names)
+            now = order[(order.index(now) + 1) % len(order)] if now in order else order[0]
+            dark.value = names[now]
+            ui.run_javascript(
+                f'document.cookie = "{_THEME}={now}; path=/; SameSite=Strict; max-age=31536000"'
+            )
+            show(now)
+
+        show(now if now in names else "automatic")
+        button.on("click", turn)
+
+    def refresh(self, on: ui.element | None = None) -> None:
+        """Show the stages as the files allow them now, and the way on in its place."""
         assert self._session is not None
         self.steps.clear()
         with self.steps, ui.element("ol"):
             for number, stage in enumerate(STAGES, 1):
-                text = f"{number} {stage.title}"
-                why = _closed(self._session, stage.key)
+                text, path = f"{number} {stage.title}", address(self._session, stage.key)
                 with ui.element("li"):
                     if stage.key == self._stage:
-                        ui.link(text, address(self._session, stage.key)).props("aria-current=step")
-                    elif why:
+                        ui.link(text, path).props("aria-current=step")
+                    elif why := self._why_closed(stage.key):
                         ui.html(text, sanitize=False, tag="span").props("aria-disabled=true").tooltip(why)
                     else:
-                        ui.link(text, address(self._session, stage.key))
+                        ui.link(text, path)
+        if on is not None:
+            on.clear()
+            with on:
+                self.way_on()
 
     def way_on(self) -> None:
         """A link to the next stage, where it is open."""
         assert self._session is not None
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
-        if after < len(keys) and not _closed(self._session, keys[after]):
-            ui.link(f"Continue: {STAGES[after].title}", address(self._session, keys[after])).classes(
-                "button go"
-            )
+        if after < len(keys) and not self._why_closed(keys[after]):
+            path = address(self._session, keys[after])
+            ui.link(f"Continue: {STAGES[after].title}", path).classes("button go")
 
-
-def _closed(session: Session, key: str) -> str:
-    try:
-        return closed(session, key)
-    except TunnelError as error:
-        return str(error)
-
-
-def _theme_button() -> None:
-    """Automatic, light, dark: kept in a cookie, so that it is the same on every page."""
-    names: dict[str, bool | None] = {"automatic": None, "light": False, "dark": True}
-    request = ui.context.client.request
-    now = str(request.cookies.get(_THEME, "automatic"))
-    dark = ui.dark_mode(names.get(now))
-    button = ui.element("button").props("type=button")
-
-    def show(name: str) -> None:
-        button.clear()
-        with button:
-            ui.html(f"Theme: {name}", sanitize=False, tag="span")
-
-    def turn() -> None:
-        nonlocal now
-        order = list(names)
-        now = order[(order.index(now) + 1) % len(order)] if now in order else order[0]
-        dark.value = names[now]
-        ui.run_javascript(f'document.cookie = "{_THEME}={now}; path=/; SameSite=Strict; max-age=31536000"')
-        show(now)
-
-    show(now if now in names else "automatic")
-    button.on("click", turn)
+    def _why_closed(self, key: str) -> str:
+        assert self._session is not None
+        try:
+            return closed(self._session, key)
+        except TunnelError as error:
+            return str(error)
 
 
 class Fault:
@@ -135,19 +151,14 @@ class Fault:
     def show(self, error: TunnelError | str) -> None:
         """Show the line that the terminal would print, in the page's words; an empty one is none."""
         self._place.clear()
-        if not str(error):
-            return
-        with self._place:
-            ui.label(page_words(str(error))).classes("fault")
-
-    def clear(self) -> None:
-        """Show nothing."""
-        self._place.clear()
+        if str(error):
+            with self._place:
+                ui.label(page_words(str(error))).classes("fault")
 
     @contextmanager
     def around(self) -> Iterator[None]:
         """Show the error of what is done inside."""
-        self.clear()
+        self.show("")
         try:
             yield
         except TunnelError as error:
@@ -159,6 +170,28 @@ def show_parts(parts: Iterable[str | TextTable]) -> None:
     ui.html(as_html(parts), sanitize=False).classes("printed")  # its texts are escaped
 
 
+def show_facts(facts: Iterable[tuple[str, ...]]) -> None:
+    """Values, each with its label and perhaps a note below it."""
+    with ui.element("div").classes("facts"):
+        for value, *words in facts:
+            with ui.element("div"):
+                ui.label(value).classes("value")
+                for text in words:
+                    ui.label(text).classes("soft")
+
+
+def show_items(lines: Iterable[str]) -> None:
+    """Items of the list that is open."""
+    for line in lines:
+        with ui.element("li"):
+            ui.label(line)
+
+
+def heading(text: str) -> None:
+    """The heading of a part of a page."""
+    ui.html(text, sanitize=False, tag="h2")
+
+
 def show_command(words: str) -> None:
     """The command that does the same in a terminal."""
     with ui.element("p").classes("command"):
@@ -167,11 +200,7 @@ def show_command(words: str) -> None:
 
 
 def button(text: str, action: Callable[[], object], *, main: bool = False) -> ui.element:
-    """A button.
-
-    Args:
-        main: whether it is the way on.
-    """
+    """A button; the main one is the way on."""
     element = ui.element("button").props("type=button").classes("button go" if main else "button")
     with element:
         ui.html(escape(text), sanitize=False, tag="span")
@@ -183,8 +212,6 @@ class Chart(ui.element, component="static/chart.js"):
 
     Args:
         title: what it shows, for a screen reader too.
-        x: label of the abscissa, with its unit.
-        y: label of the ordinate, with its unit.
         series: labels of the curves and the names of their colours (``before``, ``after``, ``soft``, …).
         data: abscissas and the ordinates of every curve; None is a gap.
         moved: called with the id of a mark and where it was moved, in the unit of its axis; may be awaitable.
@@ -200,8 +227,8 @@ class Chart(ui.element, component="static/chart.js"):
         moved: Callable[[str, float], Any] | None = None,
     ) -> None:
         super().__init__()
-        self._props.update(title=title, x=x, y=y, series=[list(curve) for curve in series], data=data)
-        self._props.update(marks=[])
+        curves = [list(curve) for curve in series]
+        self._props.update(title=title, x=x, y=y, series=curves, data=data, marks=[])
         self.classes("chart")
         if moved is not None:
             self.on("moved", lambda event: moved(str(event.args["id"]), float(event.args["at"])))
@@ -223,24 +250,13 @@ class Chart(ui.element, component="static/chart.js"):
 
 
 def too_large(size: int) -> str:
-    """Why an upload is refused.
-
-    Args:
-        size: of it, bytes.
-    """
-    return (
-        f"{size / 1e6:.0f} MB are more than the {UPLOAD_BYTES / 1e6:.0f} MB of an upload; "
-        "use tunnel import, or drop fewer files at a time"
-    )
+    """Why an upload of a size in bytes is refused."""
+    most = f"{UPLOAD_BYTES / 1e6:.0f} MB of an upload"
+    return f"{size / 1e6:.0f} MB are more than the {most}; use tunnel import, or drop fewer files at a time"
 
 
 def drop_zone(dropped: events.Handler[events.MultiUploadEventArguments], fault: Fault) -> None:
-    """A place to drop files on, or to choose them with.
-
-    Args:
-        dropped: called with the files of a drop together.
-        fault: where a refusal is shown.
-    """
+    """A place to drop files on, or to choose them with; a refusal is shown as a fault."""
     limit = f"at most {UPLOAD_BYTES / 1e6:.0f} MB"
     zone = ui.upload(
         label=f"Drop files here, or press + to choose ({limit})",
@@ -259,13 +275,7 @@ def drop_zone(dropped: events.Handler[events.MultiUploadEventArguments], fault: 
 
 
 async def keep(session: Session, given: events.MultiUploadEventArguments) -> None:
-    """Keep dropped files under safe names; a file of the same name is replaced.
-
-    Args:
-        given: the drop.
-    """
-    from tunnel_sim.files.writing import output_folder, write_whole
-
+    """Keep dropped files under safe names; a file of the same name is replaced."""
     target = output_folder(session.uploads)
     names = [safe_name(file.name) for file in given.files]
     if len(set(names)) < len(names):

@@ -1,17 +1,18 @@
-"""What is read from dropped files, with the choices stated so far; nothing of it is written."""
+"""What is read from dropped files, with the choices stated so far, and the fields to state them in."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import tomli_w
 from nicegui import events, ui
 
-from tunnel_lab.bench.parts import show_command
+from tunnel_lab.bench.parts import FIELDS, show_command
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.conditions import ImportChoices, read_recipe
 from tunnel_sim.files.toml_input import validate
@@ -19,18 +20,32 @@ from tunnel_sim.files.writing import write_whole
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from tunnel_sim.files.importing.raw_records import RawRecord
+    from tunnel_sim.files.importing.columns import ColumnPair
     from tunnel_sim.files.importing.records import Imported, ImportedRun
+    from tunnel_sim.files.importing.tables import Channel, Table
     from tunnel_sim.vocabulary.record import Array
 
 
 MOST_COLUMNS = 8
 """At most this many raw columns are drawn."""
-
 MOST_RECORDS = 24
 """At most this many records are drawn."""
+READINGS = ("angle", "counts", "voltage", "rate", "acceleration")
+"""Kinds of unit that a reading may have."""
+Role = Literal["time", "angle", "condition", "input"]
 _STILL = 0.01  # of a run's readings from the least to the greatest: a range that looks flat
-Changed = Callable[[str, Any], Awaitable[None]]
+_WRITTEN = {
+    "rate": "Sample rate, where there are no times [Hz]",
+    "counts_per_turn": "Counts of an encoder per turn",
+    "calibration": "Angle of a voltage, such as 0.1 + 20*V",
+    "start": "Leave out samples before [s]",
+    "end": "Leave out samples after [s]",
+    "rest": "Reading at rest of every run, to be subtracted [rad]",
+    "name": "Conditions in the file names: S{spring}_V{wind_speed}_*",
+    "delimiter": "Delimiter of a text file: tab, blank, ; , or |",
+    "decimal": "Decimal sign of a text file",
+}
+"""Labels of the choices that are typed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +53,6 @@ class Mark:
     """A run in the chart of its record, times from the record's first sample.
 
     Args:
-        file: the file that holds it.
         start: of the run: the release, s.
         end: where it has come to rest, or the next run begins, s.
         rest: the reading at which it rests, in the reading's unit.
@@ -57,15 +71,7 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A record as it is drawn.
-
-    Args:
-        title: of the chart.
-        unit: of the readings.
-        time: s, few enough to draw.
-        reading: in the unit; None within a gap.
-        marks: the runs in it.
-    """
+    """A record as it is drawn: the time in s, and the reading in its unit, None within a gap."""
 
     title: str
     unit: str
@@ -89,10 +95,7 @@ def choices_of(session: Session) -> ImportChoices:
 
 
 def state(session: Session, changes: Mapping[str, Any]) -> None:
-    """Keep choices, as a recipe beside the campaign.
-
-    Args:
-        changes: by field of `ImportChoices`; None: found from the files.
+    """Keep changed choices, as a recipe beside the campaign; what is None is found from the files.
 
     Raises:
         TunnelError: when a value is not one.
@@ -107,7 +110,6 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     """State where a run begins, ends or rests.
 
     Args:
-        mark: the run as it is.
         places: ``start`` and ``end`` in s from the record's first sample, ``rest`` in the reading's unit;
             None: as found.
 
@@ -116,9 +118,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
     """
     choices = choices_of(session)
     now = choices.stretch_of(mark.file, mark.run)
-    others = [
-        stretch for stretch in choices.stretches if (stretch.file, stretch.run) != (mark.file, mark.run)
-    ]
+    others = [one for one in choices.stretches if (one.file, one.run) != (mark.file, mark.run)]
     stated = now.model_dump() | dict(places)
     first = mark.start if stated["start"] is None else stated["start"]
     last = mark.end if stated["end"] is None else stated["end"]
@@ -128,7 +128,7 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
             where=f"run '{mark.run}'",
             remedy="move one of them",
         )
-    state(session, {"stretches": [*(stretch.model_dump() for stretch in others), stated]})
+    state(session, {"stretches": [*(one.model_dump() for one in others), stated]})
 
 
 def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
@@ -158,6 +158,18 @@ def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
         return read_records(good, choices, name=session.name), tuple(faults)
 
 
+def _tables(session: Session) -> Iterator[tuple[Path, Sequence[Table]]]:
+    """The tables of the files that can be read."""
+    from tunnel_sim.files.importing.source import read_source
+
+    for path in files_of(session):
+        try:
+            tables = read_source(path, choices_of(session)).tables
+        except TunnelError:
+            continue
+        yield path, tables
+
+
 def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[float | None]]]:
     """The columns of the first table that can be read, as they are in the file.
 
@@ -166,83 +178,125 @@ def raw_columns(session: Session) -> list[tuple[str, str, list[float], list[floa
     """
     import numpy as np
 
-    from tunnel_sim.files.importing.source import read_source
-
-    for path in files_of(session):
-        try:
-            tables = read_source(path, choices_of(session)).tables
-        except TunnelError:
-            continue
-        shown = [
-            (
-                channel.name,
-                channel.unit,
-                *points(np.arange(channel.values.size, dtype=np.float64), channel.values),
-            )
-            for table in tables[:1]
-            for channel in table.channels[:MOST_COLUMNS]
-            if channel.values.size > 1 and np.isfinite(channel.values).any()
-        ]
+    for _, tables in _tables(session):
+        shown = []
+        for channel in tables[0].channels[:MOST_COLUMNS] if tables else ():
+            if channel.values.size > 1 and np.isfinite(channel.values).any():
+                rows = np.arange(channel.values.size, dtype=np.float64)
+                shown.append((channel.name, channel.unit, *points(rows, channel.values)))
         if shown:
             return shown
     return []
 
 
 def column_names(session: Session) -> list[str]:
-    """Names of the columns in the dropped files; empty where they cannot be read."""
-    from tunnel_sim.files.importing.source import read_source
-
-    names: dict[str, None] = {}
-    try:
-        for path in files_of(session):
-            for table in read_source(path, choices_of(session)).tables:
-                names |= dict.fromkeys(channel.name for channel in table.channels)
-    except TunnelError:
+    """Names of the columns in the dropped files; empty where one cannot be read."""
+    found = list(_tables(session))
+    if len(found) < len(files_of(session)):
         return []
-    return list(names)
+    return list(
+        dict.fromkeys(channel.name for _, tables in found for table in tables for channel in table.channels)
+    )
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the dropped files: what it is or would be, whether it is read as that, and its unit if known."""
+
+    name: str
+    unit: str
+    source: str
+    role: Role
+    used: bool
+
+    @property
+    def units(self) -> list[str]:
+        """The units that can be stated for it; none where the file alone can."""
+        from tunnel_sim.files.importing.tables import UNITS
+
+        kinds = {"time": ("time",), "angle": READINGS}.get(self.role, ())
+        return [unit for kind in kinds for unit in UNITS[kind]]
+
+    def stating(self, unit: str | None) -> dict[str, Any]:
+        """The choices that state one of its `units`; a column that is not used is then the one to use."""
+        key = "time_unit" if self.role == "time" else "unit"
+        if self.used or unit is None:
+            return {key: unit}
+        return {key: unit, self.role: self.name if self.role == "time" else (self.name,)}
+
+
+def columns_of(session: Session) -> list[Column]:
+    """The columns of all dropped files that can be read, each name once."""
+    from tunnel_sim.files.importing.columns import find_pairs
+
+    choices = choices_of(session)
+    found: dict[str, Column] = {}
+    for path, tables in _tables(session):
+        for table in tables:
+            try:
+                pairs = find_pairs(table, choices, path.name)
+            except TunnelError:  # it has to be chosen first
+                pairs = []
+            for channel in table.channels:
+                found.setdefault(channel.name, _column(channel, pairs, choices))
+    return list(found.values())
+
+
+def _column(channel: Channel, pairs: list[ColumnPair], choices: ImportChoices) -> Column:
+    import numpy as np
+
+    from tunnel_sim.files.importing.columns import guessed_angle_unit, guessed_time_unit, is_stated, is_time
+    from tunnel_sim.files.importing.conditions import condition_of
+    from tunnel_sim.files.importing.tables import is_input
+
+    role: Role
+    if any(channel is pair.time for pair in pairs) or (not pairs and is_time(channel)):
+        role, used, stated = "time", True, choices.time_unit
+    elif condition_of(channel.name, channel.unit) is not None:
+        return Column(channel.name, channel.unit, "a condition of the runs", "condition", True)
+    elif is_input(channel) or is_stated(channel, choices):
+        return Column(channel.name, channel.unit, "the input of a driven run", "input", True)
+    else:
+        used = any(channel is pair.reading for pair in pairs)
+        role, stated = "angle", choices.unit if used else None
+    if stated is not None:
+        return Column(channel.name, stated, "stated here", role, used)
+    if channel.unit:
+        return Column(channel.name, channel.unit, "stated in the file", role, used)
+    if not np.isfinite(channel.values).any():
+        return Column(channel.name, "", "it has no numbers", role, used)
+    guess = guessed_time_unit if role == "time" else guessed_angle_unit
+    unit, size = guess(channel.values)
+    what = f"steps of {size:.4g}" if role == "time" else f"a swing of ±{size:.4g}"
+    return Column(channel.name, unit, f"guessed from {what}", role, used)
 
 
 def drawn(imported: Imported) -> list[Drawn]:
     """The first records, with their runs."""
     raws = {id(part.raw): part.raw for part in imported.parts}
     unit = imported.campaign.sensor.unit
-    return [
-        _drawn(raw, [part for part in imported.parts if part.raw is raw], unit)
-        for raw in list(raws.values())[:MOST_RECORDS]
-    ]
-
-
-def _drawn(raw: RawRecord, parts: list[ImportedRun], unit: str) -> Drawn:
-    marks = tuple(_mark(part, unit) for part in parts)
-    return Drawn(raw.id, unit, *points(raw.cleaned.time_s, raw.cleaned.reading), marks)
+    records = []
+    for raw in list(raws.values())[:MOST_RECORDS]:
+        time, marks = raw.cleaned.time_s, []
+        for part in (part for part in imported.parts if part.raw is raw):
+            start, end = float(time[part.piece.first]), float(time[part.piece.last - 1])
+            fault = part.said[-1] if part.run is None else ""
+            marks.append(Mark(part.id, raw.source.name, start, end, *_rest(part, unit), fault))
+        records.append(Drawn(raw.id, unit, *points(time, raw.cleaned.reading), tuple(marks)))
+    return records
 
 
 def points(time: Array, reading: Array) -> tuple[list[float], list[float | None]]:
-    """The curve of a record for a chart.
+    """The curve of a record for a chart, few enough points to draw; None within a gap.
 
     Args:
         time: shape (n,), s.
         reading: shape (n,).
-
-    Returns:
-        Times and readings, few enough to draw; None within a gap.
     """
     from tunnel_lab.plotting.runs import thinned
 
     when, values = thinned(time, reading)
     return when.tolist(), [None if isnan(value) else value for value in values.tolist()]
-
-
-def _mark(part: ImportedRun, unit: str) -> Mark:
-    time = part.raw.cleaned.time_s
-    return Mark(
-        part.id,
-        part.raw.source.name,
-        float(time[part.piece.first]),
-        float(time[part.piece.last - 1]),
-        *_rest(part, unit),
-        part.said[-1] if part.run is None else "",
-    )
 
 
 def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
@@ -254,8 +308,10 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
 
     if part.rest is not None:
         return part.rest, f"{significant(part.rest)} {unit}, stated and subtracted"
-    end = float(np.median(part.reading[-max(part.reading.size // 10, 2) :]))
-    if _flat(part.reading):
+    tail = part.reading[-max(part.reading.size // 10, 2) :]
+    end = float(np.median(tail))
+    low, high = np.quantile(tail, (0.05, 0.95))
+    if high - low < _STILL * float(np.ptp(part.reading)):
         return end, f"{significant(end)} {unit}, found where the motion has ended"
     centre = None if part.run is None else centre_of(part.run, 0.0)
     if centre is not None:
@@ -263,76 +319,75 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
     return end, f"about {significant(end, 2)} {unit}, found"
 
 
-def _flat(reading: Array) -> bool:
-    """Whether the last tenth of a run visibly stands still."""
-    import numpy as np
+def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaitable[None]]) -> None:
+    """A field for the unit of each of the first columns; a changed unit makes choices, which are then stated."""
+    with ui.element("div").classes("fields wide"):
+        for column in columns[:MOST_COLUMNS]:
+            units = column.units
+            if column.unit not in units:  # the unit of the file, which is not one of a time or an angle
+                units = [*units, *([column.unit] if column.unit else [])]
 
-    tail = reading[-max(reading.size // 10, 2) :]
-    low, high = np.quantile(tail, (0.05, 0.95))
-    return bool(high - low < _STILL * float(np.ptp(reading)))
+            async def change(event: events.ValueChangeEventArguments[Any], column: Column = column) -> None:
+                await state(column.stating(event.value))
 
-
-class ChoicesPart:
-    """The fields.
-
-    Args:
-        session: whose files they are about.
-        columns: names of the columns in the files.
-        changed: called with the name of a choice and its new value; None: found from the files.
-    """
-
-    def __init__(self, session: Session, columns: list[str], changed: Changed) -> None:
-        from tunnel_sim.files.importing.tables import UNITS
-
-        self._now = choices_of(session)
-        self._changed = changed
-        angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
-        with ui.element("div").classes("fields wide"):
-            self._select("angle", "Column of the angle", columns, several=True)
-            self._select("unit", "Unit of the angle", angle)
-            self._select("time", "Column of the times", columns)
-            self._select("time_unit", "Unit of the times", list(UNITS["time"]))
-            self._number("rate", "Sample rate, where there are no times [Hz]")
-            self._number("counts_per_turn", "Counts of an encoder per turn")
-            self._text("calibration", "Angle of a voltage, such as 0.1 + 20*V")
-            self._number("start", "Leave out samples before [s]")
-            self._number("end", "Leave out samples after [s]")
-            self._number("rest", "Reading at rest of every run, to be subtracted [rad]")
-            self._text("name", "Conditions in the file names: S{spring}_V{wind_speed}_*")
-            self._text("delimiter", "Delimiter of a text file: tab, blank, ; , or |")
-            self._text("decimal", "Decimal sign of a text file")
-            ui.checkbox(
-                "Cut records at releases", value=self._now.cut, on_change=lambda e: changed("cut", e.value)
+            source, use = column.source, "not read; a unit chosen here makes it the angle"
+            if column.used:
+                use = {"time": "read as the times", "angle": "read as the angle"}.get(column.role, "")
+            elif column.unit:  # the field is empty, so that this unit can be chosen too
+                source = f"{column.unit}, {source}"
+            value = column.unit if column.used and column.unit else None
+            label = f"Unit of {column.name}"
+            field = ui.select(units, label=label, value=value, clearable=True, on_change=change).props(
+                "dense"
             )
-        show_command(
-            f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
-        )
+            field.props["hint"] = "; ".join(filter(None, (source, use)))
+            if not column.units:
+                field.props("disable")
+    if len(columns) > MOST_COLUMNS:
+        ui.label(f"{len(columns) - MOST_COLUMNS} more columns are not shown.").classes("soft")
 
-    def _select(self, key: str, label: str, options: list[str], *, several: bool = False) -> None:
-        now = getattr(self._now, key)
-        value = list(now) if several else now
-        shown = [
-            *options,
-            *(choice for choice in (value if several else [value]) if choice and choice not in options),
-        ]
 
-        async def change(event: events.ValueChangeEventArguments[Any]) -> None:
-            await self._changed(key, event.value or (() if several else None))
+def show_choices(
+    session: Session, columns: list[str], changed: Callable[[str, Any], Awaitable[None]]
+) -> None:
+    """The fields of the choices; a changed one calls with its name and new value, None: found from the files."""
+    from tunnel_sim.files.importing.tables import UNITS
 
-        ui.select(shown, label=label, value=value, multiple=several, clearable=True, on_change=change).props(
-            "dense"
-        )
+    now = choices_of(session)
+    angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
 
-    def _number(self, key: str, label: str) -> None:
-        async def change() -> None:
-            await self._changed(key, field.value)
+    async def choose(key: str, event: events.ValueChangeEventArguments[Any]) -> None:
+        await changed(key, event.value or (() if key == "angle" else None))
 
-        field = ui.number(label, value=getattr(self._now, key)).props("dense step=any")
-        field.on("change", change)
+    async def write(key: str, field: ui.number | ui.input) -> None:
+        await changed(key, None if field.value == "" else field.value)
 
-    def _text(self, key: str, label: str) -> None:
-        async def change() -> None:
-            await self._changed(key, field.value or None)
-
-        field = ui.input(label, value=getattr(self._now, key) or "").props("dense")
-        field.on("change", change)
+    with ui.element("div").classes("fields wide"):
+        for key, options in (
+            ("angle", columns),
+            ("unit", angle),
+            ("time", columns),
+            ("time_unit", list(UNITS["time"])),
+        ):
+            several = key == "angle"
+            value = list(now.angle) if several else getattr(now, key)
+            chosen = value if several else [value]
+            ui.select(
+                [*options, *(choice for choice in chosen if choice and choice not in options)],
+                label=FIELDS[key.replace("_", "-")],
+                value=value,
+                multiple=several,
+                clearable=True,
+                on_change=partial(choose, key),
+            ).props("dense")
+        for key, label in _WRITTEN.items():
+            field: ui.number | ui.input
+            if key in ("calibration", "name", "delimiter", "decimal"):
+                field = ui.input(label, value=getattr(now, key) or "").props("dense")
+            else:
+                field = ui.number(label, value=getattr(now, key)).props("dense step=any")
+            field.on("change", partial(write, key, field))
+        ui.checkbox("Cut records at releases", value=now.cut, on_change=lambda e: changed("cut", e.value))
+    show_command(
+        f"tunnel import {session.uploads}/* --recipe {session.choices} --out {session.campaign} --yes"
+    )

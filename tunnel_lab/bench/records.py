@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import events, ui
 
 from tunnel_lab.bench import preview
-from tunnel_lab.bench.columns import ColumnsPart, columns_of
-from tunnel_lab.bench.parts import Chart, Fault, Frame, address, button, drop_zone, keep, show_parts
-from tunnel_lab.bench.preview import ChoicesPart
+from tunnel_lab.bench.parts import (
+    Chart,
+    Fault,
+    Frame,
+    address,
+    button,
+    drop_zone,
+    keep,
+    show_items,
+    show_parts,
+)
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -27,19 +37,16 @@ _HELP = (
 )
 
 
-def build(session: Session, frame: Frame) -> None:
-    """Build the page."""
-    _Records(session, frame)
-
-
-class _Records:
+class RecordsPage:
     """The page: it reads the files again whenever a choice changes."""
 
     def __init__(self, session: Session, frame: Frame) -> None:
-        self._session, self._frame = session, frame
+        self._session = session
         self._imported: Imported | None = None
         if not preview.files_of(session):
-            _as_it_is(session)
+            ui.label(f"The campaign in {session.campaign}, as it is.").classes("soft")
+            self._fault, self._drawn = Fault(), ui.element("div")
+            ui.timer(0.0, self._draw_runs, once=True)
             frame.way_on()
             return
         self._files = ui.element("div")
@@ -62,6 +69,20 @@ class _Records:
             ui.label("Reading the files …").classes("soft")
         ui.timer(0.0, self._first, once=True)
 
+    async def _draw_runs(self) -> None:
+        """The runs of a campaign that was not made of dropped files, as they are."""
+        from tunnel_sim.files.campaign_folder import read_campaign
+
+        with self._fault.around():
+            campaign = await asyncio.to_thread(read_campaign, self._session.campaign)
+            if self._drawn.is_deleted:  # the page was left
+                return
+            with self._drawn.classes("charts"):
+                for run in campaign.runs[: preview.MOST_RECORDS]:
+                    label = f"reading [{campaign.sensor.unit}]"
+                    curve = preview.points(run.record.time_s, run.record.yaw_rad)
+                    Chart(run.id, "time [s]", label, [("reading", "after")], curve)
+
     async def _first(self) -> None:
         self._names = await asyncio.to_thread(preview.column_names, self._session)
         self._show_choices()
@@ -73,7 +94,7 @@ class _Records:
     def _show_choices(self) -> None:
         self._form_place.clear()
         with self._form_place:
-            ChoicesPart(self._session, self._names, self._changed)
+            preview.show_choices(self._session, self._names, self._changed)
 
     async def _changed(self, key: str, value: Any) -> None:
         with self._fault.around():
@@ -106,30 +127,41 @@ class _Records:
         """
         self._reading += 1
         mine = self._reading
-        imported, error = None, None
-        faults: tuple[TunnelError, ...] = ()
+        imported = None
         try:
             imported, faults = await asyncio.to_thread(preview.read, self._session)
+            said: TunnelError | str = "; ".join(f"left out: {fault}" for fault in faults)
         except TunnelError as refused:
-            error = refused
-        if (
-            mine != self._reading or self._table.is_deleted
-        ):  # a later choice is being read, or the page was left
+            said = refused
+        if self._is_past(mine):
             return True
-        left_out = "; ".join(f"left out: {fault}" for fault in faults)
-        self._fault.show(error or left_out)
-        if error is not None and not redraw:
+        self._fault.show(said)
+        if imported is None and not redraw:
             return False
         self._imported = imported
         self._write_button.props(remove="disabled") if imported else self._write_button.props("disabled")
         self._table.clear()
         if redraw:
             self._drawn.clear()
-            await self._show_units(opened=imported is None)
-            if mine != self._reading or self._drawn.is_deleted:
+            columns = await asyncio.to_thread(preview.columns_of, self._session)
+            if self._is_past(mine):
                 return True
+            self._units.clear()
+            self._units.set_visibility(bool(columns))
+            with self._units:
+                preview.show_columns(columns, self._stated)
+            if imported is None:
+                self._units.open()
         if imported is None:
-            await self._draw_columns()
+            curves = await asyncio.to_thread(preview.raw_columns, self._session)
+            if self._drawn.is_deleted or not curves:
+                return False
+            with self._drawn:
+                ui.label("The columns as they are in the file:").classes("soft")
+                with ui.element("div").classes("charts"):
+                    for name, unit, rows, values in curves:
+                        label = f"{name} [{unit or 'unit not stated'}]"
+                        Chart(name, "row", label, [("value", "after")], [rows, values])
             return False
         with self._drawn:
             self._draw(imported)
@@ -138,33 +170,12 @@ class _Records:
 
             show_parts([parts_table(imported)])
             with ui.element("ul").classes("notes"):
-                for line in imported.remarks():
-                    with ui.element("li"):
-                        ui.label(line)
+                show_items(imported.remarks())
         return True
 
-    async def _show_units(self, *, opened: bool) -> None:
-        columns = await asyncio.to_thread(columns_of, self._session)
-        if self._units.is_deleted:
-            return
-        self._units.clear()
-        self._units.set_visibility(bool(columns))
-        with self._units:
-            ColumnsPart(columns, self._stated)
-        if opened:
-            self._units.open()
-
-    async def _draw_columns(self) -> None:
-        """The columns as they are in the file, to choose from."""
-        columns = await asyncio.to_thread(preview.raw_columns, self._session)
-        if self._drawn.is_deleted or not columns:
-            return
-        with self._drawn:
-            ui.label("The columns as they are in the file:").classes("soft")
-            with ui.element("div").classes("charts"):
-                for name, unit, rows, values in columns:
-                    label = f"{name} [{unit or 'unit not stated'}]"
-                    Chart(name, "row", label, [("value", "after")], [rows, values])
+    def _is_past(self, reading: int) -> bool:
+        """Whether a later choice is being read, or the page was left."""
+        return reading != self._reading or self._table.is_deleted
 
     def _show_files(self) -> None:
         self._files.clear()
@@ -185,8 +196,9 @@ class _Records:
     def _draw(self, imported: Imported) -> None:
         """Draw the records, or only their marks where they are drawn already."""
         records = preview.drawn(imported)
+        marks = [mark for record in records for mark in record.marks]
+        unit = imported.campaign.sensor.unit
         if not self._drawn.default_slot.children:
-            self._charts = []
             ui.label(_HELP).classes("soft")
             with ui.element("div").classes("charts"):
                 self._charts = [self._chart(record) for record in records]
@@ -194,36 +206,46 @@ class _Records:
             if hidden > 0:
                 ui.label(f"{hidden} more records are not drawn.").classes("soft")
             with ui.expansion("Resting angles as numbers"), ui.element("div").classes("fields"):
-                self._rests = [self._rest(mark, record.unit) for record in records for mark in record.marks]
+                self._rests = []
+                for mark in marks:
+                    field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]").props(
+                        "dense step=any"
+                    )
+                    self._rests.append(field.on("change", partial(self._rest_typed, mark, field)))
         for chart, record in zip(self._charts, records, strict=True):
-            chart.show_marks(_marks(record))
-        for field, mark in zip(
-            self._rests, (mark for record in records for mark in record.marks), strict=True
-        ):
+            chart.show_marks(
+                [
+                    {
+                        "id": f"{mark.run} {kind}",
+                        "at": getattr(mark, kind),
+                        "kind": kind,
+                        "label": f"{words} of {mark.run}",
+                        "unit": unit if kind == "rest" else "s",
+                        "from": mark.start,
+                        "to": mark.end,
+                        "about": f"rest {mark.about}",
+                    }
+                    for mark in record.marks
+                    for kind, words in _KINDS.items()
+                ]
+            )
+        for field, mark in zip(self._rests, marks, strict=True):
             field.set_value(float(f"{mark.rest:.6g}"))
             field.props["hint"] = mark.about
             field.update()
 
-    def _rest(self, mark: preview.Mark, unit: str) -> ui.number:
-        """A field for the reading at which a run rests; where it is emptied, the rest is found again."""
-
-        async def change() -> None:
-            await self._moved(mark, "rest", field.value)
-
-        field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]").props("dense step=any")
-        return field.on("change", change)
+    async def _rest_typed(self, mark: preview.Mark, field: ui.number) -> None:
+        """Keep a rest; where the field is emptied, the rest is found again."""
+        await self._moved(mark, "rest", field.value)
 
     def _chart(self, record: preview.Drawn) -> Chart:
         marks = {f"{mark.run} {kind}": (mark, kind) for mark in record.marks for kind in _KINDS}
+        curves: list[Sequence[float | None]] = [record.time, record.reading]
         label = f"reading [{record.unit}]"
         return Chart(
-            record.title,
-            _TIME,
-            label,
-            [("reading", "after")],
-            [record.time, record.reading],
+            record.title, _TIME, label, [("reading", "after")], curves,
             lambda name, at: self._moved(*marks[name], at),
-        )
+        )  # fmt: skip
 
     async def _write(self) -> None:
         with self._written.around():
@@ -233,30 +255,8 @@ class _Records:
             ui.navigate.to(address(self._session, "conditions"))
 
 
-def _marks(record: preview.Drawn) -> list[dict[str, Any]]:
-    """The runs of a record as marks of its chart."""
-    return [
-        {
-            "id": f"{mark.run} {kind}",
-            "at": getattr(mark, kind),
-            "kind": kind,
-            "label": f"{words} of {mark.run}",
-            "unit": record.unit if kind == "rest" else "s",
-            "from": mark.start,
-            "to": mark.end,
-            "about": f"rest {mark.about}",
-        }
-        for mark in record.marks
-        for kind, words in _KINDS.items()
-    ]
-
-
 def write(session: Session, imported: Imported) -> None:
-    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
-
-    Raises:
-        TunnelError: when the folder cannot be written.
-    """
+    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept."""
     from tunnel_lab.bench import conditions
     from tunnel_lab.plotting.runs import import_picture
     from tunnel_sim.files.importing.records import write_imported
@@ -265,25 +265,3 @@ def write(session: Session, imported: Imported) -> None:
     write_imported(imported, session.campaign, overwrite=True, picture=import_picture)
     if before is not None:
         conditions.restore(session, before)
-
-
-def _as_it_is(session: Session) -> None:
-    """A campaign that was not made of dropped files: its runs, as they are."""
-    ui.label(f"The campaign in {session.campaign}, as it is.").classes("soft")
-    fault = Fault()
-    place = ui.element("div")
-
-    async def show() -> None:
-        from tunnel_sim.files.campaign_folder import read_campaign
-
-        with fault.around():
-            campaign = await asyncio.to_thread(read_campaign, session.campaign)
-            if place.is_deleted:  # the page was left
-                return
-            with place.classes("charts"):
-                for run in campaign.runs[: preview.MOST_RECORDS]:
-                    label = f"reading [{campaign.sensor.unit}]"
-                    curve = preview.points(run.record.time_s, run.record.yaw_rad)
-                    Chart(run.id, "time [s]", label, [("reading", "after")], curve)
-
-    ui.timer(0.0, show, once=True)

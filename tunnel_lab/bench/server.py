@@ -8,7 +8,6 @@ import re
 import secrets
 import socket
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib import import_module, resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,12 +17,9 @@ from fastapi.responses import FileResponse, HTMLResponse
 from nicegui import app, background_tasks, core, events, ui
 
 from tunnel_lab.bench import work
-from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep, too_large
-from tunnel_lab.bench.words import page_words
+from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep, page_words, too_large
 from tunnel_lab.bench.workspace import (
     STAGES,
-    Session,
-    Stage,
     closed,
     new_session,
     open_session,
@@ -42,21 +38,25 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 _LENGTH = re.compile(r"[0-9]{1,20}")
-_HEADERS = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
 
 
 def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
-    """Serve the bench until interrupted.
-
-    Args:
-        folder: the workspace, as it is shown and typed.
-        port: TCP port (count); 0 takes a free one.
-        first: path of the page to open.
+    """Serve a workspace until interrupted, on a TCP port or a free one (0), with the path of the page to open.
 
     Raises:
         TunnelError: when the port is taken.
     """
-    port = _free_port(port)
+    with socket.socket() as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((HOST, port))
+        except OSError as error:
+            raise TunnelError(
+                f"cannot be opened ({(error.strerror or str(error)).lower()})",
+                where=f"--port {port}",
+                remedy="name another one, or leave it out",
+            ) from error
+        port = int(trial.getsockname()[1])
     token = secrets.token_urlsafe(24)
     address = f"{first}?token={token}"
     core.app.add_middleware(Guard, port=port, token=token)
@@ -101,46 +101,8 @@ async def _end() -> None:
     await asyncio.to_thread(work.stop_all)
 
 
-def _free_port(port: int) -> int:
-    """The port, or a free one for 0.
-
-    Raises:
-        TunnelError: when it cannot be opened.
-    """
-    with socket.socket() as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            trial.bind((HOST, port))
-        except OSError as error:
-            raise TunnelError(
-                f"cannot be opened ({(error.strerror or str(error)).lower()})",
-                where=f"--port {port}",
-                remedy="name another one, or leave it out",
-            ) from error
-        return int(trial.getsockname()[1])
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """Why a request is not answered.
-
-    Args:
-        status: of HTTP (count).
-        words: one line.
-    """
-
-    status: int
-    words: str
-
-
 class Guard:
-    """Lets only the bench's own pages through.
-
-    Args:
-        app: what is guarded.
-        port: of the server (count).
-        token: secret of this start of the server.
-    """
+    """Lets only the bench's own pages through: those that show the secret token of this start of the server."""
 
     def __init__(self, app: ASGIApp, port: int, token: str) -> None:
         self._app = app
@@ -155,58 +117,46 @@ class Guard:
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
-        refusal = self._refusal(headers, query)
-        if refusal is not None:
-            await _refuse(scope, send, refusal)
+        status, words = self._refusal(headers, query)
+        if status and scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008, "reason": words[:120]})
+        elif status:  # what is left of the request is not read
+            await _answer(send, status, (b"connection", b"close"), body=f"{words}\n".encode())
         elif "token" in query and scope["type"] == "http" and scope["method"] == "GET":
-            await self._welcome(scope, query, send)
+            # The token moves from the address into a cookie, so that it is in no history or bookmark.
+            rest = urlencode({name: value for name, value in query.items() if name != "token"})
+            # The path cannot name another host or end the header.
+            path = "/" + quote(scope["path"].lstrip("/\\"), errors="replace")
+            place = path + (f"?{rest}" if rest else "")
+            cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+            await _answer(send, 303, (b"location", place.encode()), (b"set-cookie", cookie.encode()))
         else:
             await self._app(scope, receive, send)
 
-    def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> Refusal | None:
+    def _refusal(self, headers: Mapping[str, str], query: Mapping[str, str]) -> tuple[int, str]:
+        """Status of HTTP and words of a request that is not answered; 0 for any other."""
         host, origin = headers.get("host", ""), headers.get("origin")
         if host not in self._hosts:
-            return Refusal(
-                421, "This is the bench of another address; use the one that tunnel bench printed."
-            )
+            return 421, "This is the bench of another address; use the one that tunnel bench printed."
         if origin is not None and origin != f"http://{host}":
-            return Refusal(403, "The request comes from another page; use the bench itself.")
-        given = query.get("token") or _cookies(headers.get("cookie", "")).get(self._cookie, "")
+            return 403, "The request comes from another page; use the bench itself."
+        pairs = (part.strip().partition("=") for part in headers.get("cookie", "").split(";"))
+        cookies = {name: value for name, _, value in pairs}
+        given = query.get("token") or cookies.get(self._cookie, "")
         if not hmac.compare_digest(given.encode(), self._token.encode()):
-            return Refusal(
-                403, "The token is missing or old; use the whole address that tunnel bench printed."
-            )
+            return 403, "The token is missing or old; use the whole address that tunnel bench printed."
         length = headers.get("content-length", "0")
         if "transfer-encoding" in headers or not _LENGTH.fullmatch(length):
-            return Refusal(411, "The length of the request is not stated.")
+            return 411, "The length of the request is not stated."
         if int(length) > UPLOAD_BYTES:
-            return Refusal(413, too_large(int(length)))
-        return None
-
-    async def _welcome(self, scope: Scope, query: dict[str, str], send: Send) -> None:
-        """Move the token from the address into a cookie, so that it is in no history or bookmark."""
-        rest = urlencode({name: value for name, value in query.items() if name != "token"})
-        # The path cannot name another host or end the header.
-        path = "/" + quote(scope["path"].lstrip("/\\"), errors="replace")
-        place = path + (f"?{rest}" if rest else "")
-        cookie = f"{self._cookie}={self._token}; HttpOnly; SameSite=Strict; Path=/"
-        headers = [*_HEADERS, (b"location", place.encode()), (b"set-cookie", cookie.encode())]
-        await send({"type": "http.response.start", "status": 303, "headers": headers})
-        await send({"type": "http.response.body", "body": b""})
+            return 413, too_large(int(length))
+        return 0, ""
 
 
-def _cookies(header: str) -> dict[str, str]:
-    pairs = (part.strip().partition("=") for part in header.split(";"))
-    return {name: value for name, _, value in pairs}
-
-
-async def _refuse(scope: Scope, send: Send, refusal: Refusal) -> None:
-    if scope["type"] == "websocket":
-        await send({"type": "websocket.close", "code": 1008, "reason": refusal.words[:120]})
-        return
-    headers = [*_HEADERS, (b"connection", b"close")]  # what is left of the request is not read
-    await send({"type": "http.response.start", "status": refusal.status, "headers": headers})
-    await send({"type": "http.response.body", "body": f"{refusal.words}\n".encode()})
+async def _answer(send: Send, status: int, *headers: tuple[bytes, bytes], body: bytes = b"") -> None:
+    plain = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
+    await send({"type": "http.response.start", "status": status, "headers": [*plain, *headers]})
+    await send({"type": "http.response.body", "body": body})
 
 
 def add_pages(folder: Path) -> None:
@@ -222,7 +172,7 @@ def add_pages(folder: Path) -> None:
     def rig() -> None:
         frame = Frame("Try it")
         with frame.main:
-            import_module("tunnel_lab.bench.try_it").build(folder)
+            import_module("tunnel_lab.bench.try_it").TryItPage(folder)
 
     @app.get("/{name}/report.html")
     def report(name: str) -> FileResponse:
@@ -258,10 +208,9 @@ def add_pages(folder: Path) -> None:
 
 
 def build_start(folder: Path) -> None:
-    """Build the page."""
-    ui.label("Drop the files of a data logger. Every step writes the files that the commands write.").classes(
-        "lede"
-    )
+    """The first page: a place to drop files on, and the campaigns."""
+    words = "Drop the files of a data logger. Every step writes the files that the commands write."
+    ui.label(words).classes("lede")
     fault = Fault()
 
     async def dropped(given: events.MultiUploadEventArguments) -> None:
@@ -272,24 +221,18 @@ def build_start(folder: Path) -> None:
 
     drop_zone(dropped, fault)
     place = folder if folder.name else folder.resolve()
-    ui.label(f"Dropped files are kept in {place}, in a folder of their own beside the campaign.").classes(
-        "soft"
-    )
+    words = f"Dropped files are kept in {place}, in a folder of their own beside the campaign."
+    ui.label(words).classes("soft")
     campaigns = sessions(folder)
     if campaigns:
         with ui.element("h2"):
             ui.html("Campaigns here", sanitize=False, tag="span")
         with ui.element("ul").classes("sessions"):
             for session in campaigns:
+                try:
+                    stage = [stage for stage in STAGES if not closed(session, stage.key)][-1]
+                except TunnelError:
+                    stage = STAGES[0]
                 with ui.element("li"):
-                    stage = _furthest(session)
                     ui.link(session.name, address(session, stage.key))
                     ui.label(f"open up to {stage.title}").classes("soft")
-
-
-def _furthest(session: Session) -> Stage:
-    """The last stage that is open."""
-    try:
-        return [stage for stage in STAGES if not closed(session, stage.key)][-1]
-    except TunnelError:
-        return STAGES[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees, radians
 from pathlib import Path
@@ -13,7 +14,7 @@ from nicegui import events, ui
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Chart, Fault, address, button
 from tunnel_lab.bench.workspace import new_session
-from tunnel_sim.effects import Effect, EffectChain, effect_class
+from tunnel_sim.effects import Effect, EffectChain, effect_class, known_effects
 from tunnel_sim.effects.base import read_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
@@ -45,59 +46,52 @@ class Car(ui.element, component="static/car.js"):
         self.update()
 
 
-def build(folder: Path) -> None:
-    """Build the page."""
-    _TryIt(folder)
-
-
-class _TryIt:
-    """The page."""
+class TryItPage:
+    """The page: the trace follows every slider."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._trial, self._busy = folder, RigTrial(), False
-        ui.label(
+        self._kinds = {kind.name: kind for kind in known_effects() if not kind.driven}  # of free decays
+        words = (
             "The rig by the fast integrator, without noise. Grey: the nominal model; blue: with the effect."
-        ).classes("lede")
+        )
+        ui.label(words).classes("lede")
         with ui.element("div").classes("bench"):
             with ui.element("div").classes("sliders"):
-                for key, (name, unit, low, high, step) in _SLIDERS.items():
-                    self._slider(key, name, unit, low, high, step)
-                self._effects()
+                for key, (name, unit, *limits) in _SLIDERS.items():
+                    with ui.element("div").classes("slider"):
+                        self._slider(key, name, unit, limits, getattr(self._trial, key), "g")
+                names = {"": "none", **{name: name.replace("_", " ") for name in self._kinds}}
+                ui.select(names, label="Effect", value="", on_change=self._choose).props("dense")
+                self._severity = ui.element("div").classes("slider")
             with ui.element("div").classes("shown"):
-                self._chart = Chart(
-                    "Yaw angle",
-                    "time [s]",
-                    "yaw angle [rad]",
-                    [("nominal model", "quiet"), ("with the effect", "after")],
-                    [],
-                )
+                curves = [("nominal model", "quiet"), ("with the effect", "after")]
+                self._chart = Chart("Yaw angle", "time [s]", "yaw angle [rad]", curves, [])
                 self._words = ui.label().classes("soft").props("role=status aria-live=polite")
                 self._fault = Fault()
                 self._car = Car()
-        self._campaign()
+        self._campaign_fault = Fault()
+        with ui.element("p").classes("buttons"):
+            button("Simulate a campaign of this rig", self._write)
+        words = "Two springs, wind off and on, with the sensor's noise, as tunnel simulate does."
+        ui.label(words).classes("soft")
         ui.timer(0.0, self._simulate, once=True)
 
-    def _slider(self, key: str, name: str, unit: str, low: float, high: float, step: float) -> None:
-        with ui.element("div").classes("slider"):
-            label = ui.label(f"{name}: {getattr(self._trial, key):g} {unit}")
+    def _slider(
+        self, key: str, name: str, unit: str, limits: Sequence[float], value: float, form: str
+    ) -> None:
+        """A slider of a field of the trial, below its name and value; limits: least, greatest and step."""
+        mark = "" if unit == "1" else f" {unit}"
+        label = ui.label(f"{name}: {value:{form}}{mark}")
 
-            async def change(event: events.ValueChangeEventArguments[float | None]) -> None:
-                value = float(event.value or 0.0)
-                label.set_text(f"{name}: {value:g} {unit}")
-                await self._change(**{key: value})
+        async def change(event: events.ValueChangeEventArguments[float | None]) -> None:
+            now = float(event.value or 0.0)
+            label.set_text(f"{name}: {now:{form}}{mark}")
+            await self._change(**{key: now})
 
-            slider = ui.slider(
-                min=low, max=high, step=step, value=getattr(self._trial, key), on_change=change
-            )
-            slider.props(f'aria-label="{name} [{unit}]"')
-
-    def _effects(self) -> None:
-        from tunnel_sim.effects import known_effects
-
-        self._kinds = {kind.name: kind for kind in known_effects() if not kind.driven}  # of free decays
-        names = {"": "none", **{name: name.replace("_", " ") for name in self._kinds}}
-        ui.select(names, label="Effect", value="", on_change=self._choose).props("dense")
-        self._severity = ui.element("div").classes("slider")
+        low, high, step = limits
+        slider = ui.slider(min=low, max=high, step=step, value=value, on_change=change)
+        slider.props(f'aria-label="{name} [{unit}]"')
 
     async def _choose(self, event: events.ValueChangeEventArguments[str]) -> None:
         self._severity.clear()
@@ -108,18 +102,9 @@ class _TryIt:
         kind = self._kinds[name]
         info, example = kind.parameters()[0], kind.example[0]
         low, high = max(info.lower, -2.0 * abs(example)), min(info.upper, 2.0 * abs(example))
-        unit = "" if info.unit == "1" else f" {info.unit}"
         with self._severity:
-            label = ui.label(f"{info.meaning}: {example:.3g}{unit}")
-
-            async def change(event: events.ValueChangeEventArguments[float | None]) -> None:
-                value = float(event.value or 0.0)
-                label.set_text(f"{info.meaning}: {value:.3g}{unit}")
-                await self._change(severity=value)
-
-            ui.slider(min=low, max=high, step=(high - low) / 200.0, value=example, on_change=change).props(
-                f'aria-label="{info.meaning} [{info.unit}]"'
-            )
+            limits = (low, high, (high - low) / 200.0)
+            self._slider("severity", info.meaning, info.unit, limits, example, ".3g")
             ui.label(kind.equation).classes("soft equation")
         await self._change(effect=name, severity=example)
 
@@ -145,28 +130,18 @@ class _TryIt:
         finally:
             self._busy = False
 
-    def _campaign(self) -> None:
-        fault = Fault()
-        name = "try-it"
-
-        async def write() -> None:
-            with fault.around():
-                session = new_session(self._folder, name)
-                plan, log = self._folder / f"{session.name}.plan.toml", session.log("simulation")
-                write_whole(plan, plan_text(self._trial, session.name).encode())
-                words = ("simulate", str(plan), "--out", str(session.campaign), *effect_words(self._trial))
-                await asyncio.to_thread(work.start, words, log)
-                while (state := work.work_of(log)).running:
-                    await asyncio.sleep(0.2)
-                if state.error:
-                    raise TunnelError(state.error)
-                ui.navigate.to(address(session, "records"))
-
-        with ui.element("p").classes("buttons"):
-            button("Simulate a campaign of this rig", write)
-        ui.label("Two springs, wind off and on, with the sensor's noise, as tunnel simulate does.").classes(
-            "soft"
-        )
+    async def _write(self) -> None:
+        with self._campaign_fault.around():
+            session = new_session(self._folder, "try-it")
+            plan, log = self._folder / f"{session.name}.plan.toml", session.log("simulation")
+            write_whole(plan, plan_text(self._trial, session.name).encode())
+            words = ("simulate", str(plan), "--out", str(session.campaign), *effect_words(self._trial))
+            await asyncio.to_thread(work.start, words, log)
+            while (state := work.work_of(log)).running:
+                await asyncio.sleep(0.2)
+            if state.error:
+                raise TunnelError(state.error)
+            ui.navigate.to(address(session, "records"))
 
 
 @dataclass(frozen=True)
@@ -207,10 +182,7 @@ def chosen_effect(trial: RigTrial) -> Effect | None:
 
 
 def simulate(trial: RigTrial) -> tuple[Array, Array, Array]:
-    """Simulate a run without and with the effect.
-
-    Returns:
-        Times (s), and readings (rad) of the nominal model and with the effect, shape (n,) each; neither has noise.
+    """Times (s), and readings (rad) without noise of the nominal model and with the effect, shape (n,) each.
 
     Raises:
         TunnelError: when the motion grows without bound.
@@ -227,32 +199,24 @@ def simulate(trial: RigTrial) -> tuple[Array, Array, Array]:
         duration=trial.duration,
     )
     effect = chosen_effect(trial)
-    time, nominal = _read(stated, ())
-    seen = nominal if effect is None else _read(stated, (effect,))[1]
+    sensor = SensorModel(RATE, noise_std=0.0, resolution=0.0)
+    records = []
+    for effects in ((),) if effect is None else ((), (effect,)):
+        rng = np.random.default_rng(1)  # the same random moments at every change
+        chain = EffectChain.draw(stated, effects, rng)
+        try:
+            motion = forward_motion(rig, follow_fastest(rig, chain.physics()), RATE)
+        except ValueError as error:
+            remedy = "choose a stiffer spring or a smaller Cnβ"
+            raise TunnelError(str(error), where="the rig", remedy=remedy) from error
+        records.append(read_motion(motion, sensor, rng, chain))
+    nominal, seen = records[0].yaw_rad, records[-1].yaw_rad
     size = min(nominal.size, seen.size)  # where samples are dropped there are fewer
-    return time[:size], nominal[:size], seen[:size]
-
-
-def _read(stated: RunSettings, effects: tuple[Effect, ...]) -> tuple[Array, Array]:
-    rig = load_rig()
-    rng = np.random.default_rng(1)  # the same random moments at every change
-    chain = EffectChain.draw(stated, effects, rng)
-    try:
-        motion = forward_motion(rig, follow_fastest(rig, chain.physics()), RATE)
-    except ValueError as error:
-        raise TunnelError(
-            str(error), where="the rig", remedy="choose a stiffer spring or a smaller Cnβ"
-        ) from error
-    record = read_motion(motion, SensorModel(RATE, noise_std=0.0, resolution=0.0), rng, chain)
-    return record.time_s, record.yaw_rad
+    return records[0].time_s[:size], nominal[:size], seen[:size]
 
 
 def plan_text(trial: RigTrial, name: str) -> str:
-    """The plan of a small campaign with the trial's physics, for ``tunnel simulate``: two springs, wind off and on.
-
-    Args:
-        trial: what is chosen; its effect is an option of the command.
-    """
+    """The plan of a small campaign for ``tunnel simulate``; the effect is an option of the command."""
     import tomli_w
 
     return tomli_w.dumps(

@@ -14,7 +14,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from datetime import datetime
@@ -26,8 +26,6 @@ from tunnel_sim.processes import Worker
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from diagnosis.by_hand import ByHand, Closure
 
 
@@ -47,11 +45,8 @@ class Work:
 
     Args:
         command: as one would type it; empty where there is no log.
-        process: number of the process (count).
         started: date and time, ISO 8601.
         lines: printed so far.
-        running: whether the process is alive.
-        paused: whether it has been suspended.
         status: exit status; None while it runs, and where it ended without one.
     """
 
@@ -66,20 +61,16 @@ class Work:
     @property
     def error(self) -> str:
         """The line that says why it ended without a result; empty where it did not."""
-        if not self.command or self.running or self.status in (0, None):
-            return (
-                "" if self.running or not self.command or self.status == 0 else "It was ended from outside."
-            )
+        if not self.command or self.running or self.status == 0:
+            return ""
+        if self.status is None:
+            return "It was ended from outside."
         errors = [line.removeprefix("tunnel: ") for line in self.lines if line.startswith("tunnel: ")]
         return errors[-1] if errors else f"It ended with exit status {self.status}."
 
 
 def work_of(log: Path) -> Work:
-    """The state of a command by its log.
-
-    Args:
-        log: the file; it need not exist.
-    """
+    """The state of a command by its log, which need not exist."""
     try:
         lines = log.read_text("utf-8", "replace").splitlines()
     except OSError:
@@ -87,7 +78,19 @@ def work_of(log: Path) -> Work:
     first = _FIRST.fullmatch(lines[0]) if lines else None
     if first is None:
         return Work()
-    running, body = _is_locked(log), lines[1:]
+    child = _started.get(log)
+    if child is not None:
+        child.poll()  # else a process that has ended stays in the table
+    import fcntl
+
+    running, body = False, lines[1:]
+    try:
+        with log.open("rb") as stream:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        running = True
+    except OSError:
+        pass
     last = _LAST.fullmatch(body[-1]) if body else None
     marks = [line for line in body if line in (_PAUSED, _GOES_ON)]
     shown = tuple(line for line in body if line not in (_PAUSED, _GOES_ON) and not _LAST.fullmatch(line))
@@ -97,11 +100,7 @@ def work_of(log: Path) -> Work:
 
 
 def seconds_taken(log: Path) -> float | None:
-    """Wall time of a command that has succeeded, s; None where it has not, or was paused.
-
-    Args:
-        log: of the command.
-    """
+    """Wall time of a command that has succeeded, s; None where it has not, or was paused."""
     work = work_of(log)
     if work.status != 0 or _PAUSED in log.read_text("utf-8", "replace").splitlines():
         return None
@@ -109,11 +108,7 @@ def seconds_taken(log: Path) -> float | None:
 
 
 def start(words: Sequence[str], log: Path) -> None:
-    """Start a command, unless it is running.
-
-    Args:
-        words: after ``tunnel``.
-        log: where it prints; replaced.
+    """Start a command of ``tunnel`` that prints into a log.
 
     Raises:
         TunnelError: when the command is running already.
@@ -128,9 +123,8 @@ def start(words: Sequence[str], log: Path) -> None:
     while not work_of(log).command and _started[log].poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     if not work_of(log).command:
-        raise TunnelError(
-            "could not be started", where=words[0], remedy="start it in a terminal, which says why"
-        )
+        remedy = "start it in a terminal, which says why"
+        raise TunnelError("could not be started", where=words[0], remedy=remedy)
 
 
 def pause(log: Path) -> None:
@@ -169,28 +163,11 @@ def _send(log: Path, name: str, mark: str = "") -> None:
     os.killpg(work.process, getattr(signal, name))  # the lock is held, so the number is still its own
 
 
-def _is_locked(log: Path) -> bool:
-    child = _started.get(log)
-    if child is not None:
-        child.poll()  # else a process that has ended stays in the table
-    import fcntl
-
-    try:
-        with log.open("rb") as stream:
-            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        pass
-    return False
-
-
 async def closure(campaign: Path, state: State, effects: Sequence[str], *, converged: bool) -> Closure:
     """How far the gap closes with effects chosen by hand.
 
     Args:
-        campaign: its folder.
-        state: of its files; fits of another state are not used.
+        state: of the campaign's files; fits of another state are not used.
         converged: whether the fit frees their forms and goes on until it has converged.
 
     Raises:
@@ -202,18 +179,8 @@ async def closure(campaign: Path, state: State, effects: Sequence[str], *, conve
 async def next_run(
     campaign: Path, state: State, first: Sequence[str], second: Sequence[str]
 ) -> dict[str, Any] | None:
-    """The run that would distinguish two sets of effects; None in normalised form.
-
-    Args:
-        campaign: its folder.
-        state: of its files.
-        first: names of effects.
-        second: names of their rivals.
-
-    Raises:
-        TunnelError: as `closure`.
-    """
-    answers = (tuple(sorted(first)), tuple(sorted(second)))
+    """The run that would distinguish two sets of effects; None in normalised form; errors as of `closure`."""
+    answers = tuple(sorted(first)), tuple(sorted(second))
     return await _in_fitter(_next_run, campaign, state, *answers)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -103,28 +102,18 @@ def sessions(folder: Path) -> list[Session]:
 def open_session(folder: Path, name: str) -> Session:
     """A session by the name in an address.
 
-    Args:
-        name: as the address has it.
-
     Raises:
         TunnelError: when there is no such session.
     """
     by_name = {session.name: session for session in sessions(folder)}
     if name not in by_name:
-        raise TunnelError(
-            f"there is no campaign '{one_line(name, 60)}'",
-            where=str(folder),
-            remedy="choose one on the first page",
-        )
+        what, remedy = f"there is no campaign '{one_line(name, 60)}'", "choose one on the first page"
+        raise TunnelError(what, where=str(folder), remedy=remedy)
     return by_name[name]
 
 
 def new_session(folder: Path, file_name: str) -> Session:
-    """A session for dropped files, with a name that nothing in the workspace has.
-
-    Args:
-        file_name: of the first file.
-    """
+    """A session for dropped files, named after the first, with a name that nothing in the workspace has."""
     stem = safe_name(Path(safe_name(file_name)).stem)
     taken = {path.name.split(".")[0].lower() for path in folder.iterdir()}
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
@@ -134,12 +123,8 @@ def new_session(folder: Path, file_name: str) -> Session:
 def safe_name(text: str) -> str:
     """A name that is a plain file of its folder on every system, whatever a browser sends.
 
-    Args:
-        text: a file name, or anything else.
-
-    Returns:
-        Letters, digits, ``_``, ``-``, ``+`` and single dots, at most 85 of them; never empty, hidden or a device.
-        A safe name stays as it is.
+    It has letters, digits, ``_``, ``-``, ``+`` and single dots, at most 85 of them; it is never empty, hidden or a
+    device. A safe name stays as it is.
     """
     last = re.split(r"[/\\]", unicodedata.normalize("NFKC", text))[-1]
     plain = re.sub(r"[^\w.+-]+", "_", last)
@@ -153,13 +138,7 @@ def safe_name(text: str) -> str:
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage.
-
-    Args:
-        key: in addresses.
-        title: of the page.
-        builder: module of this package and its function that builds the page.
-    """
+    """A stage: its key in addresses, the title of its page, and what builds the page, in a module of this room."""
 
     key: str
     title: str
@@ -167,43 +146,27 @@ class Stage:
 
 
 STAGES = (
-    Stage("records", "Records", "records.build"),
-    Stage("conditions", "Conditions", "conditions.build"),
-    Stage("identify", "Identify", "identify.build"),
-    Stage("diagnose", "Diagnose", "diagnosis.build_diagnose"),
+    Stage("records", "Records", "records.RecordsPage"),
+    Stage("conditions", "Conditions", "conditions.ConditionsPage"),
+    Stage("identify", "Identify", "identify.IdentifyPage"),
+    Stage("diagnose", "Diagnose", "diagnosis.DiagnosePage"),
     Stage("next-run", "Next run", "diagnosis.build_next_run"),
-    Stage("report", "Report", "report.build_report"),
+    Stage("report", "Report", "diagnosis.ReportPage"),
 )
 
 
 def closed(session: Session, key: str) -> str:
-    """Why a stage cannot be opened.
-
-    Returns:
-        What to do first, in one line; empty where the stage is open.
-    """
+    """Why a stage cannot be opened: what to do first, in one line; empty where the stage is open."""
     place = [stage.key for stage in STAGES].index(key)
-    checks: tuple[Callable[[Session], str], ...] = (
-        lambda session: "" if session.imported else "Write the campaign on the page Records first.",
-        lambda session: "Correct the conditions that are marked first." if session.draft.is_file() else "",
-        _identified,
-        _diagnosed,
-        lambda _: "",
-    )
-    return next((why for check in checks[:place] if (why := check(session))), "")
-
-
-def _identified(session: Session) -> str:
-    document = read_result(session.estimate(ESTIMATOR))
-    if document is None or not is_current(session, session.estimate(ESTIMATOR)):
+    if place > 0 and not session.imported:
+        return "Write the campaign on the page Records first."
+    if place > 1 and session.draft.is_file():
+        return "Correct the conditions that are marked first."
+    if place > 2 and not is_current(session, session.estimate(ESTIMATOR)):
         return f"Identify the campaign with {ESTIMATOR} first."
-    if work_of(session.log(ESTIMATOR)).status == 1:
+    if place > 2 and work_of(session.log(ESTIMATOR)).status == 1:
         return "The campaign could not be identified; the page Identify says why."
-    return ""
-
-
-def _diagnosed(session: Session) -> str:
-    if read_result(session.diagnosis) is None or not is_current(session, session.diagnosis):
+    if place > 3 and not is_current(session, session.diagnosis):
         return "Diagnose the campaign first."
     return ""
 
@@ -220,11 +183,10 @@ def is_current(session: Session, result: Path) -> bool:
 
 
 @lru_cache(maxsize=16)
-def _hashes(session: Session, state: object) -> dict[str, str]:
-    """SHA-256 of the campaign's files; they are read again only when ``state`` has changed."""
+def _hashes(session: Session, _: object) -> dict[str, str]:
+    """SHA-256 of the campaign's files; they are read again only when their state has changed."""
     from tunnel_lab.terminal.inputs import file_hashes
 
-    del state
     return file_hashes(session.campaign)
 
 

@@ -69,7 +69,7 @@ def plot(
     from tunnel_lab.plotting import runs as figures
     from tunnel_lab.plotting.style import save_both
     from tunnel_lab.report.diagnosis_file import read_document
-    from tunnel_lab.report.fit import fit_pages
+    from tunnel_lab.report.where import fit_pages
     from tunnel_sim.files.writing import output_folder
 
     failure = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from identification.campaign.belief import information_gain
 from identification.estimate import PARAMETERS
 from identification.printing import SYMBOLS
-from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor
+from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor, refusal
 from tunnel_lab.envs.session import (
     LARGE,
     CampaignSession,
@@ -32,10 +32,6 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-
 Observation = dict[str, Array]
 WIDTH, HEIGHT = 960, 480
 _DPI = 100
@@ -44,16 +40,13 @@ _DPI = 100
 class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
     """Choose the runs of a campaign; the reward is the information gained minus the cost.
 
-    Arguments that are None take the preset's value (`tunnel_lab.envs.menu`).
+    Arguments that are None take the preset's value (`tunnel_lab.envs.menu`); docs/reference/envs/campaign.md has a
+    table of all.
 
     Args:
         preset: ``identification`` or ``diagnosis``.
         simulation: ``linear``: runs by the closed form of the linear model, their estimate to first order in the
             noise; ``full``: runs in MuJoCo, estimated by a fit. None: ``full`` for a diagnosis, else ``linear``.
-        springs: numbers of the available springs in the rig's table.
-        wind_speeds: m/s; 0 is wind-off.
-        release_angles_deg: degrees.
-        durations: s.
         noise_std: of the sensor, rad.
         sample_rate: of the sensor, Hz.
         severities: the effects that the diagnosis considers, each with the range its severity is drawn from, in
@@ -61,10 +54,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
         probability: of one effect (a probability) at which a diagnosis ends.
         seconds_per_nat: rig time that a nat is worth, s.
-        max_runs: number of runs after which the episode is truncated.
         rig: path of a rig description; None takes the packaged rig.
-        expose_truth: put the truth into ``info``; it is never in the observation.
-        render_mode: None, ``human`` (a line for each run in the terminal) or ``rgb_array`` (a figure).
 
     Raises:
         TunnelError: when an argument is out of range or a name is unknown.
@@ -94,16 +84,25 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         render_mode: str | None = None,
     ) -> None:
         if preset not in PRESETS:
-            raise TunnelError(
-                f"unknown preset {preset!r}", where="Campaign-v0", remedy=did_you_mean(preset, PRESETS)
-            )
+            raise refusal(f"unknown preset {preset!r}", did_you_mean(preset, PRESETS))
         base = PRESETS[preset]
         self.severities = _checked_severities(base, severities)
+        if simulation not in (None, "linear", "full"):
+            raise refusal(f"unknown simulation {simulation!r}", "give 'linear' or 'full'")
+        if simulation == "linear" and self.severities:
+            raise refusal("a diagnosis needs the full simulation", "leave simulation out")
         runs = base.max_runs if max_runs is None else max_runs
         loaded = load_rig(None if rig is None else Path(rig))
-        goals = {"cn_beta target": targets[0], "cn_r target": targets[1], "max_runs": runs}
-        _check_positive(**goals, seconds_per_nat=seconds_per_nat)
-        _check_positive(probability=probability, most=1.0)
+        for name, value, most in (
+            ("cn_beta target", targets[0], np.inf),
+            ("cn_r target", targets[1], np.inf),
+            ("max_runs", runs, np.inf),
+            ("seconds_per_nat", seconds_per_nat, np.inf),
+            ("probability", probability, 1.0),
+        ):
+            if isinstance(value, bool) or not 0.0 < value <= most:
+                bound = "above 0" if most == np.inf else f"above 0 and at most {most:g}"
+                raise refusal(f"{name} = {value!r} must be {bound}", "correct it")
         self.conditions = Conditions(
             rig=loaded,
             sensor=preset_sensor(base, noise_std, sample_rate),
@@ -116,7 +115,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             ),
             costs=Costs() if costs is None else costs,
             effects=tuple(self.severities),
-            linear=_is_linear(simulation, bool(self.severities)),
+            linear=not self.severities and simulation != "full",
         )
         self.targets = (float(targets[0]), float(targets[1]))
         self.probability = float(probability)
@@ -124,8 +123,21 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         self.max_runs = int(runs)
         self.expose_truth = expose_truth
         self.render_mode = render_mode
-        self.action_space = spaces.MultiDiscrete(list(self.conditions.menu.shape))
-        self.observation_space = _observation_space(self.conditions, self.max_runs)
+        menu, costs = self.conditions.menu, self.conditions.costs
+        self.action_space = spaces.MultiDiscrete(list(menu.shape))
+        stiffest = max(stiffness for _, stiffness in menu.springs)
+        highest = [stiffest, max(menu.wind_speeds), max(menu.release_angles), max(menu.durations)]
+        longest = costs.setup + costs.spring_change + costs.speed_change + highest[3]
+        most_progress = np.array([self.max_runs, self.max_runs * longest])
+        parts: dict[str, spaces.Space[Any]] = {
+            "estimate": spaces.Box(-LARGE, LARGE, (4,), np.float64),
+            "covariance": spaces.Box(-LARGE, LARGE, (16,), np.float64),
+            "last_run": spaces.Box(np.zeros(4), np.array(highest), dtype=np.float64),
+            "progress": spaces.Box(np.zeros(2), most_progress, dtype=np.float64),
+        }
+        if self.severities:
+            parts["probabilities"] = spaces.Box(0.0, 1.0, (len(self.severities) + 3,), np.float64)
+        self.observation_space = cast("spaces.Space[Observation]", spaces.Dict(parts))
         self.known: Knowledge = first_knowledge(self.conditions)
         self._session: CampaignSession | None = None
         self._total_gain = 0.0
@@ -161,10 +173,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         return self.known.observation(), self._info(0.0)
 
     def step(self, action: Iterable[int]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Make a run.
-
-        Args:
-            action: indices of spring, wind speed, release angle and duration in the menu.
+        """Make a run: indices of spring, wind speed, release angle and duration in the menu.
 
         Returns:
             Observation, reward (information gained, nats, less rig time over ``seconds_per_nat``), whether the
@@ -174,10 +183,13 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             TunnelError: when the action is not in the menu, or there was no reset.
         """
         if self._session is None:
-            raise TunnelError("there is no episode", where="Campaign-v0", remedy="call reset() first")
+            raise refusal("there is no episode", "call reset() first")
         before = self.known
         self.known = self._session.perform(before, self.conditions.menu.choice(action))
-        gain = self._gain(before)
+        if self.conditions.effects:
+            gain = diagnostic_information(self.known) - diagnostic_information(before)
+        else:
+            gain = information_gain(before.belief, self.known.belief)
         self._total_gain += gain
         reward = gain - self.known.costs[-1] / self.seconds_per_nat
         done = reached(self.known, self.targets, self.probability)
@@ -190,11 +202,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         return self.known.observation(), float(reward), done, truncated, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The last run and the progress of the campaign.
-
-        Returns:
-            For ``rgb_array`` an image of shape (480, 960, 3); None otherwise: ``human`` prints a line.
-        """
+        """Print the last run and the estimate, or return `picture`, as the ``render_mode`` says."""
         if self.render_mode == "human":
             print(line_of(self.known), flush=True)
         elif self.render_mode == "rgb_array":
@@ -204,11 +212,6 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
                 "render() without a render_mode: give render_mode='rgb_array' or 'human' to make()"
             )
         return None
-
-    def _gain(self, before: Knowledge) -> float:
-        if self.conditions.effects:
-            return diagnostic_information(self.known) - diagnostic_information(before)
-        return information_gain(before.belief, self.known.belief)
 
     def _info(self, gain: float) -> dict[str, Any]:
         known = self.known
@@ -228,6 +231,22 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         return info
 
 
+def _checked_severities(
+    preset: Preset, given: Mapping[str, tuple[float, float]] | None
+) -> dict[str, tuple[float, float]]:
+    if given is not None and not (preset.severities and given):
+        remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
+        raise refusal("severities are for the diagnosis preset only", remedy)
+    ranges = {}
+    for name, (low, high) in (preset.severities if given is None else given).items():
+        severity = effect_class(name).parameters()[0]
+        if not 0.0 < low <= high < np.inf:
+            remedy = f"give the range of {severity.name} in {severity.unit}"
+            raise refusal(f"{name}: ({low!r}, {high!r}) is not a range above 0", remedy)
+        ranges[name] = (float(low), float(high))
+    return ranges
+
+
 def reached(known: Knowledge, targets: tuple[float, float], probability: float) -> bool:
     """Whether a campaign has reached its goal.
 
@@ -241,63 +260,6 @@ def reached(known: Knowledge, targets: tuple[float, float], probability: float) 
         return bool(probabilities(known)[1:-2].max() >= probability)
     belief = known.belief
     return belief.relative_std("cn_beta") <= targets[0] and belief.relative_std("cn_r") <= targets[1]
-
-
-def _is_linear(simulation: str | None, diagnoses: bool) -> bool:
-    """Whether runs come from linear theory."""
-    if simulation not in (None, "linear", "full"):
-        raise TunnelError(
-            f"unknown simulation {simulation!r}", where="Campaign-v0", remedy="give 'linear' or 'full'"
-        )
-    if simulation == "linear" and diagnoses:
-        raise TunnelError(
-            "a diagnosis needs the full simulation", where="Campaign-v0", remedy="leave simulation out"
-        )
-    return simulation == "linear" or (simulation is None and not diagnoses)
-
-
-def _observation_space(conditions: Conditions, max_runs: int) -> spaces.Space[Observation]:
-    menu = conditions.menu
-    stiffest = max(stiffness for _, stiffness in menu.springs)
-    highest = [stiffest, max(menu.wind_speeds), max(menu.release_angles), max(menu.durations)]
-    longest = conditions.costs.setup + conditions.costs.spring_change + conditions.costs.speed_change
-    parts: dict[str, spaces.Space[Any]] = {
-        "estimate": spaces.Box(-LARGE, LARGE, (4,), np.float64),
-        "covariance": spaces.Box(-LARGE, LARGE, (16,), np.float64),
-        "last_run": spaces.Box(np.zeros(4), np.array(highest), dtype=np.float64),
-        "progress": spaces.Box(
-            np.zeros(2), np.array([max_runs, max_runs * (longest + highest[3])]), dtype=np.float64
-        ),
-    }
-    if conditions.effects:
-        parts["probabilities"] = spaces.Box(0.0, 1.0, (len(conditions.effects) + 3,), np.float64)
-    return cast("spaces.Space[Observation]", spaces.Dict(parts))
-
-
-def _checked_severities(
-    preset: Preset, given: Mapping[str, tuple[float, float]] | None
-) -> dict[str, tuple[float, float]]:
-    where = "Campaign-v0"
-    if given is None:
-        return dict(preset.severities)
-    if not preset.severities or not given:
-        remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
-        raise TunnelError("severities are for the diagnosis preset only", where=where, remedy=remedy)
-    for name, (low, high) in given.items():
-        severity = effect_class(name).parameters()[0]
-        if not 0.0 < low <= high < np.inf:
-            remedy = f"give the range of {severity.name} in {severity.unit}"
-            raise TunnelError(
-                f"{name}: ({low!r}, {high!r}) is not a range above 0", where=where, remedy=remedy
-            )
-    return {name: (float(low), float(high)) for name, (low, high) in given.items()}
-
-
-def _check_positive(*, most: float = np.inf, **values: float) -> None:
-    for name, value in values.items():
-        if isinstance(value, bool) or not 0.0 < value <= most:
-            bound = "above 0" if most == np.inf else f"above 0 and at most {most:g}"
-            raise TunnelError(f"{name} = {value!r} must be {bound}", where="Campaign-v0", remedy="correct it")
 
 
 def line_of(known: Knowledge) -> str:
@@ -318,62 +280,43 @@ def line_of(known: Knowledge) -> str:
 
 
 def picture(known: Knowledge, targets: tuple[float, float], probability: float) -> NDArray[np.uint8]:
-    """The last record beside the standard deviations, or the probabilities, so far.
+    """The last record beside the standard deviations, or the probabilities, so far; RGB, shape (480, 960, 3).
 
     Args:
         targets: relative standard deviations of Cnβ and Cnr, fractions.
         probability: that ends a diagnosis (a probability).
-
-    Returns:
-        RGB, shape (480, 960, 3).
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from tunnel_lab.plotting.runs import WIND_OFF, WIND_ON
     from tunnel_lab.plotting.style import COLOURS
 
     figure = Figure(figsize=(WIDTH / _DPI, HEIGHT / _DPI), dpi=_DPI, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)  # matplotlib types it in parts only
-    angles, bars = figure.subplots(1, 2)
-    _draw_record(angles, known)
+    angles, right = figure.subplots(1, 2)
+    angles.set(xlabel="time [s]", ylabel="angle β [rad]")
+    if known.last is None or not known.runs:
+        angles.set_title("no run yet", fontsize=10)
+    else:
+        run = known.runs[-1]
+        colour = WIND_ON if run.wind_on else WIND_OFF
+        angles.plot(run.record.time_s, run.record.yaw_rad, ".", markersize=2, color=colour)
+        angles.set_title(f"run {len(known.choices)}: {known.last.words}", fontsize=10)
     if known.conditions.effects:
         names = [name.replace("_", "\n") for name in answers(known.conditions.effects)]
-        bars.bar(names, probabilities(known), color=COLOURS[0])
-        bars.axhline(probability, color=COLOURS[1], linestyle="--", linewidth=1)
-        bars.set_ylim(0.0, 1.0)
-        bars.set_ylabel("probability")
-        bars.tick_params(axis="x", labelsize=7)
-        bars.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
+        right.bar(names, probabilities(known), color=COLOURS[0])
+        right.axhline(probability, color=COLOURS[1], linestyle="--", linewidth=1)
+        right.set(ylim=(0.0, 1.0), ylabel="probability")
+        right.tick_params(axis="x", labelsize=7)
     else:
-        _draw_spread(bars, known, targets)
+        for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
+            spread = [100.0 * belief.relative_std(name) for belief in known.beliefs]
+            right.semilogy(range(len(spread)), spread, "o-", color=COLOURS[place], label=SYMBOLS[name])
+            right.axhline(100.0 * target, color=COLOURS[place], linestyle="--", linewidth=1)
+        right.set(xlabel="informative runs", ylabel="standard deviation [%]")
+        right.set_xticks(range(0, len(known.beliefs), 1 + len(known.beliefs) // 10))
+        right.legend(loc="upper right")
+    right.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)
     canvas.draw()
     return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3], dtype=np.uint8)
-
-
-def _draw_record(axes: Axes, known: Knowledge) -> None:
-    from tunnel_lab.plotting.runs import WIND_OFF, WIND_ON
-
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("angle β [rad]")
-    if known.last is None or not known.runs:
-        axes.set_title("no run yet", fontsize=10)
-        return
-    run = known.runs[-1]
-    colour = WIND_ON if run.wind_on else WIND_OFF
-    axes.plot(run.record.time_s, run.record.yaw_rad, ".", markersize=2, color=colour)
-    axes.set_title(f"run {len(known.choices)}: {known.last.words}", fontsize=10)
-
-
-def _draw_spread(axes: Axes, known: Knowledge, targets: tuple[float, float]) -> None:
-    from tunnel_lab.plotting.style import COLOURS
-
-    history = known.beliefs
-    for place, (name, target) in enumerate(zip(("cn_beta", "cn_r"), targets, strict=True)):
-        spread = [100.0 * belief.relative_std(name) for belief in history]
-        axes.semilogy(range(len(spread)), spread, "o-", color=COLOURS[place], label=SYMBOLS[name])
-        axes.axhline(100.0 * target, color=COLOURS[place], linestyle="--", linewidth=1)
-    axes.set_xlabel("informative runs")
-    axes.set_ylabel("standard deviation [%]")
-    axes.set_xticks(range(0, len(history), 1 + len(history) // 10))
-    axes.legend(loc="upper right")
-    axes.set_title(f"{known.rig_time / 60.0:.0f} min of rig time; dashed: the goal", fontsize=10)

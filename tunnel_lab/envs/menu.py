@@ -8,14 +8,17 @@ from dataclasses import dataclass, field
 from importlib import resources
 from itertools import product
 from math import degrees, isfinite, radians
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import Condition, SensorModel
 from tunnel_sim.vocabulary.rig import Rig
+
+
+def refusal(what: str, remedy: str) -> TunnelError:
+    """The error of an argument or an action of the environment."""
+    return TunnelError(what, where="Campaign-v0", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -75,10 +78,7 @@ class Menu:
         return len(self.springs), len(self.wind_speeds), len(self.release_angles), len(self.durations)
 
     def choice(self, action: Iterable[int]) -> Choice:
-        """The run that an action stands for.
-
-        Args:
-            action: indices of spring, speed, angle and duration.
+        """The run that an action stands for: indices of spring, speed, angle and duration.
 
         Raises:
             TunnelError: when it is not four indices within the menu.
@@ -86,12 +86,10 @@ class Menu:
         remedy = f"give four whole numbers from 0 to below {', '.join(map(str, self.shape))}"
         numbers = np.asarray(action)
         if numbers.shape != (4,) or not np.issubdtype(numbers.dtype, np.integer):
-            raise TunnelError(f"{action!r} is not an action", where="Campaign-v0", remedy=remedy)
-        spring, speed, angle, duration = (int(i) for i in numbers)
-        if not all(0 <= i < n for i, n in zip((spring, speed, angle, duration), self.shape, strict=True)):
-            raise TunnelError(
-                f"action {numbers.tolist()} is outside the menu", where="Campaign-v0", remedy=remedy
-            )
+            raise refusal(f"{action!r} is not an action", remedy)
+        if np.any(numbers < 0) or np.any(numbers >= self.shape):
+            raise refusal(f"action {numbers.tolist()} is outside the menu", remedy)
+        spring, speed, angle, duration = numbers.tolist()
         number, stiffness = self.springs[spring]
         return Choice(
             number, stiffness, self.wind_speeds[speed], self.release_angles[angle], self.durations[duration]
@@ -99,8 +97,8 @@ class Menu:
 
     def actions(self) -> Iterator[tuple[int, int, int, int]]:
         """Every action, durations fastest, springs slowest."""
-        springs, speeds, angles, durations = (range(n) for n in self.shape)
-        return product(springs, speeds, angles, durations)
+        springs, speeds, angles, durations = self.shape
+        return product(range(springs), range(speeds), range(angles), range(durations))
 
 
 def make_menu(
@@ -110,25 +108,17 @@ def make_menu(
     release_angles_deg: Sequence[float],
     durations: Sequence[float],
 ) -> Menu:
-    """Check and convert the arguments of an environment.
-
-    Args:
-        rig: the rig whose springs the numbers refer to.
-        springs: numbers of the rig's springs.
-        wind_speeds: m/s, 0 or more.
-        release_angles_deg: degrees, above 0.
-        durations: s, above 0.
+    """Check and convert the arguments of an environment: springs by number, m/s, degrees and s.
 
     Raises:
         TunnelError: when a list is empty, repeats itself, or holds a value that the rig does not allow.
     """
-    lists = {
-        "springs": springs,
-        "wind_speeds": wind_speeds,
-        "release_angles_deg": release_angles_deg,
-        "durations": durations,
-    }
-    for name, values in lists.items():
+    for name, values in (
+        ("springs", springs),
+        ("wind_speeds", wind_speeds),
+        ("release_angles_deg", release_angles_deg),
+        ("durations", durations),
+    ):
         least = 0.0 if name == "wind_speeds" else np.nextafter(0.0, 1.0)
         if len(values) == 0 or len(set(values)) != len(values):
             raise TunnelError(
@@ -161,14 +151,7 @@ class Costs:
     speed_change: float = 60.0
 
     def of(self, choice: Choice, last: Choice | None) -> float:
-        """Rig time of a run.
-
-        Args:
-            last: the run before it; None for the first run, which needs a change of spring and speed.
-
-        Returns:
-            s.
-        """
+        """Rig time of a run after another, s; the first run (None) needs a change of spring and speed."""
         spring = last is None or choice.spring != last.spring
         speed = last is None or choice.wind_speed != last.wind_speed
         return self.setup + choice.duration + spring * self.spring_change + speed * self.speed_change
@@ -176,51 +159,35 @@ class Costs:
 
 @dataclass(frozen=True)
 class Preset:
-    """Default values of the arguments.
+    """Default values of the arguments of `CampaignEnv`.
 
     Args:
-        springs: numbers of the rig's table.
         wind_speeds: m/s.
-        release_angles_deg: degrees.
         durations: s.
         noise_std: rad.
         sample_rate: Hz.
-        max_runs: number of runs after which an episode is truncated.
-        severities: the vocabulary: each effect with the range its severity is drawn from, in its unit; empty:
-            none.
     """
 
-    springs: tuple[int, ...]
-    wind_speeds: tuple[float, ...]
-    release_angles_deg: tuple[float, ...]
-    durations: tuple[float, ...]
+    springs: Sequence[int]
+    wind_speeds: Sequence[float]
+    release_angles_deg: Sequence[float]
+    durations: Sequence[float]
     noise_std: float
     sample_rate: float
     max_runs: int
-    severities: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    severities: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
 
-def _load() -> dict[str, Preset]:
-    text = (resources.files("tunnel_lab") / "data" / "campaign-presets.toml").read_text(encoding="utf-8")
-    return {name: _preset(values) for name, values in tomllib.loads(text).items()}
-
-
-def _preset(values: Mapping[str, Any]) -> Preset:
-    severities = {name: (low, high) for name, (low, high) in values.get("severities", {}).items()}
-    plain = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
-    return Preset(**(plain | {"severities": MappingProxyType(severities)}))
-
-
-PRESETS = _load()
+_FILE = resources.files("tunnel_lab") / "data" / "campaign-presets.toml"
+PRESETS = {name: Preset(**table) for name, table in tomllib.loads(_FILE.read_text("utf-8")).items()}
 
 
 def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | None) -> SensorModel:
-    """The preset's sensor with the given values; its reading is not quantised.
+    """The preset's sensor with the values that are not None; its reading is not quantised.
 
     Args:
-        preset: one of `PRESETS`.
-        noise_std: rad; None takes the preset's.
-        sample_rate: Hz; None takes the preset's.
+        noise_std: rad.
+        sample_rate: Hz.
 
     Raises:
         TunnelError: when a number is not positive, or the rate does not divide the rig's 1000 steps per second.
@@ -229,13 +196,8 @@ def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | 
     rate = preset.sample_rate if sample_rate is None else sample_rate
     for name, value, unit in (("noise_std", noise, "rad"), ("sample_rate", rate, "Hz")):
         if isinstance(value, bool) or not (isfinite(value) and value > 0.0):
-            raise TunnelError(
-                f"{name} = {value!r} must be above 0", where="Campaign-v0", remedy=f"give it in {unit}"
-            )
+            raise refusal(f"{name} = {value!r} must be above 0", f"give it in {unit}")
     if rate > 1000.0 or abs(1000.0 / rate - round(1000.0 / rate)) > 1e-9:
-        raise TunnelError(
-            f"sample_rate = {rate:g} Hz does not divide the rig's 1000 steps per second",
-            where="Campaign-v0",
-            remedy="give 1000, 500, 250, 200, 125, 100 Hz or another divisor of 1000 Hz",
-        )
+        what = f"sample_rate = {rate:g} Hz does not divide the rig's 1000 steps per second"
+        raise refusal(what, "give 1000, 500, 250, 200, 125, 100 Hz or another divisor of 1000 Hz")
     return SensorModel(sample_rate=float(rate), noise_std=float(noise), resolution=0.0)

@@ -19,9 +19,8 @@ import numpy as np
 from diagnosis.answer.next_run import planned_run, separation
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.search.investigate import Study
-from diagnosis.search.weigh import Weighed
 from identification.campaign.belief import expected_belief, information_gain
-from tunnel_lab.envs.menu import Choice, Menu
+from tunnel_lab.envs.menu import Choice, Menu, refusal
 from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -39,9 +38,6 @@ def scripted(known: Knowledge) -> Action:
     """A rig engineer's plan: every spring in turn, first with the wind off and then at each speed.
 
     Every run has the largest release and the longest record. After its last run the plan starts again.
-
-    Args:
-        known: the number of runs so far.
     """
     springs, speeds, _, _ = known.conditions.menu.shape
     by_speed = np.argsort(known.conditions.menu.wind_speeds, kind="stable")
@@ -58,26 +54,25 @@ def greedy(known: Knowledge) -> Action:
     """The run with the largest expected information on (Cnβ, Cnr) per rig time.
 
     Over the whole menu, the expected information gain (exact Fisher information at the present estimate; Izz, Cr,
-    the sensor's zero and every release unknown) over the run's cost. Runs that might diverge are left out.
-
-    Returns:
-        The action; the scripted one where every run might diverge.
+    the sensor's zero and every release unknown) over the run's cost. Runs that might diverge are left out; where
+    every run might, it is the scripted run.
     """
+    return _best(known, lambda choice: expected_gain(known, choice))
+
+
+def _best(known: Knowledge, gain: Callable[[Choice], float]) -> Action:
+    """The action with the largest gain per rig time; the scripted one where none has any."""
     best, chosen = 0.0, None
     for action in known.conditions.menu.actions():
         choice = known.conditions.menu.choice(action)
-        value = expected_gain(known, choice) / known.cost(choice)
+        value = gain(choice) / known.cost(choice)
         if value > best:
             best, chosen = value, action
     return scripted(known) if chosen is None else chosen
 
 
 def expected_gain(known: Knowledge, choice: Choice) -> float:
-    """Information that a run is expected to add about (Cnβ, Cnr).
-
-    Returns:
-        nats; 0 where the run might diverge.
-    """
+    """Information that a run is expected to add about (Cnβ, Cnr), nats; 0 where the run might diverge."""
     conditions = known.conditions
     after = expected_belief(
         known.belief,
@@ -94,18 +89,14 @@ def separating(known: Knowledge) -> Action:
 
     Over the whole menu, half the squared separation of the two fitted models (the expected log-likelihood ratio,
     nats; see `diagnosis.answer.next_run.separation`) over the run's cost. If only one effect is named, its rival
-    is the nominal model.
-
-    Returns:
-        The action; the next one of the script while no gap is detected or no run had wind, because the fitted
-        models cannot then predict other runs.
+    is the nominal model. It is the scripted run while no gap is detected or no run had wind, because the fitted
+    models cannot then predict other runs.
     """
     rivals = None if known.study is None else best_rivals(known.study)
     if rivals is None or not rivals[0].problem.data.wind_on:
         return scripted(known)
-    best, chosen = 0.0, None
-    for action in known.conditions.menu.actions():
-        choice = known.conditions.menu.choice(action)
+
+    def gain(choice: Choice) -> float:
         run = planned_run(
             rivals[0],
             spring_stiffness=choice.spring_stiffness,
@@ -115,38 +106,26 @@ def separating(known: Knowledge) -> Action:
         )
         distance = separation(*rivals, run, choice.release_angle)
         apart = 0.0 if distance is None or not np.isfinite(distance) else distance
-        value = 0.5 * apart**2 / known.cost(choice)
-        if value > best:
-            best, chosen = value, action
-    return scripted(known) if chosen is None else chosen
+        return 0.5 * apart**2
+
+    return _best(known, gain)
 
 
 def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
     """The fits of the two most probable answers; the second is the nominal one where only one effect is fitted.
 
-    Returns:
-        None while no effect is fitted.
+    It is None while no effect is fitted.
     """
-    fits = [fit for answer in study.weighed if (fit := _fit_of(study, answer)) is not None]
+    fits = [found.fit for answer in study.weighed if (found := study.hypothesis(answer.effects)) is not None]
     if not fits:
         return None
     return (fits[0], fits[1]) if len(fits) > 1 else (fits[0], study.nominal)
 
 
-def _fit_of(study: Study, answer: Weighed) -> Fit | None:
-    hypothesis = study.hypothesis(answer.effects)
-    return None if hypothesis is None else hypothesis.fit
-
-
 def run_campaign(
     env: Any, policy: Policy, *, seed: int, options: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Play one episode.
-
-    Args:
-        env: a ``tunnel_sim/Campaign-v0``, wrapped or not.
-        seed: of truth and noise.
-        options: of the reset.
+    """Play one episode of a ``tunnel_sim/Campaign-v0``, wrapped or not.
 
     Returns:
         The last ``info``, whose ``campaign`` goes to `identify` and `diagnose`.
@@ -161,26 +140,16 @@ def run_campaign(
 
 
 def features(observation: Mapping[str, Array]) -> Array:
-    """The observation of the identification preset in numbers of order one to ten.
+    """The observation of the identification preset in numbers of order one to ten, shape (20,).
 
-    Args:
-        observation: of ``Campaign-v0``.
-
-    Returns:
-        Estimate [SI], ln of its four standard deviations, their six correlations, the last run [SI], runs made and
-        rig time [s]; shape (20,).
+    Estimate [SI], ln of its four standard deviations, their six correlations, the last run [SI], runs made and rig
+    time [s].
     """
     covariance = observation["covariance"].reshape(4, 4)
     std = np.sqrt(np.maximum(np.diag(covariance), _SMALLEST**2))
     correlations = (covariance / np.outer(std, std))[_PAIRS]
-    parts = (
-        observation["estimate"],
-        np.log(std),
-        correlations,
-        observation["last_run"],
-        observation["progress"],
-    )
-    return np.concatenate(parts)
+    runs = observation["last_run"], observation["progress"]
+    return np.concatenate((observation["estimate"], np.log(std), correlations, *runs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,24 +168,17 @@ class Agent:
     layers: tuple[tuple[Array, Array], ...]
     menu: str
 
-    def action(self, observation: Mapping[str, Array], menu: Menu) -> tuple[int, int, int, int]:
-        """The run that the agent chooses.
-
-        Args:
-            observation: of ``Campaign-v0``.
+    def action(self, observation: Mapping[str, Array], menu: Menu) -> Action:
+        """The run that the agent chooses after an observation.
 
         Raises:
             TunnelError: when the menu is not that of the training.
         """
         if menu_text(menu) != self.menu:
-            raise TunnelError(
-                "the agent was trained with another menu",
-                where="Campaign-v0",
-                remedy="use the menu of the identification preset, or train an agent with yours",
-            )
-        values = (features(observation) - self.mean) / np.sqrt(
-            self.variance + 1e-8
-        )  # as NormalizeObservation
+            remedy = "use the menu of the identification preset, or train an agent with yours"
+            raise refusal("the agent was trained with another menu", remedy)
+        spread = np.sqrt(self.variance + 1e-8)  # as NormalizeObservation
+        values = (features(observation) - self.mean) / spread
         for weight, bias in self.layers[:-1]:
             values = np.tanh(weight @ values + bias)
         weight, bias = self.layers[-1]
@@ -270,7 +232,7 @@ def packaged_agent() -> Agent:
         return read_agent(path)
 
 
-def trained(known: Knowledge) -> tuple[int, int, int, int]:
+def trained(known: Knowledge) -> Action:
     """The policy of the packaged agent; for the identification preset.
 
     Raises:
@@ -279,10 +241,5 @@ def trained(known: Knowledge) -> tuple[int, int, int, int]:
     return packaged_agent().action(known.observation(), known.conditions.menu)
 
 
-POLICIES: dict[str, Policy] = {
-    "scripted": scripted,
-    "greedy": greedy,
-    "separating": separating,
-    "trained": trained,
-}
+POLICIES: dict[str, Policy] = {one.__name__: one for one in (scripted, greedy, separating, trained)}
 """By name."""

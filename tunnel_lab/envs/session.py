@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import exp, isfinite, log
 from typing import Any
 
@@ -56,8 +56,7 @@ class Conditions:
     """The fixed conditions of all episodes of an environment.
 
     Args:
-        rig: geometry, springs, air.
-        sensor: noise, rate and resolution; its zero is not used, because each episode has its own.
+        sensor: its zero is not used, because each episode has its own.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
         linear: whether runs come from linear theory instead of MuJoCo and a fit; without effects only.
     """
@@ -102,11 +101,9 @@ class Knowledge:
     """The knowledge at a point of an episode, without the truth.
 
     Args:
-        conditions: rig, sensor, menu and costs.
         beliefs: before the first run and after each informative one.
         choices: the runs requested so far, including lost ones.
         costs: rig time of each, s.
-        runs: the runs made.
         fits: reading and fit of the runs that the belief uses, with their links; empty where ``linear``.
         learnt: what these runs give, where ``linear``.
         study: the last diagnosis; None before the first, or where there is no vocabulary.
@@ -146,8 +143,8 @@ class Knowledge:
     @property
     def campaign(self) -> Campaign:
         """The runs made, for `identify` and `diagnose`."""
-        conditions = self.conditions
-        return Campaign("campaign-v0", conditions.rig_properties, conditions.sensor_properties, self.runs)
+        rig, sensor = self.conditions.rig_properties, self.conditions.sensor_properties
+        return Campaign("campaign-v0", rig, sensor, self.runs)
 
     def cost(self, choice: Choice) -> float:
         """Cost of a further run, s."""
@@ -155,10 +152,8 @@ class Knowledge:
 
     def observation(self) -> dict[str, Array]:
         """What the environment shows of it; docs/reference/envs/campaign.md lists the keys."""
-        last = self.last
-        run = (0.0,) * 4 if last is None else (
-            last.spring_stiffness, last.wind_speed, last.release_angle, last.duration
-        )  # fmt: skip
+        last = self.last or Choice(0, 0.0, 0.0, 0.0, 0.0)
+        run = [last.spring_stiffness, last.wind_speed, last.release_angle, last.duration]
         observed = {
             "estimate": np.clip(self.belief.values, -LARGE, LARGE),
             "covariance": np.clip(self.belief.covariance.ravel(), -LARGE, LARGE),
@@ -190,38 +185,40 @@ class CampaignSession:
     def perform(self, known: Knowledge, choice: Choice) -> Knowledge:
         """Make a run and update the knowledge.
 
-        Args:
-            known: before the run.
-
-        Returns:
-            The knowledge after it. A run whose motion grows without bound is lost: it costs time without result.
+        A run whose motion grows without bound is lost: it costs time without result.
         """
-        known = replace(
-            known,
-            choices=(*known.choices, choice),
-            costs=(*known.costs, known.cost(choice)),
-            status="ok",
-        )
+        conditions, truth = self._conditions, self.truth
+        costs = (*known.costs, known.cost(choice))
+        known = replace(known, choices=(*known.choices, choice), costs=costs, status="ok")
         rng = self._rng.spawn(1)[0]
-        condition = choice.condition(f"r{len(known.choices):02d}", self._conditions.rig.air.density)
-        if self._conditions.linear:
+        condition = choice.condition(f"r{len(known.choices):02d}", conditions.rig.air.density)
+        if conditions.linear:
             return self._linear(known, choice, condition, rng)
+        settings = run_settings(truth.coefficients, condition)
+        sensor = replace(conditions.sensor, zero=truth.sensor_zero)
         try:
-            run = self._run(condition, rng)
+            record = simulate(conditions.rig, settings, sensor, rng, effects=truth.effects)
+            known = replace(known, runs=(*known.runs, stated_run(condition, record)))
         except TunnelError as error:
             return replace(known, status=f"lost: {error.what}")
-        known = _identified(replace(known, runs=(*known.runs, run)), choice)
-        return _diagnosed(known) if self._conditions.effects else known
-
-    def _run(self, condition: Condition, rng: np.random.Generator) -> Run:
-        record = simulate(
-            self._conditions.rig,
-            run_settings(self.truth.coefficients, condition),
-            replace(self._conditions.sensor, zero=self.truth.sensor_zero),
-            rng,
-            effects=self.truth.effects,
-        )
-        return stated_run(condition, record)
+        fitted = identify_run(known.runs[-1], conditions.sensor_properties)
+        if fitted.fit is None:
+            known = replace(known, status=f"no information: {fitted.estimate.status.value.partition(':')[0]}")
+        else:
+            fits = (*known.fits, (conditions.link(choice), fitted.reading, fitted.fit))
+            links, pairs = [link for link, _, _ in fits], [(reading, fit) for _, reading, fit in fits]
+            try:
+                belief = update_belief(known.prior, links, pairs, conditions.noise_std)
+                known = replace(known, fits=fits, beliefs=(*known.beliefs, belief))
+            except ValueError as error:
+                known = replace(known, status=f"no information: {error}")
+        if not conditions.effects:
+            return known
+        try:
+            kinds = [effect_class(name) for name in conditions.effects]
+            return replace(known, study=investigate(known.campaign, kinds))
+        except TunnelError as error:
+            return replace(known, status=f"not diagnosed: {error.what}")
 
     def _linear(
         self, known: Knowledge, choice: Choice, condition: Condition, rng: np.random.Generator
@@ -244,46 +241,15 @@ class CampaignSession:
         return replace(known, learnt=runs, beliefs=(*known.beliefs, belief))
 
 
-def _identified(known: Knowledge, choice: Choice) -> Knowledge:
-    """Update the belief with the last run."""
-    conditions = known.conditions
-    fitted = identify_run(known.runs[-1], conditions.sensor_properties)
-    if fitted.fit is None:
-        reason = fitted.estimate.status.value.partition(":")[0]
-        return replace(known, status=f"no information: {reason}")
-    fits = (*known.fits, (conditions.link(choice), fitted.reading, fitted.fit))
-    links, pairs = [link for link, _, _ in fits], [(reading, fit) for _, reading, fit in fits]
-    try:
-        belief = update_belief(known.prior, links, pairs, conditions.noise_std)
-    except ValueError as error:
-        return replace(known, status=f"no information: {error}")
-    return replace(known, fits=fits, beliefs=(*known.beliefs, belief))
-
-
-def _diagnosed(known: Knowledge) -> Knowledge:
-    """Diagnose all runs so far."""
-    kinds = [effect_class(name) for name in known.conditions.effects]
-    try:
-        return replace(known, study=investigate(known.campaign, kinds))
-    except TunnelError as error:
-        return replace(known, status=f"not diagnosed: {error.what}")
-
-
 def answers(effects: Sequence[str]) -> tuple[str, ...]:
-    """The answers that a diagnosis gives probabilities for, in order.
-
-    Returns:
-        ``none``, each effect alone, ``several`` (two at once), ``unknown``.
-    """
+    """The answers that have a probability: ``none``, each effect alone, ``several`` (two at once), ``unknown``."""
     return ("none", *effects, "several", "unknown")
 
 
 def probabilities(known: Knowledge) -> Array:
-    """The diagnosis' probabilities of `answers`.
+    """The diagnosis' probabilities of `answers`, shape (effects + 3,).
 
-    Returns:
-        Shape (effects + 3,), summing to 1. They are equal before the first diagnosis. While no gap is detected,
-        ``none`` has all but the false-alarm rate.
+    They are equal before the first diagnosis; while no gap is detected, ``none`` has all but the false-alarm rate.
     """
     names = answers(known.conditions.effects)
     shares = np.zeros(len(names))
@@ -301,8 +267,7 @@ def probabilities(known: Knowledge) -> Array:
 def diagnostic_information(known: Knowledge) -> float:
     """ln(answers) minus the entropy of the probabilities, nats.
 
-    Returns:
-        0 while no gap is detected: its absence does not show which effect acts.
+    It is 0 while no gap is detected: its absence does not show which effect acts.
     """
     if known.study is None or not known.study.weighed:
         return 0.0
@@ -316,12 +281,11 @@ class RigTruth:
     """The truth of an episode, which no observation contains.
 
     Args:
-        effects: those added to it.
         sensor_zero: rad.
     """
 
     coefficients: Truth
-    effects: tuple[Effect, ...] = field(default=())
+    effects: tuple[Effect, ...] = ()
     sensor_zero: float = 0.0
 
     @property
@@ -343,30 +307,37 @@ def draw_truth(
     severities: Mapping[str, tuple[float, float]],
     options: Mapping[str, Any] | None,
 ) -> RigTruth:
-    """Draw an episode's truth; values from the options replace the drawn ones.
+    """Draw an episode's truth; values from the options of a reset replace the drawn ones.
 
     Every number is always drawn, so that one option does not change the other numbers.
 
     Args:
         severities: the effects, of which one acts, each with the same probability and a severity log-uniform in
             its range (SI units); no effect acts where it is empty.
-        options: ``truth``: coefficients by name, ``sensor_zero`` among them; ``effects``: parameters by effect
-            name, empty for none.
 
     Raises:
         TunnelError: for an unknown option, coefficient or effect, or a number that is out of range.
     """
-    options = {} if options is None else dict(options)
+    options = options or {}
     for key in options:
         if key not in OPTIONS:
             raise TunnelError(f"unknown reset option {key!r}", remedy=did_you_mean(str(key), OPTIONS))
     values = {name: _normal(rng, MEAN[name], STD[name]) for name in PARAMETERS}
     zero = _normal(rng, 0.0, 0.004)
-    effects = _draw_effect(rng, severities)
+    effects: tuple[Effect, ...] = ()
+    if severities:
+        name = list(severities)[int(rng.integers(len(severities)))]
+        low, high = severities[name]
+        severity = exp(rng.uniform(log(low), log(high)))
+        effects = (effect_from(name, {effect_class(name).parameters()[0].name: severity}),)
     given = _numbers(options.get("truth", {}))
     zero = given.pop("sensor_zero", zero)
-    if options.get("effects") is not None:
-        effects = _given_effects(options["effects"])
+    stated = options.get("effects")
+    if stated is not None:
+        if not isinstance(stated, Mapping):
+            remedy = "give parameters by effect, as {'coulomb_friction': {'friction_moment': 0.004}}"
+            raise TunnelError("option effects is not a mapping", remedy=remedy)
+        effects = tuple(effect_from(name, dict(parameters)) for name, parameters in stated.items())
     return RigTruth(Truth(**(values | given)), effects, zero)
 
 
@@ -377,18 +348,8 @@ def _normal(rng: np.random.Generator, mean: float, std: float) -> float:
             return mean + std * step
 
 
-def _draw_effect(
-    rng: np.random.Generator, severities: Mapping[str, tuple[float, float]]
-) -> tuple[Effect, ...]:
-    if not severities:
-        return ()
-    name = list(severities)[int(rng.integers(len(severities)))]
-    low, high = severities[name]
-    severity = exp(rng.uniform(log(low), log(high)))
-    return (effect_from(name, {effect_class(name).parameters()[0].name: severity}),)
-
-
 def _numbers(given: Any) -> dict[str, float]:
+    """The option ``truth``, checked."""
     known = (*PARAMETERS, "sensor_zero")
     if not isinstance(given, Mapping):
         raise TunnelError("option truth is not a mapping", remedy=f"give some of {', '.join(known)} by name")
@@ -404,10 +365,3 @@ def _numbers(given: Any) -> dict[str, float]:
             remedy = f"give a {'positive ' if positive else ''}number in {unit}"
             raise TunnelError(f"{name} = {value!r} is out of range", where="truth", remedy=remedy)
     return {name: float(value) for name, value in given.items()}
-
-
-def _given_effects(given: Any) -> tuple[Effect, ...]:
-    if not isinstance(given, Mapping):
-        remedy = "give parameters by effect, as {'coulomb_friction': {'friction_moment': 0.004}}"
-        raise TunnelError("option effects is not a mapping", remedy=remedy)
-    return tuple(effect_from(name, dict(parameters)) for name, parameters in given.items())

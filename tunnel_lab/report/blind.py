@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,16 +14,13 @@ from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from diagnosis.blind import Score
-    from diagnosis.blind.calibration import CalibrationBin, SmoothCalibration
     from identification.statistics import Proportion
 
 
-INCLUSION = "Calibration of inclusion"
 CALIBRATION = "Calibration"
 NAMES = {"cn_beta": "Cnβ", "cn_r": "Cnr"}
 KINDS = {
@@ -39,6 +36,7 @@ KINDS = {
     "withheld": "withheld from the vocabulary",
     "all": "all",
 }
+_RIGHT_ANSWER = {"withheld": "unknown"}  # the others are answered by their name
 _CELL, _NAMES, _RIGHT = 0.19, 1.6, 1.0  # inches: a cell, the names beside the rows, the shares
 _DARK = 0.55  # share of the colour from which white text is legible
 
@@ -54,23 +52,130 @@ class ScoreSection(TextTable):
     note: str = ""
 
 
+def sections(score: Score) -> list[ScoreSection]:
+    """The sections of a score, in order; those without rows are left out."""
+    return [one for one in (*_answer_sections(score), *_other_sections(score)) if one.rows]
+
+
 def _section(
-    title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]], note: str = ""
+    title: str, headings: tuple[str, ...], rows: Iterable[tuple[str, ...]], note: str = ""
 ) -> ScoreSection:
     return ScoreSection(title, headings, tuple(rows), headings[1:-1], note)
 
 
-def sections(score: Score) -> list[ScoreSection]:
-    """The sections of a score, in order.
+def _answer_sections(score: Score) -> list[ScoreSection]:
+    """Whether answers are right, and as often as they state."""
+    alarms = {
+        "a cause named where none acts": score.false_alarms(),
+        "no cause named where one acts": score.missed(),
+        "truth named as rival in a wrong answer": score.rivals(),
+    }
+    error, bins = score.calibration()
+    found, inclusion, smooth = score.found(), score.inclusion(), []
+    if inclusion is not None:
+        ends = "{:.4f}–{:.4f}".format(*inclusion.interval)
+        smooth = [(f"{inclusion.error:.4f}", ends, str(inclusion.statements), str(inclusion.campaigns))]
+    return [
+        _section(
+            "Causes exactly right",
+            ("campaigns where", "right", "of", "share", "95 %"),
+            ((KINDS[name], *_share(share)) for name, share in score.exact().items()),
+        ),
+        _section(
+            "Causes found and false",
+            ("campaigns", "sets exact", "true causes found", "named causes false", ""),
+            ((one.group, _brief(one.exact), _brief(one.found), _brief(one.false), "") for one in found),
+            "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
+            "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as "
+            "independent.",
+        ),
+        _section(
+            "Alarms",
+            ("", "number", "of", "share", "95 %"),
+            ((name, *_share(share)) for name, share in alarms.items() if share.total),
+        ),
+        _section(
+            CALIBRATION,
+            ("probability stated", "mean", "right", "of", "share", "95 %"),
+            ((f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", *_share(b.right)) for b in bins),
+            f"Expected calibration error of the answer given, {len(bins)} bins in use: {error:.3f}",
+        ),
+        _section(
+            "Decisions",
+            ("campaigns", "wrong set stated", "true causes in the smallest set of 0.9", "its mean size"),
+            (
+                (one.group, _brief(one.stated_wrongly), _brief(one.covered), f"{one.credible_size:.2f}")
+                for one in found
+            ),
+            "An answer below one half is undecided and states no set. The smallest set of answers that together "
+            "have a probability of 0.9 should contain the true causes in about nine of ten campaigns.",
+        ),
+        _section(
+            "Calibration of inclusion",
+            ("smooth calibration error", "95 %", "statements", "campaigns"),
+            smooth,
+            "Of the probability of every effect that it is among the causes. The kernel is as wide as the error "
+            "that it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns.",
+        ),
+    ]
 
-    Returns:
-        Sections; those without rows are left out.
-    """
-    every = [
-        _exact(score), _found(score), _alarms(score), _calibration(score), _decisions(score), _inclusion(score),
-        _closure(score), _coefficients(score), _pairs(score), _answers(score), _time(score),
-    ]  # fmt: skip
-    return [section for section in every if section.rows]
+
+def _other_sections(score: Score) -> list[ScoreSection]:
+    """How far the gaps close, the coefficients, the answers by truth, and the time taken."""
+    closed, median, low = score.closure()
+    pairs, (middle, high, longest) = score.pairs(), score.seconds()
+    right, answers = score.right_by_truth(), []
+    for truth, given in sorted(score.confusion().items(), key=lambda item: _order(item[0])):
+        wrong = sorted(given.items(), key=lambda item: -item[1])
+        others = [f"{name} {number}" for name, number in wrong if name != _RIGHT_ANSWER.get(truth, truth)]
+        answers.append((truth, str(right[truth].total), str(right[truth].count), ", ".join(others)))
+    return [
+        _section(
+            "Closure on held-out runs, where the causes are right",
+            ("", "number", "of", "share", "95 %"),
+            [("at least 0.95 of the gap closed", *_share(closed))] if closed.total else (),
+            f"Closed: median {median:.4f}, 5th percentile {low:.4f}",
+        ),
+        _section(
+            "Coefficients before and after the causes are added",
+            ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %"),
+            _coefficient_rows(score),
+            "Errors are medians of |estimate − truth| / |truth|; ≤ 3 std counts errors within three standard "
+            "deviations of the estimate.",
+        ),
+        _section(
+            "Answers to two effects",
+            ("answered", "number", ""),
+            ((name, str(number), "") for name, number in pairs.items() if any(pairs.values())),
+        ),
+        _section("Answers by truth", ("truth", "number", "right", "answered otherwise"), answers),
+        _section(
+            "Seconds for each campaign",
+            ("median", "90th percentile", "largest"),
+            [(f"{middle:.1f}", f"{high:.1f}", f"{longest:.1f}")] if longest > 0.0 else (),
+        ),
+    ]
+
+
+def _coefficient_rows(score: Score) -> list[tuple[str, ...]]:
+    errors = {(e.group, e.name, e.when): e for e in score.coefficients()}
+    rows: list[tuple[str, ...]] = []
+    for (group, name, when), after in errors.items():
+        before = errors.get((group, name, "before"))
+        if when == "before" or before is None:
+            continue
+        low, high = after.within.interval
+        rows.append(
+            (
+                f"{group}: {NAMES[name]}",
+                f"{100.0 * before.median:.2g}",
+                f"{100.0 * after.median:.2g}",
+                f"{before.within.count}/{before.within.total}",
+                f"{after.within.count}/{after.within.total}",
+                f"{100.0 * low:.1f}–{100.0 * high:.1f} %",
+            )
+        )
+    return rows
 
 
 def origin_lines(score: Score) -> list[str]:
@@ -87,16 +192,21 @@ def origin_lines(score: Score) -> list[str]:
 
 
 def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> str:
-    """The page.
+    """The page in Markdown, with all tables and the full confusion matrix.
 
     Args:
         figures: addresses of the calibration and of the confusion, relative to the page; empty: not drawn.
-
-    Returns:
-        Markdown, tables and the full confusion matrix included.
     """
     withheld = "".join(f" --exclude {name}" for name in score.excluded)
     drawn = f" --figure docs/{figures[0]}" if figures[0] else ""
+    making = []
+    if made := score.made_with:
+        kinds = ",".join(f"{kind}:{share:g}" for kind, share in made["kinds"].items())
+        making = [
+            f"tunnel blind make {folder} --count {made['count']} --seed {made['seed']} --kinds {kinds} "
+            f"--textbook {made['textbook']:g} --rare {made['rare']:g} "
+            f"--variety {made['variety']:g} --small {made['small']:g}"
+        ]
     lines = [
         "# Blind check",
         "",
@@ -110,7 +220,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         "is written by the commands below; nothing in it is typed by hand.",
         "",
         "```bash",
-        *_commands(score, folder),
+        *making,
         f"tunnel blind diagnose {folder}{withheld}",
         f"tunnel blind score {folder}{withheld} --markdown docs/blind-check.md{drawn}",
         "```",
@@ -123,153 +233,25 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
             lines += ["", section.note]
         if figures[0] and section.title == CALIBRATION:
             lines += ["", f"![Share that is right against the probability stated]({figures[0]})"]
-    return "\n".join([*lines, "", *_matrix(score, figures[1]), ""])
-
-
-def _commands(score: Score, folder: str) -> list[str]:
-    made = score.made_with
-    if not made:
-        return []
-    kinds = ",".join(f"{kind}:{share:g}" for kind, share in made["kinds"].items())
-    return [
-        f"tunnel blind make {folder} --count {made['count']} --seed {made['seed']} --kinds {kinds} "
-        f"--textbook {made['textbook']:g} --rare {made['rare']:g} "
-        f"--variety {made['variety']:g} --small {made['small']:g}"
+    rows, columns, counts = confusion(score)
+    numbers = {name: str(index) for index, name in enumerate(columns, 1)}
+    cells = [
+        [name, numbers.get(name, ""), *(str(count or "·") for count in numbers_of)]
+        for name, numbers_of in zip(rows, counts.tolist(), strict=True)
     ]
+    lines += [
+        "", "## Confusion matrix", "",
+        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
+        *([f"![Answers in columns by true causes in rows]({figures[1]})", ""] if figures[1] else []),
+        *_rows(["truth", "", *numbers.values()], cells), "",
+        f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}.", "",
+    ]  # fmt: skip
+    return "\n".join(lines)
 
 
 def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     aligned = ["---", *["---:"] * (len(headings) - 2), "---"][: len(headings)]
     return [f"| {' | '.join(cells)} |" for cells in (headings, aligned, *rows)]
-
-
-def _exact(score: Score) -> ScoreSection:
-    rows = tuple((KINDS[name], *_share(share)) for name, share in score.exact().items())
-    return _section("Causes exactly right", ("campaigns where", "right", "of", "share", "95 %"), rows)
-
-
-def _alarms(score: Score) -> ScoreSection:
-    entries = {
-        "a cause named where none acts": score.false_alarms(),
-        "no cause named where one acts": score.missed(),
-        "truth named as rival in a wrong answer": score.rivals(),
-    }
-    rows = tuple((name, *_share(share)) for name, share in entries.items() if share.total)
-    return _section("Alarms", ("", "number", "of", "share", "95 %"), rows)
-
-
-def _found(score: Score) -> ScoreSection:
-    rows = tuple(
-        (group.group, *(_brief(counted) for counted in (group.exact, group.found, group.false)), "")
-        for group in score.found()
-    )
-    note = (
-        "Small causes that act beside others are neither asked for nor false. Fast and slow rigs have periods "
-        "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as independent."
-    )
-    headings = ("campaigns", "sets exact", "true causes found", "named causes false", "")
-    return _section("Causes found and false", headings, rows, note)
-
-
-def _decisions(score: Score) -> ScoreSection:
-    rows = tuple(
-        (group.group, _brief(group.stated_wrongly), _brief(group.covered), f"{group.credible_size:.2f}")
-        for group in score.found()
-    )
-    note = (
-        "An answer below one half is undecided and states no set. The smallest set of answers that together have a "
-        "probability of 0.9 should contain the true causes in about nine of ten campaigns."
-    )
-    headings = ("campaigns", "wrong set stated", "true causes in the smallest set of 0.9", "its mean size")
-    return _section("Decisions", headings, rows, note)
-
-
-def _inclusion(score: Score) -> ScoreSection:
-    calibration = score.inclusion()
-    if calibration is None:
-        return _section(INCLUSION, (), ())
-    low, high = calibration.interval
-    row = (
-        f"{calibration.error:.4f}",
-        f"{low:.4f}–{high:.4f}",
-        str(calibration.statements),
-        str(calibration.campaigns),
-    )
-    note = (
-        "Of the probability of every effect that it is among the causes. The kernel is as wide as the error that "
-        "it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns."
-    )
-    headings = ("smooth calibration error", "95 %", "statements", "campaigns")
-    return _section(INCLUSION, headings, (row,), note)
-
-
-def _calibration(score: Score) -> ScoreSection:
-    error, bins = score.calibration()
-    rows = tuple((f"{b.low:.1f} to {b.high:.1f}", f"{b.mean:.3f}", *_share(b.right)) for b in bins)
-    headings = ("probability stated", "mean", "right", "of", "share", "95 %")
-    note = f"Expected calibration error of the answer given, {len(rows)} bins in use: {error:.3f}"
-    return _section(CALIBRATION, headings, rows, note)
-
-
-def _closure(score: Score) -> ScoreSection:
-    share, median, low = score.closure()
-    rows = (("at least 0.95 of the gap closed", *_share(share)),) if share.total else ()
-    note = f"Closed: median {median:.4f}, 5th percentile {low:.4f}"
-    return _section(
-        "Closure on held-out runs, where the causes are right",
-        ("", "number", "of", "share", "95 %"),
-        rows,
-        note,
-    )
-
-
-def _coefficients(score: Score) -> ScoreSection:
-    errors = {(e.group, e.name, e.when): e for e in score.coefficients()}
-    rows = []
-    for (group, name, when), after in errors.items():
-        before = errors.get((group, name, "before"))
-        if when == "before" or before is None:
-            continue
-        low, high = after.within.interval
-        rows.append(
-            (
-                f"{group}: {NAMES[name]}",
-                f"{100.0 * before.median:.2g}",
-                f"{100.0 * after.median:.2g}",
-                f"{before.within.count}/{before.within.total}",
-                f"{after.within.count}/{after.within.total}",
-                f"{100.0 * low:.1f}–{100.0 * high:.1f} %",
-            )
-        )
-    headings = ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %")
-    note = (
-        "Errors are medians of |estimate − truth| / |truth|; ≤ 3 std counts errors within three standard "
-        "deviations of the estimate."
-    )
-    return _section("Coefficients before and after the causes are added", headings, rows, note)
-
-
-def _pairs(score: Score) -> ScoreSection:
-    counts = score.pairs()
-    rows = tuple((name, str(number), "") for name, number in counts.items()) if sum(counts.values()) else ()
-    return _section("Answers to two effects", ("answered", "number", ""), rows)
-
-
-def _answers(score: Score) -> ScoreSection:
-    rows = []
-    right = score.right_by_truth()
-    for truth, answers in sorted(score.confusion().items(), key=lambda item: _order(item[0])):
-        wrong = sorted(answers.items(), key=lambda item: -item[1])
-        right_answer = {"withheld": "unknown"}.get(truth, truth)
-        others = ", ".join(f"{name} {number}" for name, number in wrong if name != right_answer)
-        rows.append((truth, str(right[truth].total), str(right[truth].count), others))
-    return _section("Answers by truth", ("truth", "number", "right", "answered otherwise"), rows)
-
-
-def _time(score: Score) -> ScoreSection:
-    median, high, largest = score.seconds()
-    rows = ((f"{median:.1f}", f"{high:.1f}", f"{largest:.1f}"),) if largest > 0.0 else ()
-    return _section("Seconds for each campaign", ("median", "90th percentile", "largest"), rows)
 
 
 def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
@@ -281,23 +263,6 @@ def confusion(score: Score) -> tuple[list[str], list[str], NDArray[np.int_]]:
         [name for name in names if name != "withheld"],
     )
     return rows, columns, np.array([[by_truth[row].get(column, 0) for column in columns] for row in rows])
-
-
-def _matrix(score: Score, figure: str) -> list[str]:
-    """The full confusion matrix: true causes in rows, answers in columns."""
-    rows, columns, counts = confusion(score)
-    numbers = {name: str(index) for index, name in enumerate(columns, 1)}
-    cells = [
-        [name, numbers.get(name, ""), *(str(count or "·") for count in numbers_of)]
-        for name, numbers_of in zip(rows, counts.tolist(), strict=True)
-    ]
-    return [
-        "## Confusion matrix", "",
-        "True causes in rows, answers in columns; `two or more` counts any set of effects.", "",
-        *([f"![Answers in columns by true causes in rows]({figure})", ""] if figure else []),
-        *_rows(["truth", "", *numbers.values()], cells), "",
-        f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}.",
-    ]  # fmt: skip
 
 
 def _order(name: str) -> tuple[int, str]:
@@ -324,17 +289,33 @@ def _share(share: Proportion) -> tuple[str, str, str, str]:
 def calibration_figure(score: Score) -> Figure:
     """How often statements are true, against the probability stated.
 
-    Returns:
-        A panel of the answers, in bins with Wilson's intervals of 95 %; and, where the answers state them, one of
-        the probabilities that each effect is among the causes, without bins.
+    A panel of the answers, in bins with Wilson's intervals of 95 %; and, where the answers state them, one of the
+    probabilities that each effect is among the causes, without bins.
     """
     error, bins = score.calibration()
     inclusion = score.inclusion()
     fig = figure(WIDTH if inclusion else 0.55 * WIDTH, 4.0)
     panels = fig.subplots(1, 2 if inclusion else 1, squeeze=False)[0]
-    _draw_answers(panels[0], bins, error)
+    mean = np.array([bin_of.mean for bin_of in bins])
+    share = np.array([bin_of.right.value for bin_of in bins], np.float64)
+    ends = np.array([bin_of.right.interval for bin_of in bins]).reshape(-1, 2)
+    spans = np.maximum([share - ends[:, 0], ends[:, 1] - share], 0.0)
+    number = sum(bin_of.right.total for bin_of in bins)
+    label = f"{number} answers, 95 %"
+    panels[0].errorbar(mean, share, yerr=spans, fmt="o-", color=AFTER, ms=4, lw=0.8, label=label)
+    for bin_of, x, y in zip(bins, mean, share, strict=True):
+        beside = (5, -5 if y > x else 5)  # below the points that lie high, where the interval is short
+        text = str(bin_of.right.total)
+        panels[0].annotate(text, (x, y), beside, textcoords="offset points", fontsize=7, va="center")
+    panels[0].set(xlabel="stated probability of the answer", ylabel="share of answers that are right")
+    panels[0].set_title(f"{number} answers: expected calibration error {error:.3f}")
     if inclusion is not None:
-        _draw_inclusion(panels[1], inclusion)
+        stated, number = inclusion.stated, inclusion.statements
+        band = {"color": AFTER, "alpha": 0.2, "linewidth": 0.0, "label": "95 %"}
+        panels[1].fill_between(stated, inclusion.low, inclusion.high, **band)
+        panels[1].plot(stated, inclusion.observed, color=AFTER, label=f"{number} statements")
+        panels[1].set(xlabel="stated probability that an effect acts", ylabel="share of effects that do")
+        panels[1].set_title(f"{number} effects: smooth calibration error {inclusion.error:.3f}")
     for axes in panels:
         axes.plot(
             [0.0, 1.0], [0.0, 1.0], color=QUIET, linewidth=1.0, linestyle="--", label="calibrated", zorder=1
@@ -348,53 +329,12 @@ def calibration_figure(score: Score) -> Figure:
     return fig
 
 
-def _draw_answers(axes: Axes, bins: tuple[CalibrationBin, ...], error: float) -> None:
-    mean = np.array([bin_of.mean for bin_of in bins])
-    share = np.array([bin_of.right.value for bin_of in bins], np.float64)
-    ends = np.array([bin_of.right.interval for bin_of in bins]).reshape(-1, 2)
-    spans = np.maximum([share - ends[:, 0], ends[:, 1] - share], 0.0)
-    number = sum(bin_of.right.total for bin_of in bins)
-    axes.errorbar(
-        mean, share, yerr=spans, fmt="o-", color=AFTER, ms=4, lw=0.8, label=f"{number} answers, 95 %"
-    )
-    for bin_of, x, y in zip(bins, mean, share, strict=True):
-        side = -1 if y > x else 1  # below the points that lie high, where the interval is short
-        axes.annotate(
-            str(bin_of.right.total),
-            (x, y),
-            (5, 5 * side),
-            textcoords="offset points",
-            fontsize=7,
-            va="center",
-        )
-    axes.set(xlabel="stated probability of the answer", ylabel="share of answers that are right")
-    axes.set_title(f"{number} answers: expected calibration error {error:.3f}")
-
-
-def _draw_inclusion(axes: Axes, calibration: SmoothCalibration) -> None:
-    axes.fill_between(
-        calibration.stated,
-        calibration.low,
-        calibration.high,
-        color=AFTER,
-        alpha=0.2,
-        linewidth=0.0,
-        label="95 %",
-    )
-    axes.plot(
-        calibration.stated, calibration.observed, color=AFTER, label=f"{calibration.statements} statements"
-    )
-    axes.set(xlabel="stated probability that an effect acts", ylabel="share of effects that do")
-    axes.set_title(f"{calibration.statements} effects: smooth calibration error {calibration.error:.3f}")
-
-
 @styled
 def confusion_figure(score: Score) -> Figure:
-    """What was answered, by the true causes.
+    """What was answered, by the true causes: truths in rows and answers in columns, by the same numbers.
 
-    Returns:
-        Truths in rows and answers in columns, by the same numbers; the colour is the share of the row and the
-        number a count. What is answered as it is stands on the diagonal, in blue.
+    The colour is the share of the row and the number a count. What is answered as it is stands on the diagonal, in
+    blue.
     """
     from matplotlib.patches import Rectangle
 
@@ -408,7 +348,7 @@ def confusion_figure(score: Score) -> Figure:
         for column, count in enumerate(own_counts):
             if not count:
                 continue
-            is_right = columns[column] == {"withheld": "unknown"}.get(name, name)
+            is_right = columns[column] == _RIGHT_ANSWER.get(name, name)
             share = count / total
             corner = (column - 0.5, row - 0.5)
             axes.add_patch(
@@ -418,15 +358,9 @@ def confusion_figure(score: Score) -> Figure:
                 column, row, str(count), ha="center", va="center", fontsize=6.5,
                 color=PAPER if share > _DARK else INK,
             )  # fmt: skip
-        right_share = right[name]
-        low, high = (100.0 * end for end in right_share.interval)
-        axes.text(
-            len(columns),
-            row,
-            f"{right_share.count}/{right_share.total}  ({low:.0f}–{high:.0f} %)",
-            va="center",
-            fontsize=7,
-        )
+        low, high = (100.0 * end for end in right[name].interval)
+        text = f"{right[name].count}/{right[name].total}  ({low:.0f}–{high:.0f} %)"
+        axes.text(len(columns), row, text, va="center", fontsize=7)
     numbers = {name: index for index, name in enumerate(columns, 1)}
     axes.set_yticks(range(len(rows)), [f"{plain(name)}  {numbers.get(name, '')}".rstrip() for name in rows])
     axes.set_xticks(range(len(columns)), [str(number) for number in numbers.values()])

@@ -12,6 +12,7 @@ from tunnel_sim.files.toml_input import OneLine, StrictModel, check_version, val
 
 REMEDY = "give a file that tunnel diagnose --json wrote"
 Excess = Annotated[float, Field(description="a number of noise powers")]
+Table = dict[str, Any]
 Share = Annotated[float, Field(ge=0.0, le=1.0, description="a number from 0 to 1")]
 
 
@@ -79,13 +80,7 @@ class Document(Part):
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
-    """Read the document of a diagnosis.
-
-    Args:
-        path: a file that ``tunnel diagnose --json`` wrote.
-
-    Returns:
-        The fields that are compared, in JSON's types.
+    """The fields that are compared, of a file that ``tunnel diagnose --json`` wrote, in JSON's types.
 
     Raises:
         TunnelError: when it is missing, is not JSON, or is not a diagnosis.
@@ -94,10 +89,7 @@ def read_diagnosis(path: Path) -> dict[str, Any]:
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """Read the whole document of a diagnosis, of which only the fields that are compared are checked.
-
-    Args:
-        path: a file that ``tunnel diagnose --json`` wrote.
+    """The whole document of a diagnosis, of which only the fields that are compared are checked.
 
     Raises:
         TunnelError: as for `read_diagnosis`.
@@ -111,49 +103,27 @@ def read_document(path: Path) -> dict[str, Any]:
 class DiagnosisDocument(Document):
     """What ``tunnel diagnose --json`` writes; excesses are in noise variances of a sample."""
 
-    credible: Annotated[
-        list[dict[str, Any]],
-        Field(description="effect and probability of the fewest answers that have 0.9 together"),
-    ]
-    common: Annotated[
-        dict[str, dict[str, float]],
-        Field(description="effects and channels that answers of 0.9 together have in common"),
-    ]
-    verdict: Annotated[str, Field(description="the answer in plain words")]
-    where: Annotated[
-        dict[str, Any],
-        Field(description="channel, condition, runs, time_s, amplitude_rad, frequency_hz, words"),
-    ]
-    inclusion: Annotated[
-        dict[str, float], Field(description="by effect, the probability that it is among the causes")
-    ]
-    waterfall: Annotated[
-        list[dict[str, Any]], Field(description="effect and excess, as the causes are added one by one")
-    ]
-    waterfall_on: Annotated[str, Field(description="what was held out of the fits for it")]
-    without: Annotated[dict[str, float], Field(description="by cause, the excess when it alone is taken out")]
-    sizes: Annotated[
-        list[dict[str, Any]],
-        Field(description="what each fitted cause does to a swing of a stated amplitude"),
-    ]
-    rest: Annotated[dict[str, Any] | None, Field(description="what remains after the causes")]
-    closable: Annotated[
-        dict[str, Any] | None, Field(description="how much of what remains could be closed, and by what")
-    ]
-    model: Annotated[dict[str, Any] | None, Field(description="the patched model, with --model")]
-    next_run: Annotated[
-        dict[str, Any] | None,
-        Field(description="the run that would distinguish the causes from their rivals"),
-    ]
-    confirmation: Annotated[
-        dict[str, Any], Field(description="how far MuJoCo and the fits' integrator agree")
-    ]
-    noise: Annotated[dict[str, Any], Field(description="std and stated_std in rad, source, reason")]
-    blind_spots: Annotated[list[str], Field(description="what these runs cannot show")]
-    cautions: Annotated[list[str], Field(description="caveats")]
-    remarks: Annotated[
-        list[dict[str, Any]],
-        Field(description="of the examination: outcome, runs, what, remedy"),
-    ]
-    seconds: Annotated[dict[str, float], Field(description="wall time by step, s")]
-    provenance: Annotated[dict[str, Any], Field(description="versions, and SHA-256 of the records")]
+    credible: list[Table] = Field(
+        description="effect and probability of the fewest answers that have 0.9 together"
+    )
+    common: dict[str, dict[str, float]] = Field(
+        description="effects and channels that answers of 0.9 together have in common"
+    )
+    verdict: str = Field(description="the answer in plain words")
+    where: Table = Field(description="channel, condition, runs, time_s, amplitude_rad, frequency_hz, words")
+    inclusion: dict[str, float] = Field(description="by effect, the probability that it is among the causes")
+    waterfall: list[Table] = Field(description="effect and excess, as the causes are added one by one")
+    waterfall_on: str = Field(description="what was held out of the fits for it")
+    without: dict[str, float] = Field(description="by cause, the excess when it alone is taken out")
+    sizes: list[Table] = Field(description="what each fitted cause does to a swing of a stated amplitude")
+    rest: Table | None = Field(description="what remains after the causes")
+    closable: Table | None = Field(description="how much of what remains could be closed, and by what")
+    model: Table | None = Field(description="the patched model, with --model")
+    next_run: Table | None = Field(description="the run that would distinguish the causes from their rivals")
+    confirmation: Table = Field(description="how far MuJoCo and the fits' integrator agree")
+    noise: Table = Field(description="std and stated_std in rad, source, reason")
+    blind_spots: list[str] = Field(description="what these runs cannot show")
+    cautions: list[str] = Field(description="caveats")
+    remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
+    seconds: dict[str, float] = Field(description="wall time by step, s")
+    provenance: Table = Field(description="versions, and SHA-256 of the records")

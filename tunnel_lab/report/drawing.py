@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnosis.closure import Misfit, misfit_of, unit_shown
-from tunnel_lab.plotting.style import figure_text, styled
+from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
@@ -53,8 +52,7 @@ def array(values: Sequence[float | None]) -> Array:
 def faded(*colours: str) -> Colormap:
     """A colour map that fades out instead of becoming white, so that it suits a light and a dark page.
 
-    Args:
-        colours: one, from faint to opaque; or two, opaque at the ends and transparent in the middle.
+    It is of one colour, from faint to opaque; or of two, opaque at the ends and transparent in the middle.
     """
     from matplotlib.colors import LinearSegmentedColormap, to_rgba
 
@@ -68,14 +66,7 @@ def faded(*colours: str) -> Colormap:
 
 
 def run_label(run: Document) -> str:
-    """A run and its conditions in a few words.
-
-    Args:
-        run: an entry of ``maps.runs``.
-
-    Returns:
-        Text such as ``r02 · 16.1 N m/rad · 15 m/s``.
-    """
+    """A run of ``maps.runs`` and its conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``."""
     parts = [str(run["id"])]
     if run["spring_stiffness"] is not None:
         parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
@@ -83,27 +74,10 @@ def run_label(run: Document) -> str:
     return " · ".join(parts)
 
 
-def drawn_label(run: Document) -> str:
-    """The same for matplotlib."""
-    return figure_text(run_label(run))
-
-
-def shade(axes: Axes, interval: Sequence[float] | None) -> None:
-    """Shade the interval that holds most of the gap.
-
-    Args:
-        interval: its ends, in the unit of the horizontal axis; None: nothing is shaded.
-    """
-    if interval is not None:
-        axes.axvspan(interval[0], interval[1], color=MARK, alpha=0.28, linewidth=0)
-
-
 def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:
-    """The scale on which gaps are drawn.
+    """The unit in which gaps are drawn, and the function from an excess in noise variances to the misfit in it.
 
-    Returns:
-        Its unit, and the function from an excess in noise variances to the root mean square misfit in that unit:
-        degrees where the readings are angles, standard deviations of the noise for a document without ``misfit``.
+    It is degrees where the readings are angles, standard deviations of the noise for a document without ``misfit``.
     """
     misfit = misfit_of(document) or Misfit(1.0, 0.0, "rad")
     unit, factor = unit_shown(misfit.unit) if document["gap"].get("misfit") else ("noise std", 1.0)
@@ -112,16 +86,24 @@ def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:
 
 @styled
 def inline_svg(figure: Figure, name: str, description: str) -> str:
-    """A figure as an SVG element.
+    """A figure as an SVG element, always the same for the same figure, without an address outside the page.
 
     Args:
         figure: drawn by matplotlib; its text stays text. Colours of `THEMED` become the style sheet's.
         name: unique in the page; every id in the element begins with it.
-
-    Returns:
-        The element; it is always the same for the same figure and has no address outside the page.
     """
     from matplotlib import rc_context
+
+    # Ids are numbered: matplotlib's are hashes of places, which the layout finds to rounding only.
+    ids: dict[str, str] = {}
+
+    def own(given: str) -> str:
+        return ids.setdefault(given, f"{name}-{len(ids)}")
+
+    def in_page(tag: re.Match[str]) -> str:
+        text = _ID.sub(lambda match: f'id="{own(match[1])}"', _NAMES.sub("", tag[0]))
+        text = _REFERENCE.sub(lambda match: match[1] + own(match[2]), text)
+        return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", text)
 
     buffer = io.StringIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
@@ -129,24 +111,10 @@ def inline_svg(figure: Figure, name: str, description: str) -> str:
     text = buffer.getvalue()
     for pattern in _NOT_HTML:
         text = pattern.sub("", text)
-    ids: dict[
-        str, str
-    ] = {}  # numbered: matplotlib's are hashes of places, which the layout finds to rounding only
-    text = _TAG.sub(lambda match: _in_page(match[0], name, ids), text)
+    text = _TAG.sub(in_page, text)
     text = _OPENING.sub(lambda match: _SIZE.sub("", match[0]), text, count=1)
     label = description.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
     return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
-
-
-def _in_page(tag: str, name: str, ids: dict[str, str]) -> str:
-    """A tag with ids that are unique in the page, by matplotlib's in ``ids``, and with colours of the theme."""
-
-    def own(given: str) -> str:
-        return ids.setdefault(given, f"{name}-{len(ids)}")
-
-    tag = _ID.sub(lambda match: f'id="{own(match[1])}"', _NAMES.sub("", tag))
-    tag = _REFERENCE.sub(lambda match: match[1] + own(match[2]), tag)
-    return _COLOUR.sub(lambda match: f"var(--{THEMED[match[0]]})", tag)
 
 
 def shown_text(svg: str) -> str:

@@ -1,15 +1,18 @@
-"""All figures of a diagnosis, by name."""
+"""All figures of a diagnosis, by name: its answer, how far the gap closes, and the coefficients."""
 
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnosis.decision import plain, probability
 from diagnosis.policy import LISTED_PROBABILITY
-from identification.printing import coefficient_label
+from diagnosis.printing import excess_std
+from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
     INTERVAL,
@@ -35,12 +38,11 @@ from tunnel_lab.report.drawing import (
     SIGMAS,
     Document,
     array,
-    drawn_label,
     faded,
     misfit_scale,
+    run_label,
 )
-from tunnel_lab.report.fit import fit_figure, fit_sheets
-from tunnel_lab.report.waterfall import waterfall_figure
+from tunnel_lab.report.view import WITHIN_THE_NOISE
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -50,8 +52,12 @@ if TYPE_CHECKING:
 SHOWN = 8
 """Most answers drawn."""
 _LOW = 2.1  # inches: a map on the printed summary
-_LABEL = 24  # characters in a line of a label
-_LEAST_NOISE = 0.03  # noise variances, three standard deviations: where the document has no maps
+_STEP_LABEL, _LABEL = 20, 24  # characters in a line of a label
+_LEAST_EXCESS, _LEAST_NOISE = 1e-3, 0.03  # of an excess and of three of it: where the document has no maps
+_VISIBLE = 0.01  # of the axis: a band narrower than this is not seen, and has no key
+_BESIDE = 7.0  # points between a mark and its text
+_MARK = 5.0  # points: the size of the mark of what is left without a cause alone
+_BEFORE_ZERO = 0.03  # of the axis: a mark at zero is clear of the labels
 _MOST_CURVES = len(COLOURS)
 _LONG = 30  # characters of a label
 _LEGEND, _HANDLE = 62, 8  # characters: the width of the figure, and the line beside a label
@@ -59,54 +65,125 @@ _AXES = {"angle": "angle [rad]", "rate": "rate [rad/s]", "time": "time since the
 
 
 def diagnosis_figures(document: Document) -> dict[str, Figure]:
-    """All figures of a diagnosis.
-
-    Args:
-        document: the diagnosis as JSON's types; without ``maps`` those that need them are left out.
-
-    Returns:
-        Figures by name, in the order of the report.
-    """
-    figures = _first_figures(document)
+    """All figures of a diagnosis by name, in the order of the report; those of ``maps`` only where it has them."""
+    figures: dict[str, Figure | None] = dict(_first_figures(document))
     if document.get("maps"):
-        figures["fit"] = fit_figure(document)
-        figures["where-runs"] = where.runs_figure(document)
-        figures["where-profiles"] = where.profiles_figure(document)
-        figures["where-spectrum"] = where.spectrum_figure(document)
-        figures["where-backbones"] = backbone_figure(document)
-        figures["where-phase-plane"] = where.phase_plane_figure(document)
-        figures["where-moment"] = where.moment_figure(document)
-    figures["which"] = candidates_figure(document)
-    figures["how-far"] = closure_figure(document)
-    figures["law"] = law_figure(document)
-    figures["coefficients"] = coefficients_figure(document)
+        figures |= {
+            "fit": where.fit_figure(document),
+            "where-runs": where.runs_figure(document),
+            "where-profiles": where.profiles_figure(document),
+            "where-spectrum": where.spectrum_figure(document),
+            "where-backbones": backbone_figure(document),
+            "where-phase-plane": where.phase_plane_figure(document),
+            "where-moment": where.moment_figure(document),
+        }
+    figures |= {
+        "which": candidates_figure(document),
+        "how-far": closure_figure(document),
+        "law": law_figure(document),
+        "coefficients": coefficients_figure(document),
+    }
     return {name: figure for name, figure in figures.items() if figure is not None}
 
 
 def summary_figures(document: Document) -> dict[str, Figure]:
-    """The figures of the printed summary.
-
-    Returns:
-        Figures by name, with the fit over the data in several heights, of which the page shows one.
-    """
-    first = {name: fig for name, fig in _first_figures(document, _LOW).items() if fig is not None}
-    return first | fit_sheets(document)
+    """The figures of the printed summary; the fit over the data in several heights, of which the page shows one."""
+    return _first_figures(document, _LOW) | where.fit_sheets(document)
 
 
-def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure | None]:
+def _first_figures(document: Document, height: float = where.PLACE_HEIGHT) -> dict[str, Figure]:
     """Where the gap is, in a map of some height in inches, and how far it closes."""
     located = document.get("maps") and document["causes"]
     place = where.place_figure(document, height) if located else None
-    return {"place": place, "waterfall": waterfall_figure(document)}
+    figures = {"place": place, "waterfall": waterfall_figure(document)}
+    return {name: figure for name, figure in figures.items() if figure is not None}
+
+
+@styled
+def waterfall_figure(document: Document) -> Figure | None:
+    """What is left of the gap as the causes are added one after another; None where no cause is named.
+
+    A dot for the nominal gap, a bar for each cause from what was left before it to what it leaves, and a dot for
+    the rest, on a linear scale of the root mean square misfit.
+    """
+    steps = document.get("waterfall", [])
+    if len(steps) < 2:
+        return None
+    unit, size = misfit_scale(document)
+    left = np.array([size(step["excess"]) for step in steps], np.float64)
+    without = {name: size(value) for name, value in document.get("without", {}).items()}
+    alone = [without.get(step["effect"], np.nan) if len(without) > 1 else np.nan for step in steps]
+    fig = figure(NARROW, 1.2 + 0.36 * (left.size + 1))
+    axes = fig.add_subplot()
+    rows, upper = np.arange(left.size + 1), np.maximum(left[:-1], left[1:])
+    lower = np.minimum(left[:-1], left[1:])
+    colours = [AFTER if after <= before else BEFORE for before, after in pairwise(left)]
+    axes.vlines(left, rows[:-1], rows[1:], color=QUIET, linewidth=0.8, zorder=0.9)
+    axes.barh(rows[1:-1], upper - lower, left=lower, color=colours, height=0.55)
+    for row, value, colour in ((0, left[0], BEFORE), (rows[-1], left[-1], ACCENT)):
+        axes.plot(value, row, "o", color=colour, ms=8, clip_on=False)
+    if np.isfinite(alone).any():
+        label = "without this cause alone"
+        axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
+    names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
+    axes.set_yticks(rows, ["nominal model", *names, "the rest"])
+    axes.set(ylim=(left.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
+    axes.locator_params(axis="x", nbins=6)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    axes.axvline(0.0, color=QUIET, linewidth=0.8, zorder=0.8)
+    grid(axes, "x")
+    shown = [
+        f"{significant(value, 3) if value else '0'}{unit if unit == '°' else ''}" for value in left.tolist()
+    ]
+    rest = document.get("rest") or {}
+    if rest.get("significant") is False:
+        shown[-1] = WITHIN_THE_NOISE
+    elif rest:
+        shown[-1] += ", material" if rest.get("material") else ", immaterial"
+    # The last cause leaves the rest, which is said in the row of the rest.
+    words = [shown[0], *(f"leaves {text}" for text in shown[1:-1]), "", shown[-1]]
+    _place_texts(axes, words, [left[0], *upper, left[-1]], [*alone, np.nan])
+    noise = size(SIGMAS * (excess_std(document) or _LEAST_EXCESS))
+    seen = noise > _VISIBLE * axes.get_xlim()[1]
+    axes.axvspan(0.0, noise, color=NOISE, linewidth=0, zorder=0.3, label="noise (3σ)" if seen else None)
+    if seen or np.isfinite(alone).any():  # a key in line with the axis above it
+        axes.legend(
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderpad=0.0, borderaxespad=0.3,
+            handlelength=1.2, columnspacing=1.4,
+        )  # fmt: skip
+    return fig
+
+
+def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks: Sequence[float]) -> None:
+    """Texts to the right of what they belong to, clear of the marks, on an axis that holds them all.
+
+    Args:
+        words: the text of each row.
+        ends: right end of each row's bar or dot, in data units.
+        marks: another mark in the row, in data units; NaN: none.
+    """
+    axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # sizes are known after the layout only
+    points = 72.0 / axes.figure.dpi
+    whole = points * axes.get_window_extent().width
+    texts = [
+        axes.annotate(text, (end, row), (_BESIDE, 0), textcoords="offset points", va="center")
+        for row, (text, end) in enumerate(zip(words, ends, strict=True))
+    ]
+    widths = [_BESIDE + points * text.get_window_extent().width for text in texts]
+    beside = np.fmax(ends, marks)  # where a text stands that has to clear the mark
+    free = (1.0 + _BEFORE_ZERO) * (1.0 - np.array(widths) / whole) - _BEFORE_ZERO
+    reach = float(max(np.max(beside / free), 1.05 * np.max(beside))) or 1.0
+    axes.set_xlim(-_BEFORE_ZERO * reach, reach)
+    point = (1.0 + _BEFORE_ZERO) * reach / whole
+    for row, (text, end, mark) in enumerate(zip(texts, ends, marks, strict=True)):
+        if end + (_BESIDE - _MARK) * point < mark < end + (widths[row] + _MARK) * point:
+            text.xy = (mark, row)
 
 
 @styled
 def candidates_figure(document: Document) -> Figure | None:
-    """The answers by probability.
-
-    Returns:
-        A bar for each answer that is not improbable; None where there are fewer than two, which words say better.
-    """
+    """The answers that are not improbable; None where there are fewer than two, which words say better."""
     shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED_PROBABILITY]
     if len(shown) < 2:
         return None
@@ -119,20 +196,14 @@ def candidates_figure(document: Document) -> Figure | None:
         axes.text(value + 0.01, index, probability(value), va="center")
     axes.set_yticks(range(len(shown)), names)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.12)
-    axes.set_xticks(np.linspace(0.0, 1.0, 6))
-    axes.set_xlabel("probability")
+    axes.set(xlim=(0.0, 1.12), xticks=np.linspace(0.0, 1.0, 6), xlabel="probability")
     grid(axes, "x")
     return fig
 
 
 @styled
 def closure_figure(document: Document) -> Figure:
-    """Root mean square misfit of every run before and after the causes are added.
-
-    Returns:
-        A pair of points per run; the second is filled where the run was held out of the fit.
-    """
+    """Misfit of every run before and after the causes are added; filled where it was held out of the fit."""
     runs = document["gap"]["runs"]
     fig = figure(NARROW, 1.2 + 0.22 * max(len(runs), 4))
     axes = fig.add_subplot()
@@ -141,21 +212,18 @@ def closure_figure(document: Document) -> Figure:
     before = np.array([size(run["before"]) for run in runs])
     after = np.array([size(run["after"]) for run in runs])
     stds = [run["std"] for run in (document.get("maps") or {"runs": []})["runs"]]
-    axes.axvspan(
-        0.0, size(SIGMAS * max(stds) if stds else _LEAST_NOISE), color=NOISE, lw=0, label="noise (3σ)"
-    )
-    axes.set_xlim(0.0, 1.05 * float(max(before.max(), after.max())) or 1.0)
-    axes.set_xlabel(f"root mean square misfit [{unit}]")
+    noise = size(SIGMAS * max(stds) if stds else _LEAST_NOISE)
+    axes.axvspan(0.0, noise, color=NOISE, lw=0, label="noise (3σ)")
+    most = 1.05 * float(max(before.max(), after.max())) or 1.0
+    axes.set(xlim=(0.0, most), xlabel=f"root mean square misfit [{unit}]")
     axes.hlines(rows, after, before, color=LINE, linewidth=2.5)
     axes.plot(before, rows, "s", color=BEFORE, ms=5, clip_on=False, label="nominal model")
     if not np.array_equal(before, after):
         held_out = np.array([run["held_out"] for run in runs])
         for chosen, face, words in ((held_out, AFTER, "held out"), (~held_out, PAPER, "fitted")):
             if chosen.any():
-                label = f"with the causes, run {words}"
-                axes.plot(
-                    after[chosen], rows[chosen], "o", color=AFTER, mfc=face, ms=5, clip_on=False, label=label
-                )
+                points, label = (after[chosen], rows[chosen]), f"with the causes, run {words}"
+                axes.plot(*points, "o", color=AFTER, mfc=face, ms=5, clip_on=False, label=label)
     axes.set_yticks(rows, [figure_text(run["id"]) for run in runs])
     axes.invert_yaxis()
     fig.legend(loc="outside upper left", ncols=2)
@@ -165,17 +233,10 @@ def closure_figure(document: Document) -> Figure:
 
 @styled
 def coefficients_figure(document: Document) -> Figure | None:
-    """The coefficients before and after, with 95 % intervals.
-
-    Returns:
-        A panel per coefficient that the runs determine; None where there is none.
-    """
+    """The coefficients that the runs determine, before and after, with 95 % intervals; None where there is none."""
     before, after = (document["coefficients"][key] for key in ("before", "after"))
-    names = [
-        name
-        for name in before
-        if name in after and all(given[name].get("determined", True) for given in (before, after))
-    ]
+    both = [name for name in before if name in after]
+    names = [n for n in both if all(given[n].get("determined", True) for given in (before, after))]
     if not names:
         return None
     fig = figure(NARROW, 0.3 + 1.3 * len(names))
@@ -188,8 +249,7 @@ def coefficients_figure(document: Document) -> Figure | None:
                 marker=marker, ms=6, capsize=4,
             )  # fmt: skip
         axes.set_yticks([0, 1], ["before", "after"])
-        axes.set_ylim(1.6, -0.6)
-        axes.set_xlabel(coefficient_label(name, before[name]["unit"]))
+        axes.set(ylim=(1.6, -0.6), xlabel=coefficient_label(name, before[name]["unit"]))
         axes.locator_params(axis="x", nbins=5)
         grid(axes)
     return fig
@@ -197,42 +257,36 @@ def coefficients_figure(document: Document) -> Figure | None:
 
 @styled
 def backbone_figure(document: Document) -> Figure:
-    """Frequency and damping of the runs that show the gap against amplitude, with 95 % bands.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        Two panels: frequency relative to the nominal model's, and damping ratio minus the nominal model's.
-    """
+    """Frequency and damping against amplitude, relative to the nominal model's, with 95 % bands."""
     maps = document["maps"]
     curves = [curve for curve in maps["backbones"] if len(curve["time_s"]) > 1]
     named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
     # the runs that show the gap first, in the campaign's order, and then the rest for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
-    labels = {run["id"]: drawn_label(run) for run in maps["runs"]}
+    labels = {run["id"]: figure_text(run_label(run)) for run in maps["runs"]}
     fig = figure(NARROW, 7.0)
     frequency, damping = fig.subplots(2, 1)
-    shifts, changes = [], []
+    drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}
     for index, curve in enumerate(chosen):
-        amplitude = array(curve["amplitude_rad"])
-        nominal = curve["nominal_frequency_hz"]
-        style = {"color": COLOURS[index], "marker": MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]}
+        order = np.argsort(array(curve["amplitude_rad"]))
+        x, nominal = array(curve["amplitude_rad"])[order], curve["nominal_frequency_hz"]
+        colour, marker = COLOURS[index], MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]
         shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
-        shift_std = 100.0 * array(curve["frequency_std"]) / nominal
-        _curve(frequency, amplitude, shift, shift_std, style)
         change = 1e3 * (array(curve["zeta"]) - curve["nominal_zeta"])
-        change_std = 1e3 * array(curve["zeta_std"])
-        _curve(damping, amplitude, change, change_std, style, labels[curve["id"]])
-        shifts.append((shift, shift_std))
-        changes.append((change, change_std))
-    for axes, name in ((frequency, "frequency minus\nthe nominal one [%]"),
-                       (damping, "damping ratio minus\nthe nominal one [10⁻³]")):  # fmt: skip
+        for axes, y, std, label in (
+            (frequency, shift, 100.0 * array(curve["frequency_std"]) / nominal, None),
+            (damping, change, 1e3 * array(curve["zeta_std"]), labels[curve["id"]]),
+        ):
+            drawn[axes].append((y, std))
+            y, band = y[order], INTERVAL * std[order]
+            axes.fill_between(x, y - band, y + band, color=colour, alpha=0.15, linewidth=0)
+            axes.plot(x, y, color=colour, marker=marker, ms=3.5, lw=1.0, label=label)
+    frequency.set_ylabel("frequency minus\nthe nominal one [%]")
+    damping.set_ylabel("damping ratio minus\nthe nominal one [10⁻³]")
+    for axes, pairs in drawn.items():
         axes.axhline(0.0, color=INK, linewidth=1.0)
         axes.set_xlabel("amplitude [rad]")
-        axes.set_ylabel(name)
         grid(axes)
-    for axes, pairs in ((frequency, shifts), (damping, changes)):
         if pairs:
             limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))
             log_axis(axes, "x")
@@ -243,51 +297,31 @@ def backbone_figure(document: Document) -> Figure:
     return fig
 
 
-def _curve(
-    axes: Axes, x: Array, y: Array, std: Array, style: dict[str, Any], label: str | None = None
-) -> None:
-    order = np.argsort(x)
-    colour, marker = style["color"], str(style["marker"])
-    band = INTERVAL * std[order]
-    axes.fill_between(x[order], y[order] - band, y[order] + band, color=colour, alpha=0.15, linewidth=0)
-    axes.plot(x[order], y[order], color=colour, marker=marker, ms=3.5, lw=1.0, label=label)
-
-
 @styled
 def law_figure(document: Document) -> Figure | None:
-    """The law without a formula.
-
-    Returns:
-        A curve with its 95 % band, or a map in which white cells are within it; None where there is none.
-    """
+    """The law without a formula, with its 95 % band; in a map, white cells are within it. None without a law."""
     curve = (document.get("closable") or {}).get("curve")
     if curve is None:
         return None
     shape = [len(axis) for axis in curve["places"]]
     values, std = (np.reshape(curve[name], shape) for name in ("values", "std"))
-    unit = "rad" if curve["unit"] == "rad" else "N m" if curve["unit"] == "N m" else "rad/s²"
+    unit = curve["unit"] if curve["unit"] in ("rad", "N m") else "rad/s²"
     name = f"{'error of the reading' if unit == 'rad' else 'missing moment'} [{unit}]"
     fig = figure(NARROW, 3.2)
     axes = fig.add_subplot()
     axes.set_xlabel(_AXES[curve["over"][0]])
     if len(shape) == 1:
-        (place,) = curve["places"]
-        axes.fill_between(
-            place, values - INTERVAL * std, values + INTERVAL * std, color=AFTER, alpha=0.25, lw=0
-        )
+        (place,), band = curve["places"], INTERVAL * std
+        axes.fill_between(place, values - band, values + band, color=AFTER, alpha=0.25, lw=0)
         axes.plot(place, values, color=AFTER)
         axes.set_ylabel(name)
         grid(axes)
         return fig
     reach = float(np.max(np.abs(values))) or 1.0
     shown = np.where(np.abs(values) > INTERVAL * std, values, np.nan)
+    colours = faded(AFTER, BEFORE)
     mesh = axes.pcolormesh(
-        *curve["places"],
-        shown.T,
-        cmap=faded(AFTER, BEFORE),
-        vmin=-reach,
-        vmax=reach,
-        shading="nearest",
+        *curve["places"], shown.T, cmap=colours, vmin=-reach, vmax=reach, shading="nearest"
     )
     axes.set_ylabel(_AXES[curve["over"][1]])
     fig.colorbar(mesh, ax=axes, label=name)

@@ -20,12 +20,11 @@ from diagnosis.decision import plain
 from diagnosis.patched import patch_lines, patch_table
 from diagnosis.printing import inclusion_line
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
-from tunnel_lab.report import advice, view
+from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
-from tunnel_lab.report.fit import fit_charts, fit_figure
 from tunnel_lab.report.view import Document
-from tunnel_lab.report.where import Chart, charts
+from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -74,17 +73,18 @@ SOURCES = {
 """What each share of a coefficient's variance comes from."""
 FAMILY = "DejaVu Sans"
 """matplotlib places the text of a figure by the widths of this font, which it ships."""
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_TIMEOUT = 120.0  # s
 
 
 @dataclass(frozen=True)
 class Byline:
-    """What the page states and the document leaves out, because it would differ each time.
+    """What the page states and the document leaves out, because it would differ each time; empty: not shown.
 
     Args:
-        date: of the diagnosis, such as 2026-05-31; empty: none is shown.
-        author: who made it; empty: nobody is named.
-        notes: for the head of the page; empty: none.
-        patch: file of the patched model; empty: it was not written.
+        date: of the diagnosis, such as 2026-05-31.
+        notes: for the head of the page.
+        patch: file of the patched model.
     """
 
     date: str = ""
@@ -94,11 +94,10 @@ class Byline:
 
 
 def write_report(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
-    """Write the report of a diagnosis.
+    """Write the report of a diagnosis as an HTML file, completely or not at all.
 
     Args:
         document: the diagnosis as JSON's types (``Diagnosis.to_json_dict``), with its ``maps`` where there are any.
-        path: the HTML file; replaced when it exists, written completely or not at all.
 
     Raises:
         TunnelError: when the page cannot be drawn or the file cannot be written.
@@ -111,115 +110,27 @@ def write_report(document: Document, campaign: Campaign, path: Path, byline: Byl
 def render_report(
     document: Document, campaign: Campaign, byline: Byline | None = None, *, summary: bool = False
 ) -> str:
-    """The page as text.
+    """The page as HTML that needs no other file and no network; the same for the same document and byline.
 
-    Args:
-        document: as for `write_report`.
-        summary: whether only what fits one printed page is shown.
-
-    Returns:
-        HTML that needs no other file and no network; the same for the same document and byline.
+    With ``summary`` it is only what fits one printed page.
     """
     answer, kind = view.headline(document)
+    provenance = document.get("provenance") or {}
+    alarms = significant(document["gap"]["false_alarm_rate"], 2)
+    schema = ("schema of the document", document["schema_version"])
     context = {
         "document": document,
-        "byline": (byline or Byline()),
+        "campaign": campaign,
+        "byline": byline or Byline(),
         "answer": answer,
         "kind": kind,
-        "verdict": view.verdict_words(document),
+        "verdict": view.typeset(str(document["verdict"])),
         "summary": summary,
         "named": kind in ("open", "found"),
         "facts": view.facts(document),
         "found": view.causes_found(document),
         "coefficients": view.coefficient_rows(document),
-        "next_steps": advice.next_steps(document),
-    } | _detail(document, campaign)
-    if summary:
-        return _rendered("page.html.j2", context | _parts(summary_figures(document), {}, "summary"))
-    drawn = diagnosis_figures(document)
-    return _rendered("page.html.j2", context | _parts(drawn, fit_charts(document) | charts(document)))
-
-
-def render_fit(document: Document) -> str:
-    """The fit over the data as a page of its own.
-
-    Args:
-        document: as for `write_report`.
-
-    Returns:
-        HTML that needs no other file and no network; without a chart where the document has no ``maps``.
-    """
-    drawn = fit_figure(document)
-    parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
-    return _rendered("fit.html.j2", {"campaign": document["campaign"], "summary": False} | parts)
-
-
-def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
-    """One figure of the report.
-
-    Args:
-        document: as for `write_report`.
-        what: name of the figure, as in `DESCRIPTIONS`.
-        runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
-
-    Raises:
-        TunnelError: for a figure or a run that the diagnosis does not have.
-    """
-    if what == "fit" and (drawn := fit_figure(document, runs)) is not None:
-        return drawn
-    figures = diagnosis_figures(document)
-    if what not in figures:
-        raise TunnelError(
-            f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {', '.join(figures)}"
-        )
-    return figures[what]
-
-
-def _rendered(name: str, context: dict[str, Any]) -> str:
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=FunctionLoader(_resource),
-    )
-    return environment.get_template(name).render(context)
-
-
-def _resource(name: str) -> str:
-    return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
-
-
-def _parts(drawn: Mapping[str, Figure], shown: dict[str, list[Chart]], kind: str = "page") -> dict[str, Any]:
-    """Figures, styles and scripts: text that is part of the page as it is."""
-    from markupsafe import Markup
-
-    figures = {
-        name: inline_svg(figure, name, _description(name))  # the SVG is already escaped
-        for name, figure in drawn.items()
-    }
-    font = font_face(shown_text("".join(figures.values())))
-    sheets = ["vendor/uPlot.min.css", "style.css"] if kind == "page" else ["style.css", f"{kind}.css"]
-    return {
-        "figures": {name: Markup(svg) for name, svg in figures.items()},
-        "style": Markup("\n".join([font, *map(_resource, sheets)])),
-        "licence": Markup(_resource("vendor/uPlot-LICENSE.txt")),
-        "library": Markup(_resource("vendor/uPlot.iife.min.js")),
-        "script": Markup(_resource(f"{kind}.js")),
-        "charts": shown,
-    }
-
-
-def _description(name: str) -> str:
-    """The text alternative of a figure, or of one in another height, such as ``fit-low``."""
-    return DESCRIPTIONS[name] if name in DESCRIPTIONS else DESCRIPTIONS[name.partition("-")[0]]
-
-
-def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:
-    return {
-        "campaign": campaign,
+        "next_steps": view.next_steps(document),
         "place": view.place_rows(document),
         "lines": view.line_rows(document),
         "candidates": view.candidate_rows(document),
@@ -232,116 +143,142 @@ def _detail(document: Document, campaign: Campaign) -> dict[str, Any]:
         "patch": patch_table(document),
         "patch_lines": [line.removeprefix("- ") for line in patch_lines(document)],
         "rivals": [plain(name) for name in document["ambiguous_with"]],
-        "next_run": advice.next_run_rows(document),
+        "next_run": view.next_run_rows(document),
         "runs": view.run_rows(document, campaign),
         "windy": any(run.wind_on for run in campaign.runs),
         "budget": budget(document),
         "tests": test_rows(document),
-        "false_alarms": false_alarms(document),
+        "false_alarms": f"{alarms} of the campaigns without a gap",
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],
         "noise": noise_rows(document),
-        "versions": version_rows(document),
-        "hashes": hash_rows(document),
+        "versions": [*provenance.get("versions", {}).items(), schema],
+        "hashes": list(provenance.get("sha256", {}).items()),
+    }
+    if summary:
+        parts = _parts(summary_figures(document), {}, ["style.css", "summary.css"], "summary.js")
+    else:
+        parts = _parts(diagnosis_figures(document), fit_charts(document) | charts(document))
+    return _rendered("page.html.j2", context | parts)
+
+
+def render_fit(document: Document) -> str:
+    """The fit over the data as an HTML page of its own; without a chart where the document has no ``maps``."""
+    drawn = fit_figure(document)
+    parts = _parts({} if drawn is None else {"fit": drawn}, fit_charts(document))
+    return _rendered("fit.html.j2", {"campaign": document["campaign"], "summary": False} | parts)
+
+
+def draw(document: Document, what: str, runs: Sequence[str] = ()) -> Figure:
+    """One figure of the report.
+
+    Args:
+        what: name of the figure, as in `DESCRIPTIONS`.
+        runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
+
+    Raises:
+        TunnelError: for a figure or a run that the diagnosis does not have.
+    """
+    if what == "fit" and (drawn := fit_figure(document, runs)) is not None:
+        return drawn
+    figures = diagnosis_figures(document)
+    if what not in figures:
+        known = ", ".join(figures)
+        raise TunnelError(f"the diagnosis has no figure {what!r}", remedy=f"choose of its figures: {known}")
+    return figures[what]
+
+
+def _rendered(name: str, context: dict[str, Any]) -> str:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        loader=FunctionLoader(_resource),
+    )  # fmt: skip
+    return environment.get_template(name).render(context)
+
+
+def _resource(name: str) -> str:
+    return resources.files("tunnel_lab.report").joinpath(*name.split("/")).read_text("utf-8")
+
+
+def _parts(
+    drawn: Mapping[str, Figure],
+    shown: dict[str, list[Chart]],
+    sheets: Sequence[str] = ("vendor/uPlot.min.css", "style.css"),
+    script: str = "page.js",
+) -> dict[str, Any]:
+    """Figures, styles and scripts: text that is part of the page as it is."""
+    from markupsafe import Markup
+
+    figures = {}
+    for name, figure in drawn.items():
+        # A figure in another height has the text of the first, as ``fit-near-1``. The SVG is already escaped.
+        text = DESCRIPTIONS.get(name) or DESCRIPTIONS[name.partition("-")[0]]
+        figures[name] = Markup(inline_svg(figure, name, text))
+    font = font_face(shown_text("".join(figures.values())))
+    return {
+        "figures": figures,
+        "style": Markup("\n".join([font, *map(_resource, sheets)])),
+        "licence": Markup(_resource("vendor/uPlot-LICENSE.txt")),
+        "library": Markup(_resource("vendor/uPlot.iife.min.js")),
+        "script": Markup(_resource(script)),
+        "charts": shown,
     }
 
 
 def test_rows(document: Document) -> list[tuple[str, str, str]]:
     """The tests of the gap: name, what each looks at, and its p-value."""
-    return [
-        (name, TESTS.get(name, "–"), p_text(value).removeprefix("= "))
-        for name, value in document["gap"]["tests"].items()
-    ]
-
-
-def false_alarms(document: Document) -> str:
-    """The false-alarm rate of all tests together, in words."""
-    return f"{significant(document['gap']['false_alarm_rate'], 2)} of the campaigns without a gap"
+    tests = document["gap"]["tests"].items()
+    return [(name, TESTS.get(name, "–"), p_text(value).removeprefix("= ")) for name, value in tests]
 
 
 def budget(document: Document) -> tuple[list[str], list[tuple[str, ...]]]:
-    """The uncertainty budget of the coefficients of the answer.
+    """The uncertainty budget of the coefficients of the answer; no rows where the document has no shares.
 
     Returns:
         Headings, and a row for each source: its standard deviation and its share of the variance, by coefficient.
-        No rows where the document has no shares.
     """
-    coefficients = {
-        name: given
-        for name, given in document["coefficients"]["after"].items()
-        if given["std"] is not None and given.get("shares")
-    }
-    heads = [
-        f"{COEFFICIENTS.get(name, name)} [{unit_mark(given['unit'])}]" for name, given in coefficients.items()
-    ]
-    rows = [
-        (words, *(_part(given["std"], given["shares"].get(source, 0.0)) for given in coefficients.values()))
-        for source, words in SOURCES.items()
-    ]
-    whole = (
-        "combined standard deviation",
-        *(significant(given["std"], 2) for given in coefficients.values()),
-    )
-    return heads, [*rows, whole] if coefficients else []
-
-
-def _part(std: float, share: float) -> str:
-    if share < 5e-4:
-        return "–"
-    return f"{significant(std * math.sqrt(share), 2)} ({100.0 * share:.1f} %)"
+    heads: list[str] = []
+    columns = [[*SOURCES.values(), "combined standard deviation"]]
+    for name, given in document["coefficients"]["after"].items():
+        std, shares = given["std"], given.get("shares")
+        if std is None or not shares:
+            continue
+        heads.append(f"{COEFFICIENTS.get(name, name)} [{unit_mark(given['unit'])}]")
+        cells = []
+        for share in (shares.get(source, 0.0) for source in SOURCES):
+            shown = f"{significant(std * math.sqrt(share), 2)} ({100.0 * share:.1f} %)"
+            cells.append("–" if share < 5e-4 else shown)
+        columns.append([*cells, significant(std, 2)])
+    return heads, list(zip(*columns, strict=True)) if heads else []
 
 
 def noise_rows(document: Document) -> list[tuple[str, str]]:
     """The noise that the gap is measured against, and the model behind the excesses."""
-    noise = document["noise"]
+    noise, confirmation = document["noise"], document["confirmation"]
     stated = noise["stated_std"]
-    return [
+    rows = [
         ("Noise of one sample", f"{1e3 * noise['std']:.4g} × 10⁻³ rad ({noise['source']})"),
         ("Stated", "–" if stated is None else f"{1e3 * stated:.4g} × 10⁻³ rad"),
         ("Why this one", str(noise["reason"])),
-        *_confirmation_rows(document["confirmation"]),
     ]
-
-
-def _confirmation_rows(confirmation: Document) -> list[tuple[str, str]]:
-    """The model behind the excesses, and the difference of the integrator used for fitting."""
     if confirmation["failure"]:
-        return [
-            (
-                "Excesses computed by",
-                f"the integrator used for fitting; MuJoCo failed: {confirmation['failure']}",
-            )
-        ]
+        model = f"the integrator used for fitting; MuJoCo failed: {confirmation['failure']}"
+        return [*rows, ("Excesses computed by", model)]
     apart = f"{confirmation['largest_difference_rad']:.1e} rad at most"
-    beside = "within" if confirmation["agrees"] else "beyond"
     rms = f"{confirmation['rms_difference_rad']:.1e} rad root mean square in {confirmation['run']}"
+    beside = f"{'within' if confirmation['agrees'] else 'beyond'} {confirmation['tolerance_rad']:.1e} rad"
     return [
+        *rows,
         ("Excesses computed by", "the MuJoCo model"),
-        (
-            "Difference of the integrator used for fitting",
-            f"{apart}; {rms}, {beside} {confirmation['tolerance_rad']:.1e} rad",
-        ),
+        ("Difference of the integrator used for fitting", f"{apart}; {rms}, {beside}"),
     ]
-
-
-def version_rows(document: Document) -> list[tuple[str, str]]:
-    """Versions of the program and its libraries, and of the document's schema."""
-    versions = (document.get("provenance") or {}).get("versions", {})
-    return [*versions.items(), ("schema of the document", str(document["schema_version"]))]
-
-
-def hash_rows(document: Document) -> list[tuple[str, str]]:
-    """Files and their SHA-256."""
-    return list((document.get("provenance") or {}).get("sha256", {}).items())
 
 
 def font_face(characters: str) -> str:
-    """A rule of a style sheet that holds the font, reduced to some characters.
+    """A rule of a style sheet with the font in WOFF, reduced to the characters that the figures show.
 
-    Args:
-        characters: those that the figures show; what the font lacks is left to the browser's fonts.
-
-    Returns:
-        The rule, with the font in WOFF; always the same for the same characters.
+    It is always the same for the same characters; what the font lacks is left to the browser's fonts.
     """
     import matplotlib
     from fontTools.subset import Options, Subsetter, load_font
@@ -361,10 +298,6 @@ def font_face(characters: str) -> str:
     return f'@font-face {{ font-family: "{FAMILY}"; src: url(data:font/woff;base64,{data}) format("woff"); }}'
 
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-_TIMEOUT = 120.0  # s
-
-
 def find_browser() -> str:
     """The Chromium of this machine.
 
@@ -382,11 +315,7 @@ def find_browser() -> str:
 
 
 def write_summary(document: Document, campaign: Campaign, path: Path, byline: Byline | None = None) -> Path:
-    """Write the summary of a diagnosis as a PDF of one page.
-
-    Args:
-        document: as for `tunnel_lab.report.write_report`.
-        path: the PDF; replaced when it exists, written completely or not at all.
+    """Write the summary of a diagnosis as a PDF of one page, completely or not at all.
 
     Raises:
         TunnelError: where there is no Chromium, it fails, or the file cannot be written.
@@ -403,11 +332,9 @@ def write_summary(document: Document, campaign: Campaign, path: Path, byline: By
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             arguments.insert(0, "--no-sandbox")
         try:
-            done = subprocess.run([browser, *arguments], capture_output=True, timeout=_TIMEOUT, check=False)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise TunnelError(
-                "Chromium could not print", where="--summary", remedy="print the report"
-            ) from error
-        if done.returncode or not printed.is_file():
-            raise TunnelError("Chromium could not print", where="--summary", remedy="print the report")
-        return write_whole(path, printed.read_bytes())
+            subprocess.run([browser, *arguments], capture_output=True, timeout=_TIMEOUT, check=True)
+            content = printed.read_bytes()
+        except (OSError, subprocess.SubprocessError) as error:
+            what, remedy = "Chromium could not print", "print the report"
+            raise TunnelError(what, where="--summary", remedy=remedy) from error
+        return write_whole(path, content)

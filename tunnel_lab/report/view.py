@@ -1,4 +1,4 @@
-"""The words and numbers of the report, formatted from the document."""
+"""The words and numbers of the report, formatted from the document, and what to do next."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
 from diagnosis.decision import plain, probability
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import misfit_text, noise_powers, share
+from diagnosis.printing import misfit_text, noise_powers, run_words, share
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -20,17 +20,19 @@ from identification.printing import (
     unit_mark,
     with_std,
 )
-from tunnel_sim.effects import effect_class, known_effects
+from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 
 Document = Mapping[str, Any]
-UNDETERMINED_PLACE = "cannot be determined from these runs"
 WITHIN_THE_NOISE = "within the noise"
 """What is left where it is not significant, in the words of the verdict."""
-CONDITIONS = {"always": "with or without wind", "wind_on": "only with the wind on", None: UNDETERMINED_PLACE}
-
-
-CHANNELS = {
+_UNDETERMINED_PLACE = "cannot be determined from these runs"
+_CONDITIONS = {
+    "always": "with or without wind",
+    "wind_on": "only with the wind on",
+    None: _UNDETERMINED_PLACE,
+}
+_CHANNELS = {
     "stiffness": "the restoring moment",
     "damping": "the damping",
     "forcing": "an imposed moment",
@@ -53,22 +55,14 @@ class Fact:
 
 
 def headline(document: Document) -> tuple[str, str]:
-    """The answer in a few words, and its kind for the page's colour.
-
-    Returns:
-        Words, and one of ``none``, ``unknown``, ``open``, ``found``.
-    """
+    """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
     causes = document["causes"]
     if not causes:
         return "No gap", "none"
     if not document.get("decided", True):
-        common = document["common"]
-        known = (
-            [plain(*common["effects"])]
-            if common["effects"]
-            else [f"the {name}" for name in common["channels"]]
-        )
-        return f"Undecided: {' and '.join(known)}, and more" if known else "Undecided", "open"
+        effects, channels = document["common"]["effects"], document["common"]["channels"]
+        known = plain(*effects) if effects else " and ".join(f"the {name}" for name in channels)
+        return f"Undecided: {known}, and more" if known else "Undecided", "open"
     if causes == ["unknown"]:
         return "Unexplained gap", "unknown"
     names = plain(*causes)
@@ -79,29 +73,27 @@ def headline(document: Document) -> tuple[str, str]:
     return names, "found"
 
 
-def verdict_words(document: Document) -> str:
-    """The verdict, with minus signs and powers of ten."""
-    return typeset(str(document["verdict"]))
-
-
 def facts(document: Document) -> list[Fact]:
     """The figures at the head of the page, each in the form in which the verdict states it."""
-    gap = document["gap"]
+    gap, causes = document["gap"], document["causes"]
     decided = document.get("decided", True)
-    added = "the causes" if decided else "the most probable answer"
-    before = misfit_fact(document, "Misfit of the nominal model", gap["excess_before"])
-    if not document["causes"]:
-        before = Fact(before.label, WITHIN_THE_NOISE, times_noise(gap["excess_before"]))
-    listed = [before]
-    if document["causes"] and document["causes"] != ["unknown"]:
-        after = misfit_fact(document, f"With {added} added", gap["excess_after"], left=True)
+    before, after = gap["excess_before"], gap["excess_after"]
+    label = "Misfit of the nominal model"
+    if causes:
+        listed = [_misfit_fact(document, label, before, times_noise(before))]
+    else:
+        listed = [Fact(label, WITHIN_THE_NOISE, times_noise(before))]
+    if causes and causes != ["unknown"]:
+        label = f"With {'the causes' if decided else 'the most probable answer'} added"
         if _calm(document):
-            after = Fact(after.label, WITHIN_THE_NOISE, noise_powers(gap["excess_after"]))
-        listed += [after, Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"])]
+            listed.append(Fact(label, WITHIN_THE_NOISE, noise_powers(after)))
+        else:
+            listed.append(_misfit_fact(document, label, after, typeset(noise_powers(after))))
+        listed.append(Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"]))
     if document["candidates"]:
-        first = document["candidates"][0]
         whose = "answer" if decided else "most probable answer"
-        listed.append(Fact(f"Probability of the {whose}", probability(first["probability"])))
+        first = document["candidates"][0]["probability"]
+        listed.append(Fact(f"Probability of the {whose}", probability(first)))
     return listed
 
 
@@ -110,27 +102,16 @@ def _calm(document: Document) -> bool:
     return (document.get("rest") or {}).get("significant") is False
 
 
-def misfit_fact(document: Document, label: str, value: float, *, left: bool = False) -> Fact:
-    """A gap in the units that people use, and in noise powers beside them.
-
-    Args:
-        label: of the figure.
-        value: the gap as an excess, in noise variances, a ratio.
-        left: whether it is what is left with the causes.
-    """
+def _misfit_fact(document: Document, label: str, value: float, powers: str) -> Fact:
+    """A gap in the units that people use, and in noise powers beside them."""
     misfit = misfit_of(document)
-    powers = typeset(noise_powers(value)) if left else times_noise(value)
     if misfit is None:
         return Fact(label, powers)
     return Fact(label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}")
 
 
 def times_noise(value: float) -> str:
-    """A gap against the noise, as the verdict states it.
-
-    Args:
-        value: the gap as an excess, in noise variances, a ratio.
-    """
+    """A gap in noise variances (a ratio), as the verdict states it."""
     text = significant(value, 4) if value >= 10.0 else f"{value:.{3 if abs(value) < 0.1 else 2}f}"
     return f"{typeset(text)} times the noise power"
 
@@ -153,10 +134,10 @@ def windy(document: Document) -> bool:
 
 def acts_on(document: Document, effect: str) -> str:
     """What an effect acts on and when, such as ``the damping, with or without wind``; empty for an unknown one."""
-    if effect not in {kind.name for kind in known_effects()}:
+    kind = {kind.name: kind for kind in known_effects()}.get(effect)
+    if kind is None:
         return ""
-    kind = effect_class(effect)
-    return f"{CHANNELS[kind.channel]}{f', {CONDITIONS[kind.condition]}' if windy(document) else ''}"
+    return f"{_CHANNELS[kind.channel]}{f', {_CONDITIONS[kind.condition]}' if windy(document) else ''}"
 
 
 def causes_found(document: Document) -> list[dict[str, Any]]:
@@ -169,44 +150,30 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
         return []
     answer = document["candidates"][0]
     names = answer["effect"].split(" + ")
-    sizes = {size["effect"]: size for size in document.get("sizes", ())}
-    steps = {step["effect"]: (old, step) for old, step in pairwise(document.get("waterfall", ()))}
-    found = []
-    for name in names:
-        mine = {
-            plain(full.rpartition(".")[2]): estimate(value)
-            for full, value in answer["parameters"].items()
-            if full.partition(".")[0] == name or len(names) == 1
+    does = {size["effect"]: size_words(document, size) for size in document.get("sizes", ())}
+    steps = document.get("waterfall", ())
+    left = [misfit_shown(document, step["excess"]) for step in steps]
+    if steps and _calm(document):
+        left[-1] = WITHIN_THE_NOISE
+    closes = {step["effect"]: f"{a} to {b}" for step, (a, b) in zip(steps[1:], pairwise(left), strict=True)}
+    return [
+        {
+            "name": plain(name),
+            "acts": acts_on(document, name),
+            "parameters": [
+                (plain(full.rpartition(".")[2]), estimate(value))
+                for full, value in answer["parameters"].items()
+                if full.partition(".")[0] == name or len(names) == 1
+            ],
+            "does": does.get(name, ""),
+            "closes": closes.get(name, ""),
         }
-        old, new = steps.get(name, (None, None))
-        closes = "" if new is None else f"{_left(document, old)} to {_left(document, new)}"
-        found.append(
-            {
-                "name": plain(name),
-                "acts": acts_on(document, name),
-                "parameters": list(mine.items()),
-                "does": size_words(document, sizes[name]) if name in sizes else "",
-                "closes": closes,
-            }
-        )
-    return found
-
-
-def _left(document: Document, step: Document) -> str:
-    """What a step of the waterfall leaves."""
-    last = step["effect"] == document["waterfall"][-1]["effect"]
-    return WITHIN_THE_NOISE if last and _calm(document) else misfit_shown(document, step["excess"])
+        for name in names
+    ]
 
 
 def size_words(document: Document, size: Document) -> str:
-    """What a cause does to a swing, in a sentence.
-
-    Args:
-        size: an entry of ``sizes``.
-
-    Returns:
-        Its damping and frequency where the cause changes them visibly, its zero and its reading.
-    """
+    """What a cause of ``sizes`` does to a swing, in a sentence; damping and frequency where they change visibly."""
     mark, factor = unit_shown((document.get("maps") or {}).get("unit", "rad"))
     angle = unit_shown("rad")[1]
     said = []
@@ -237,30 +204,16 @@ def typeset(text: str) -> str:
 
 
 def percent(value: float) -> str:
-    """A share as a percentage, as the terminal prints it.
-
-    Args:
-        value: at most 1, a fraction.
-
-    Returns:
-        Text such as ``98.3 %``; shares close to 0 or 1 are given as bounds.
-    """
-    return minus(share(value))
+    """A share (a fraction) such as ``98.3 %``; shares close to 0 or 1 are given as bounds."""
+    return _minus(share(value))
 
 
 def excess(value: float) -> str:
-    """An excess, which has no meaning below a thousandth of the noise power.
-
-    Args:
-        value: in noise variances, a ratio.
-
-    Returns:
-        Three significant digits, or three decimals where it is small.
-    """
-    return minus(f"{value:.3f}" if abs(value) < 1.0 else significant(value, 3))
+    """An excess in noise variances, to three significant digits, or three decimals where it is small."""
+    return _minus(f"{value:.3f}" if abs(value) < 1.0 else significant(value, 3))
 
 
-def minus(text: str) -> str:
+def _minus(text: str) -> str:
     """A number's text with a minus sign in place of a leading hyphen."""
     return "−" + text[1:] if text.startswith("-") else text
 
@@ -284,15 +237,15 @@ def others(document: Document) -> str:
     probabilities = [c["probability"] for c in document["candidates"][_listed(document) :]]
     if not probabilities:
         return ""
-    count = (
-        "1 more answer has" if len(probabilities) == 1 else f"{len(probabilities)} more answers have together"
-    )
-    together, most = (
-        probability(value).replace("<", "less than") for value in (sum(probabilities), max(probabilities))
-    )
-    least = f", each of them {most}" if most.startswith("less") else f", none of them more than {most}"
-    each = "" if len(probabilities) == 1 or most == together else least
-    return f"{count} a probability of {together}{each}. The JSON document lists all."
+    together = probability(sum(probabilities)).replace("<", "less than")
+    most = probability(max(probabilities)).replace("<", "less than")
+    each = f", each of them {most}" if most.startswith("less") else f", none of them more than {most}"
+    if len(probabilities) == 1:
+        count, each = "1 more answer has", ""
+    else:
+        count = f"{len(probabilities)} more answers have together"
+    words = f"{count} a probability of {together}{'' if most == together else each}."
+    return f"{words} The JSON document lists all."
 
 
 def _listed(document: Document) -> int:
@@ -301,14 +254,7 @@ def _listed(document: Document) -> int:
 
 
 def estimate(values: Document) -> str:
-    """A value with its standard deviation and unit.
-
-    Args:
-        values: ``value``, ``std`` and ``unit``.
-
-    Returns:
-        Text such as ``0.00401 ± 0.00002 N m``.
-    """
+    """A value with its standard deviation and unit, such as ``0.00401 ± 0.00002 N m``."""
     if not values.get("determined", True):
         return UNDETERMINED
     unit = str(values.get("unit", ""))
@@ -319,106 +265,71 @@ def _number(values: Document) -> str:
     if not values.get("determined", True):
         return UNDETERMINED
     if values["std"]:
-        return minus(with_std(values["value"], values["std"]))
-    return minus(significant(values["value"], 5)) + (" (held)" if values["std"] == 0.0 else at_bound(values))
+        return _minus(with_std(values["value"], values["std"]))
+    return _minus(significant(values["value"], 5)) + (" (held)" if values["std"] == 0.0 else at_bound(values))
 
 
 def cause_paragraphs(document: Document) -> list[dict[str, Any]]:
-    """What the vocabulary says of every cause and its rivals.
-
-    Returns:
-        Name, equation, signature, channel, condition and references of each.
-    """
-    paragraphs = []
-    known = {kind.name for kind in known_effects()}
-    for name in [*document["causes"], *document["ambiguous_with"]]:
-        if name not in known:
-            continue
-        kind = effect_class(name)
-        paragraphs.append(
-            {
-                "name": plain(name),
-                "meaning": (kind.__doc__ or "").split("\n")[0],
-                "equation": kind.equation,
-                "signature": kind.signature,
-                "where": acts_on(document, name),
-                "references": kind.references,
-            }
-        )
-    return paragraphs
+    """What the vocabulary says of every cause and its rivals."""
+    known = {kind.name: kind for kind in known_effects()}
+    return [
+        {
+            "name": plain(name),
+            "meaning": (known[name].__doc__ or "").split("\n")[0],
+            "equation": known[name].equation,
+            "signature": known[name].signature,
+            "where": acts_on(document, name),
+            "references": known[name].references,
+        }
+        for name in [*document["causes"], *document["ambiguous_with"]]
+        if name in known
+    ]
 
 
 def coefficient_rows(document: Document) -> list[dict[str, str]]:
-    """The coefficients before and after.
-
-    Returns:
-        Symbol with unit, both estimates and the 95 % interval after.
-    """
+    """Symbol with unit, estimates before and after, and the 95 % interval of each coefficient."""
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
-    return [
-        {
-            "label": coefficient_label(name, (before.get(name) or after[name])["unit"]),
-            "before": _number(before[name]) if name in before else "–",
-            "after": _number(after[name]) if name in after else "–",
-            "interval": _interval95(after.get(name) or before[name]),
-        }
-        for name in [*before, *(n for n in after if n not in before)]
-    ]
-
-
-def _interval95(values: Document) -> str:
-    """The interval, to as many digits as its width deserves."""
-    if not values["std"]:
-        return "–"
-    reach = 1.96 * values["std"]
-    width = with_std(values["value"], reach).partition("± ")[2]
-    places = len(width.partition(".")[2])
-    ends = values.get("interval") or (values["value"] - reach, values["value"] + reach)
-    texts = [
-        significant(end) if not width.replace(".", "").isdigit() else f"{end:.{places}f}" for end in ends
-    ]
-    return " to ".join(map(minus, texts))
+    rows = []
+    for name in dict.fromkeys([*before, *after]):
+        values, interval = after.get(name) or before[name], "–"
+        if values["std"]:  # to as many digits as its width deserves
+            reach = 1.96 * values["std"]
+            width = with_std(values["value"], reach).partition("± ")[2]
+            places = len(width.partition(".")[2]) if width.replace(".", "").isdigit() else None
+            ends = values.get("interval") or (values["value"] - reach, values["value"] + reach)
+            interval = " to ".join(
+                _minus(significant(end) if places is None else f"{end:.{places}f}") for end in ends
+            )
+        rows.append(
+            {
+                "label": coefficient_label(name, (before.get(name) or after[name])["unit"]),
+                "before": _number(before[name]) if name in before else "–",
+                "after": _number(after[name]) if name in after else "–",
+                "interval": interval,
+            }
+        )
+    return rows
 
 
 def place_rows(document: Document) -> list[tuple[str, str]]:
     """Where the gap is, field by field."""
-    where = document["where"]
-    return [
-        ("Runs that show it", ", ".join(where["runs"]) or "–"),
-        ("Time", interval(where["time_s"], "s")),
-        ("Amplitude", interval(where["amplitude_rad"], "°", unit_shown("rad")[1])),
-        ("Frequency", interval(where["frequency_hz"], "Hz")),
-        ("Channel", where["channel"] or UNDETERMINED_PLACE),
-        *(
-            [("Condition", CONDITIONS.get(where["condition"], str(where["condition"])))]
-            if windy(document)
-            else ()
-        ),
-    ]
-
-
-def interval(values: list[float] | None, unit: str, factor: float = 1.0) -> str:
-    """An interval in words.
-
-    Args:
-        values: its ends, or None.
-        factor: on the ends, to have them in ``unit``; dimensionless.
-
-    Returns:
-        Text such as ``0.00 to 4.20 s``; a dash where there is none.
-    """
-    if values is None:
-        return "–"
-    low, high = (significant(factor * value, 3) for value in values)
-    return f"{low} to {high}{_spaced(unit)}"
+    where, degree = document["where"], unit_shown("rad")[1]
+    rows = [("Runs that show it", ", ".join(where["runs"]) or "–")]
+    for label, key, factor, unit in (
+        ("Time", "time_s", 1.0, " s"),
+        ("Amplitude", "amplitude_rad", degree, "°"),
+        ("Frequency", "frequency_hz", 1.0, " Hz"),
+    ):
+        ends = [significant(factor * value, 3) for value in where[key] or ()]
+        rows.append((label, f"{' to '.join(ends)}{unit}" if ends else "–"))
+    rows.append(("Channel", where["channel"] or _UNDETERMINED_PLACE))
+    if windy(document):
+        rows.append(("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))))
+    return rows
 
 
 def step_rows(document: Document) -> list[dict[str, str]]:
-    """The gap as the causes are added.
-
-    Returns:
-        What is added, what is left, and what is left without it alone; none where no cause is named.
-    """
+    """What is added, what is left, and what is left without it alone; none where no cause is named."""
     steps, without = document.get("waterfall", []), document.get("without", {})
     return [
         {
@@ -436,36 +347,25 @@ def _gap(document: Document, value: float | None) -> str:
 
 
 def run_rows(document: Document, campaign: Campaign) -> list[dict[str, str]]:
-    """Every run with its conditions and excess before and after.
-
-    Returns:
-        Formatted rows in the campaign's order.
-    """
+    """Every run with its conditions and excess before and after, in the campaign's order."""
     gap = {run["id"]: run for run in document["gap"]["runs"]}
-    rows = []
-    for run in campaign.runs:
-        excesses = gap.get(run.id, {})
-        rows.append(
-            {
-                "id": run.id,
-                "spring": "–" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
-                "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
-                "duration": f"{run.record.duration:.3g}",
-                "rate": f"{run.record.sample_rate:.4g}",
-                "before": _gap(document, excesses.get("before")) or "–",
-                "after": _gap(document, excesses.get("after")) or "–",
-                "named": "yes" if run.id in document["where"]["runs"] else "",
-            }
-        )
-    return rows
+    return [
+        {
+            "id": run.id,
+            "spring": "–" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
+            "wind": f"{run.wind_speed:g}" if run.wind_on else "off",
+            "duration": f"{run.record.duration:.3g}",
+            "rate": f"{run.record.sample_rate:.4g}",
+            "before": _gap(document, gap.get(run.id, {}).get("before")) or "–",
+            "after": _gap(document, gap.get(run.id, {}).get("after")) or "–",
+            "named": "yes" if run.id in document["where"]["runs"] else "",
+        }
+        for run in campaign.runs
+    ]
 
 
 def line_rows(document: Document) -> list[dict[str, str]]:
-    """Narrow lines in the residuals.
-
-    Returns:
-        Run, frequency, amplitude and share, formatted.
-    """
+    """Narrow lines in the residuals."""
     return [
         {
             "run": line["run"],
@@ -474,4 +374,80 @@ def line_rows(document: Document) -> list[dict[str, str]]:
             "share": percent(min(line["share"], 1.0)),
         }
         for line in (document.get("maps") or {}).get("lines", [])
+    ]
+
+
+LEAST_SEPARATION = 3.0
+"""Standard deviations between two answers below which a run does not distinguish them: odds of about 100:1."""
+
+
+def run_to_make(document: Document) -> Document | None:
+    """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
+    run: Document | None = document["next_run"]
+    return run if run is not None and run["separation"] >= LEAST_SEPARATION else None
+
+
+def unplannable(document: Document) -> str:
+    """Why no run can be planned from these runs, in a sentence; empty where one can."""
+    known = document["coefficients"]["before"]
+    if not known:
+        return "No run can be planned: the nominal model was not fitted to any run."
+    if "omega_n" in known:
+        return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
+    return ""
+
+
+def next_steps(document: Document) -> list[str]:
+    """What to do next, in the order in which to do it."""
+    causes = document["causes"]
+    steps = [
+        f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
+        for remark in document.get("remarks", ())
+        if remark["outcome"] != "noted"
+    ]
+    if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
+        words = f"Make the run that distinguishes the answers: {run_words(run)}."
+        steps.append(f"{words} Add it to the campaign and diagnose again.")
+    if not causes:
+        return [*steps, "Use the coefficients of the nominal model, within their intervals."]
+    if not document.get("decided", True):
+        springs = not unplannable(document) and document.get("model") is None  # stated, and can be chosen
+        kinds = ["springs"] * springs + ["wind speeds"] * windy(document) + ["release angles"]
+        steps += [
+            f"Add runs with other {plain(*kinds)}, and diagnose again: no answer has a probability of one half.",
+            "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",
+        ]
+    elif causes == ["unknown"]:
+        steps += [
+            "Read where the model departs from the runs, and examine the rig there.",
+            "State the effect that you suspect in a file, and diagnose again with --effects-file.",
+        ]
+    else:
+        known = {kind.name: kind.advice for kind in known_effects()}
+        steps += [
+            *(f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in causes),
+            "Measure again, and compare the two diagnoses (tunnel compare).",
+            "Until then use the coefficients with the causes, not those of the nominal model.",
+        ]
+    if (document.get("rest") or {}).get("material"):
+        steps.append(
+            "Do not trust the coefficients beyond their intervals: what remains of the gap moves them."
+        )
+    return steps
+
+
+def next_run_rows(document: Document) -> list[tuple[str, str]]:
+    """Labels and values of the run expected to distinguish the rivals; empty where none is proposed."""
+    run = document["next_run"] or {}
+    units = {
+        "spring_stiffness": "N m/rad",
+        "wind_speed": "m/s",
+        "release_angle": "rad",
+        "duration": "s",
+        "separation": "standard deviations of the noise, expected",
+    }
+    return [
+        (plain(name).capitalize(), f"{significant(value, 3)} {units.get(name, '')}".strip())
+        for name, value in run.items()
+        if isinstance(value, int | float)
     ]

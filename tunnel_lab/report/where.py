@@ -1,28 +1,30 @@
-"""Where the gap is, as figures and as data of the page's charts: by run, time, amplitude and frequency."""
+"""Where the gap is, and the fit over the data: figures, and the charts that replace them on a screen."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tunnel_lab.plotting.style import INTERVAL, figure, grid, styled
+from diagnosis.closure import unit_shown
+from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
 from tunnel_lab.report.drawing import (
     AFTER,
     BEFORE,
+    MARK,
     NARROW,
     NOISE,
     QUIET,
     SIGMAS,
     Document,
     array,
-    drawn_label,
     faded,
     misfit_scale,
     run_label,
-    shade,
 )
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -30,25 +32,30 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+TIME = "time since the start of the record [s]"
 _ANGLE, _RATE = "angle β [rad]", "rate β̇/ω [rad]"
-_UNITS: dict[str, str] = {"rad/s2": "rad/s²"}
 Chart = dict[str, Any]
 _LEAST_POWER = 0.3  # of the noise: what is below is drawn at the edge of the axis
-_ALL = "all runs together"
 PLACE_HEIGHT = 2.7
 """Height of the map of where the gap is, inches."""
+_COLUMNS = 2  # runs in a figure
+_HEIGHT = 5.4  # inches
+_SHEETS = {
+    "fit": _HEIGHT, "fit-whole-2": 4.9, "fit-whole-3": 4.4, "fit-whole-4": 4.0,
+    "fit-near-1": 3.6, "fit-near-2": 3.2, "fit-near-3": 2.8, "fit-near-4": 2.5, "fit-near-5": 2.25,
+}  # fmt: skip
+"""Heights in inches; ``near`` leaves the whole record out."""
+_MEASURED, _NOMINAL, _CAUSES = "measured", "nominal model", "with the causes"
 
 
 @styled
 def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | None:
-    """Where the gap is: misfit by amplitude and by wind speed, or by amplitude and time where there is one speed.
+    """Misfit by amplitude and by wind speed, or by time where there is one speed; None for maps without it.
+
+    Cells within the noise stay empty.
 
     Args:
-        document: a diagnosis with its maps.
-        height: of the figure, inches.
-
-    Returns:
-        A map small enough for a phone, in which cells within the noise stay empty; None for maps without it.
+        height: of the figure, inches; small enough for a phone.
     """
     grid_of = document["maps"].get("grid")
     if grid_of is None:
@@ -64,56 +71,39 @@ def place_figure(document: Document, height: float = PLACE_HEIGHT) -> Figure | N
     axes = fig.add_subplot()
     top = float(np.nanmax(shown)) if np.isfinite(shown).any() else 1.0
     mesh = axes.pcolormesh(columns, rows, shown, cmap=faded(BEFORE), vmin=0.0, vmax=top)
-    axes.set_ylabel("amplitude [°]")
     if speeds:
         axes.set_xticks(range(len(speeds)), [f"{speed:g}" if speed else "off" for speed in speeds])
-        axes.set_xlabel("wind speed [m/s]")
-    else:
-        axes.set_xlabel("time since the start of the record [s]")
-    axes.set_ylim(0.0, float(rows[-1]))
-    axes.set_xlim(float(columns[0]), float(columns[-1]))
+    axes.set(xlabel="wind speed [m/s]" if speeds else TIME, ylabel="amplitude [°]")
+    axes.set(xlim=(columns[0], columns[-1]), ylim=(0.0, rows[-1]))
     fig.colorbar(mesh, ax=axes, label=f"root mean square misfit [{unit}]")
     return fig
 
 
 @styled
 def runs_figure(document: Document) -> Figure:
-    """Excess of every run over time.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        A heat map on a logarithmic scale, in which cells within the noise stay empty.
-    """
+    """Excess of every run over time on a logarithmic scale; cells within the noise stay empty."""
     from matplotlib.colors import LogNorm
 
     maps = document["maps"]
     runs = maps["runs"]
     fig = figure(NARROW, 1.4 + 0.24 * max(len(runs), 4))
     axes = fig.add_subplot()
-    edges = array(maps["time"]["edges_s"])
-    cells, floor, top = run_cells(maps)
-    extent = (float(edges[0]), float(edges[-1]), len(runs) - 0.5, -0.5)
-    scale = LogNorm(floor, top)
+    first, *_, last = maps["time"]["edges_s"]
+    cells, floor, top = _run_cells(maps)
     image = axes.imshow(
-        cells, aspect="auto", extent=extent, cmap=faded(BEFORE), norm=scale, interpolation="nearest"
-    )
+        cells, aspect="auto", extent=(first, last, len(runs) - 0.5, -0.5), cmap=faded(BEFORE),
+        norm=LogNorm(floor, top), interpolation="nearest",
+    )  # fmt: skip
     if not np.isfinite(cells).any():
         axes.text(0.5, 0.5, "every cell within the noise", transform=axes.transAxes, ha="center")
-    axes.set_yticks(range(len(runs)), [drawn_label(run) for run in runs])
-    axes.set_xlabel("time since the start of the record [s]")
+    axes.set_yticks(range(len(runs)), [figure_text(run_label(run)) for run in runs])
+    axes.set_xlabel(TIME)
     fig.colorbar(image, ax=axes, location="top", label="excess (noise variances)", aspect=50)
     return fig
 
 
-def run_cells(maps: Document) -> tuple[Array, float, float]:
-    """The map of runs over time.
-
-    Returns:
-        Excess by run and bin of time, shape (runs, n), NaN within the noise; the least and the greatest value of
-        the scale. In noise variances.
-    """
+def _run_cells(maps: Document) -> tuple[Array, float, float]:
+    """Excess by run and bin of time, shape (runs, n), NaN within the noise; and the ends of its scale."""
     cells = np.stack([array(row) for row in maps["time"]["by_run"]])
     times = array(maps["time"]["edges_s"])
     run = min(maps["runs"], key=lambda entry: entry["std"])
@@ -126,99 +116,66 @@ def run_cells(maps: Document) -> tuple[Array, float, float]:
 def profiles_figure(document: Document) -> Figure:
     """Excess over time and amplitude, all runs together, and when a moment is missing.
 
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        Three panels; the shaded intervals hold four fifths of the gap.
+    The shaded intervals hold four fifths of the gap.
     """
     maps, where = document["maps"], document["where"]
     fig = figure(NARROW, 6.0)
-    axes = fig.subplot_mosaic([["time"], ["moment"], ["amplitude"]], height_ratios=(1.3, 0.8, 1.3))
-    _profile(axes["time"], maps["time"], "edges_s", where["time_s"])
-    axes["time"].tick_params(labelbottom=False)
-    _moment(axes["moment"], maps["time"])
-    _profile(axes["amplitude"], maps["amplitude"], "edges_rad", where["amplitude_rad"])
-    axes["amplitude"].set_xlabel("amplitude of the motion [rad]")
+    by_time, moment, by_amplitude = fig.subplots(3, 1, height_ratios=(1.3, 0.8, 1.3))
+    for axes, values, bounds, interval in (
+        (by_time, maps["time"], array(maps["time"]["edges_s"]), where["time_s"]),
+        (by_amplitude, maps["amplitude"], array(maps["amplitude"]["edges_rad"]), where["amplitude_rad"]),
+    ):
+        mean, std = array(values["excess"]), array(values["std"])
+        if interval is not None:
+            axes.axvspan(*interval, color=MARK, alpha=0.28, linewidth=0)
+        axes.stairs(SIGMAS * std, bounds, baseline=-SIGMAS * std, fill=True, color=NOISE)
+        axes.stairs(mean, bounds, color=BEFORE, linewidth=1.4)
+        axes.set(xlim=(0.0, bounds[-1]), ylabel="excess (noise variances)")
+        axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
+        grid(axes)
+    by_time.tick_params(labelbottom=False)
+    # The missing moment's energy shows when a moment acts, not how long the motion after it lasts.
+    edges, share = array(maps["time"]["edges_s"]), 100.0 * array(maps["time"]["moment_share"])
+    moment.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
+    moment.set(xlim=(0.0, edges[-1]), ylim=(0.0, 1.05 * max(float(share.max()), 20.0)))
+    moment.set(xlabel=TIME, ylabel="missing moment\n[% of its energy]")
+    grid(moment)
+    by_amplitude.set_xlabel("amplitude of the motion [rad]")
     return fig
-
-
-def _profile(axes: Axes, values: Document, edges: str, interval: list[float] | None) -> None:
-    bounds, mean, std = array(values[edges]), array(values["excess"]), array(values["std"])
-    shade(axes, interval)
-    axes.stairs(SIGMAS * std, bounds, baseline=-SIGMAS * std, fill=True, color=NOISE)
-    axes.stairs(mean, bounds, color=BEFORE, linewidth=1.4)
-    axes.set_xlim(0.0, float(bounds[-1]))
-    axes.set_ylim(min(-4.0 * float(np.nanmedian(std)), 1.05 * float(np.nanmin(mean))), None)
-    axes.set_ylabel("excess (noise variances)")
-    grid(axes)
-
-
-def _moment(axes: Axes, values: Document) -> None:
-    """The missing moment's energy: it shows when a moment acts, not how long the motion after it lasts."""
-    edges, share = array(values["edges_s"]), 100.0 * array(values["moment_share"])
-    axes.stairs(share, edges, fill=True, color=AFTER, alpha=0.6)
-    axes.set_xlim(0.0, float(edges[-1]))
-    axes.set_ylim(0.0, 1.05 * max(float(share.max()), 20.0))
-    axes.set_ylabel("missing moment\n[% of its energy]")
-    axes.set_xlabel("time since the start of the record [s]")
-    grid(axes)
 
 
 @styled
 def spectrum_figure(document: Document) -> Figure:
-    """Residual power over frequency, all runs together, before and after.
+    """Residual power over frequency, all runs together, before and after, on logarithmic axes.
 
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        One panel with logarithmic axes; the shaded interval holds four fifths of the gap.
+    The shaded interval holds four fifths of the gap.
     """
-    values = document["maps"]["frequency"]
+    values, interval = document["maps"]["frequency"], document["where"]["frequency_hz"]
     fig = figure(NARROW, 3.0)
     axes = fig.add_subplot()
-    edges, centre = spectrum_axis(values)
-    before, std = array(values["excess"]) + 1.0, array(values["std"])
-    known = np.isfinite(before)
-    shade(axes, document["where"]["frequency_hz"])
+    edges, centre = _spectrum_axis(values)
+    known = np.isfinite(array(values["excess"]))
+    centre, noise = centre[known], SIGMAS * array(values["std"])[known]
+    if interval is not None:
+        axes.axvspan(*interval, color=MARK, alpha=0.28, linewidth=0)
     low, high = values["resonance_hz"]
     axes.axvspan(0.985 * low, 1.015 * high, ymax=0.035, color=QUIET, linewidth=0)
-    axes.fill_between(
-        centre[known],
-        np.maximum(1.0 - SIGMAS * std[known], 0.3),
-        1.0 + SIGMAS * std[known],
-        color=NOISE,
-        linewidth=0,
-        label="noise (3σ)",
-    )
-    floor = 0.3
-    axes.plot(centre[known], np.maximum(before[known], floor), color=BEFORE, label="nominal model")
+    floor = np.maximum(1.0 - noise, _LEAST_POWER)
+    axes.fill_between(centre, floor, 1.0 + noise, color=NOISE, linewidth=0, label="noise (3σ)")
+    before = np.maximum((array(values["excess"]) + 1.0)[known], _LEAST_POWER)
+    axes.plot(centre, before, color=BEFORE, label="nominal model")
     if values["after"] is not None:
-        after = array(values["after"]) + 1.0
-        axes.plot(
-            centre[known], np.maximum(after[known], floor), color=AFTER, lw=1.2, label="with the causes"
-        )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(float(edges[0]), float(edges[-1]))
+        after = np.maximum((array(values["after"]) + 1.0)[known], _LEAST_POWER)
+        axes.plot(centre, after, color=AFTER, lw=1.2, label="with the causes")
+    axes.set(xscale="log", yscale="log", xlim=(edges[0], edges[-1]), ylabel="residual power over noise")
     axes.set_xlabel("frequency [Hz]; dark bar: the runs' own frequencies")
-    axes.set_ylabel("residual power over noise")
     axes.legend(loc="upper right")
     grid(axes)
     return fig
 
 
-def spectrum_axis(values: Document) -> tuple[Array, Array]:
-    """The axis of a spectrum for a logarithmic scale.
-
-    Args:
-        values: ``frequency`` of the maps.
-
-    Returns:
-        Edges of the bins, the first one half the second instead of zero, shape (n + 1,), Hz; their centres,
-        shape (n,), Hz.
-    """
+def _spectrum_axis(values: Document) -> tuple[Array, Array]:
+    """Edges of the bins for a logarithmic scale, the first one half the second instead of zero; and centres, Hz."""
     edges = array(values["edges_hz"])
     positive = np.concatenate([[0.5 * edges[1]], edges[1:]])
     return positive, np.sqrt(positive[:-1] * positive[1:])
@@ -226,143 +183,103 @@ def spectrum_axis(values: Document) -> tuple[Array, Array]:
 
 @styled
 def phase_plane_figure(document: Document) -> Figure | None:
-    """The missing moment over angle and rate.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        A map; None where the maps hold none.
-    """
+    """The missing moment over angle and rate; None where the maps hold none."""
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
-    edges = array(plane["edges_rad"])
-    clear, reach, unit, _ = plane_cells(plane)
+    low, *_, high = plane["edges_rad"]
+    clear, reach, unit, _ = _plane_cells(plane)
     fig = figure(NARROW, 4.4)
     axes = fig.add_subplot()
-    extent = (float(edges[0]), float(edges[-1]), float(edges[0]), float(edges[-1]))
-    colours = faded(AFTER, BEFORE)
     image = axes.imshow(
-        clear, origin="lower", extent=extent, cmap=colours, vmin=-reach, vmax=reach, interpolation="nearest"
-    )
-    axes.set_xlabel(_ANGLE)
-    axes.set_ylabel(_RATE)
+        clear, origin="lower", extent=(low, high, low, high), cmap=faded(AFTER, BEFORE),
+        vmin=-reach, vmax=reach, interpolation="nearest",
+    )  # fmt: skip
+    axes.set(xlabel=_ANGLE, ylabel=_RATE)
     fig.colorbar(image, ax=axes, location="top", label=f"missing moment [{unit}]", shrink=0.9, aspect=40)
     return fig
 
 
 @styled
 def moment_figure(document: Document) -> Figure | None:
-    """Means of the missing moment over all rates and over all angles.
-
-    Args:
-        document: a diagnosis with its maps.
-
-    Returns:
-        Two profiles with their 95 % bands; None where the maps hold none.
-    """
+    """Means of the missing moment over all rates and over all angles; None where the maps hold none."""
     plane = document["maps"]["phase_plane"]
     if plane is None:
         return None
     edges = array(plane["edges_rad"])
-    _, _, unit, factor = plane_cells(plane)
+    _, _, unit, factor = _plane_cells(plane)
     fig = figure(NARROW, 5.0)
     centre = 0.5 * (edges[1:] + edges[:-1])
     for axes, name, label in zip(fig.subplots(2, 1), ("by_angle", "by_rate"), (_ANGLE, _RATE), strict=True):
-        mean, spread = factor * array(plane[name]), factor * array(plane[f"{name}_std"])
+        mean, band = factor * array(plane[name]), INTERVAL * (factor * array(plane[f"{name}_std"]))
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
-        axes.fill_between(
-            centre, mean - INTERVAL * spread, mean + INTERVAL * spread, color=BEFORE, alpha=0.2, lw=0
-        )
+        axes.fill_between(centre, mean - band, mean + band, color=BEFORE, alpha=0.2, lw=0)
         axes.plot(centre, mean, color=BEFORE, marker="o", ms=3)
-        axes.set_xlabel(label)
-        axes.set_ylabel(f"mean over all {'rates' if name == 'by_angle' else 'angles'} [{unit}]")
+        others = "rates" if name == "by_angle" else "angles"
+        axes.set(xlabel=label, ylabel=f"mean over all {others} [{unit}]")
         grid(axes)
     return fig
 
 
-def plane_cells(plane: Document) -> tuple[Array, float, str, float]:
-    """The map of the missing moment.
+def _plane_cells(plane: Document) -> tuple[Array, float, str, float]:
+    """The missing moment by rate (rows) and angle (columns), NaN within three standard deviations of zero.
 
-    Args:
-        plane: of the maps.
-
-    Returns:
-        The moment by rate (rows) and angle (columns), shape (n, n), NaN within three standard deviations of zero;
-        the greatest value of the scale; their unit; and the factor from the document's unit to it.
+    Also the greatest value of its scale, a unit in which the values are neither thousands nor thousandths, and the
+    factor from the document's unit to that one.
     """
     moment = np.stack([array(row) for row in plane["moment"]])
     std = np.stack([array(row) for row in plane["std"]])
-    unit, factor = _readable(plane, np.abs(moment))
     known = np.abs(moment[np.isfinite(moment)])
+    unit, factor = plane["unit"].replace("rad/s2", "rad/s²"), 1.0
+    if known.size and known.max() < 0.1:
+        unit, factor = f"10⁻³ {unit}", 1e3
     reach = float(np.quantile(known, 0.98)) * factor if known.size else 1.0
     return np.where(np.abs(moment) > SIGMAS * std, moment * factor, np.nan), reach, unit, factor
 
 
-def _readable(plane: Document, size: Array) -> tuple[str, float]:
-    """A unit in which the values are neither thousands nor thousandths."""
-    unit = _UNITS.get(plane["unit"], str(plane["unit"]))
-    greatest = float(np.nanmax(size)) if np.isfinite(size).any() else 1.0
-    return (f"10⁻³ {unit}", 1e3) if greatest < 0.1 else (unit, 1.0)
-
-
 def charts(document: Document) -> dict[str, list[Chart]]:
-    """The charts of a diagnosis.
-
-    Args:
-        document: the diagnosis as JSON's types; without ``maps`` there are none.
-
-    Returns:
-        Charts by the name of the figure that they replace on a screen.
-    """
+    """The charts of a diagnosis by the name of the figure that they replace on a screen; none without ``maps``."""
     maps = document.get("maps")
     if not maps:
         return {}
-    by_figure = {"where-runs": [_runs(maps)], "where-spectrum": [_spectrum(maps)]}
-    if maps["phase_plane"] is not None:
-        by_figure["where-phase-plane"] = [_plane(maps["phase_plane"])]
-    return by_figure
-
-
-def _runs(maps: Document) -> Chart:
-    cells, low, high = run_cells(maps)
+    cells, low, high = _run_cells(maps)
     ids = [str(run["id"]) for run in maps["runs"]]
-    return {
+    runs = {
         "kind": "cells",
         "title": "Excess of every run over time",
-        "x": {"label": "time since the start of the record [s]", "edges": maps["time"]["edges_s"]},
+        "x": {"label": TIME, "edges": maps["time"]["edges_s"]},
         "y": {"label": "run", "edges": np.arange(len(ids) + 1).tolist(), "names": ids},
         "labels": [run_label(run) for run in maps["runs"]],
-        "values": [rounded(row) for row in cells],
+        "values": [_rounded(row) for row in cells],
         "unit": "noise variances",
         "range": [low, high],
         "log": True,
     }
-
-
-def _plane(plane: Document) -> Chart:
-    cells, reach, unit, _ = plane_cells(plane)
-    edges = plane["edges_rad"]
-    return {
-        "kind": "cells",
-        "title": "Missing moment",
-        "x": {"label": "angle β [rad]", "edges": edges},
-        "y": {"label": "rate β̇/ω [rad]", "edges": edges},
-        "values": [rounded(row) for row in cells],
-        "unit": unit,
-        "range": [-reach, reach],
-        "log": False,
-    }
+    by_figure: dict[str, list[Chart]] = {"where-runs": [runs], "where-spectrum": [_spectrum(maps)]}
+    plane = maps["phase_plane"]
+    if plane is not None:
+        cells, reach, unit, _ = _plane_cells(plane)
+        missing = {
+            "kind": "cells",
+            "title": "Missing moment",
+            "x": {"label": _ANGLE, "edges": plane["edges_rad"]},
+            "y": {"label": _RATE, "edges": plane["edges_rad"]},
+            "values": [_rounded(row) for row in cells],
+            "unit": unit,
+            "range": [-reach, reach],
+            "log": False,
+        }
+        by_figure["where-phase-plane"] = [missing]
+    return by_figure
 
 
 def _spectrum(maps: Document) -> Chart:
     given = maps["frequency"]
-    centre = spectrum_axis(given)[1]
+    centre = _spectrum_axis(given)[1]
     nothing = np.full(centre.size, np.nan)
     excess, std = array(given["excess"]), SIGMAS * array(given["std"])
     after = nothing if given["after"] is None else array(given["after"])
-    views = [_filled(_ALL, centre, -std, std, excess, after)]
+    views = [_filled("all runs together", centre, -std, std, excess, after)]
     for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
         views.append(_filled(run_label(run), centre, nothing, nothing, array(by_bin), nothing, run=run["id"]))
     return {
@@ -384,20 +301,159 @@ def _spectrum(maps: Document) -> Chart:
 def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
     """A view of the bins that hold a value; the others are empty, and a null there would break the curves."""
     filled = np.any(np.isfinite(excesses), axis=0)
-    power = (rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
-    return view(label, rounded(centre[filled]), *power, run=run)
+    power = (_rounded(np.maximum(1.0 + excess[filled], _LEAST_POWER)) for excess in excesses)
+    return {"label": label, "run": run, "data": [_rounded(centre[filled]), *power]}
 
 
-def view(label: str, *data: Sequence[float | None], run: str = "") -> Chart:
-    """The curves of a chart of lines that are shown together; ``run`` is the run they belong to."""
-    return {"label": label, "run": run, "data": list(data)}
+def _rounded(values: Array, digits: int = 4) -> list[float | None]:
+    """Numbers for JSON, as many digits as a screen shows; null where a value is not known."""
+    return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]
 
 
-def rounded(values: Array, digits: int = 4) -> list[float | None]:
-    """Numbers for JSON, as many digits as a screen shows; null where a value is not known.
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """One run, in degrees where the readings are angles.
 
     Args:
-        values: of any unit and shape, flattened, shape (n,).
-        digits: significant ones (count).
+        unit: of the readings.
+        time: s, shape (n,).
+        reading: in ``unit``, shape (n,).
+        before: residuals of the nominal model, in ``unit``, shape (n,).
+        after: residuals with the causes, in ``unit``, shape (n,); NaN where nothing was added.
+        differ: the cycles in which the models differ most, s.
     """
-    return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.ravel(values).tolist()]
+
+    id: str
+    label: str
+    unit: str
+    time: Array
+    reading: Array
+    before: Array
+    after: Array
+    differ: tuple[float, float]
+
+
+def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
+    """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``.
+
+    Raises:
+        TunnelError: for a run that the diagnosis does not have.
+    """
+    maps = document.get("maps") or {"runs": [], "traces": []}
+    unit, factor = unit_shown(maps.get("unit", "rad"))
+    labels = {run["id"]: run_label(run) for run in maps["runs"]}
+    traces = {trace["id"]: trace for trace in maps["traces"] if "reading_rad" in trace}
+    runs = []
+    for name in ids or traces:
+        if name not in traces:
+            known = ", ".join(traces) or "none"
+            raise TunnelError(f"the diagnosis has no run {name!r}", remedy=f"choose of its runs: {known}")
+        trace = traces[name]
+        time = array(trace["time_s"])
+        reading, before = factor * array(trace["reading_rad"]), factor * array(trace["before_rad"])
+        after = trace["after_rad"]
+        after = np.full(time.size, np.nan) if after is None else factor * array(after)
+        first, last = trace["differ_s"]
+        runs.append(Curves(name, labels.get(name, name), unit, time, reading, before, after, (first, last)))
+    return runs
+
+
+def fit_figure(document: Document, ids: Sequence[str] = ()) -> Figure | None:
+    """The fit over the data of the first two of `fitted_runs`; None without runs.
+
+    A column for each run: the whole record, in which the cycles are marked where the models differ most; these
+    cycles with the reading and what both models predict; and the residuals there.
+    """
+    runs = fitted_runs(document, ids)[:_COLUMNS]
+    return _drawn(runs) if runs else None
+
+
+def fit_pages(document: Document, ids: Sequence[str] = ()) -> list[Figure]:
+    """The fit over the data of all runs, two to a figure, as `fit_figure` draws them."""
+    runs = fitted_runs(document, ids)
+    return [_drawn(runs[first : first + _COLUMNS]) for first in range(0, len(runs), _COLUMNS)]
+
+
+def fit_sheets(document: Document) -> dict[str, Figure]:
+    """The fit over the data of the two runs with the largest gap, in the heights that a printed page may have left.
+
+    The highest comes first; the lower ones show the cycles where the models differ most and not the whole record.
+    """
+    runs = fitted_runs(document)[:_COLUMNS]
+    sheets = _SHEETS.items() if runs else ()
+    return {name: _drawn(runs, height, whole="near" not in name) for name, height in sheets}
+
+
+@styled
+def _drawn(runs: Sequence[Curves], height: float = _HEIGHT, *, whole: bool = True) -> Figure:
+    fig = figure(WIDTH, height)
+    ratios = (0.7, 1.3, 0.9) if whole else (1.3, 0.9)
+    panels = fig.subplots(len(ratios), len(runs), squeeze=False, height_ratios=ratios)
+    for (*above, near, left), run in zip(panels.T, runs, strict=True):
+        for axes in above:
+            axes.plot(*with_breaks(run.time, run.reading), color=QUIET, linewidth=0.7)
+            axes.axvspan(*run.differ, color=MARK, alpha=0.4, linewidth=0)
+        (*above, near)[0].set_title(figure_text(run.label))
+        _curves(near, run, run.reading, run.reading - run.before, run.reading - run.after)
+        near.tick_params(labelbottom=False)
+        _curves(left, run, None, run.before, run.after)
+        left.axhline(0.0, color=QUIET, linewidth=0.8, zorder=0)
+        left.set_xlabel(TIME)
+        for axes in (*above, near, left):
+            grid(axes)
+    for axes, name in zip(panels[::-1, 0], ("residual", "reading", "whole reading"), strict=False):
+        axes.set_ylabel(f"{name} [{runs[0].unit}]")
+    handles, labels = panels[-2, 0].get_legend_handles_labels()
+    fig.legend(handles, labels, loc="outside lower center", ncols=3)
+    return fig
+
+
+def _curves(axes: Axes, run: Curves, measured: Array | None, before: Array, after: Array) -> None:
+    """Curves of the cycles in which the models differ most."""
+    shown = (run.time >= run.differ[0]) & (run.time <= run.differ[1])
+    if measured is not None:
+        points = with_breaks(run.time[shown], measured[shown])
+        axes.plot(*points, color=QUIET, linewidth=4.0, alpha=0.5, label=_MEASURED)
+    for values, colour, label in ((before, BEFORE, _NOMINAL), (after, AFTER, _CAUSES)):
+        if np.isfinite(values).any():
+            points = with_breaks(run.time[shown], values[shown])
+            axes.plot(*points, color=colour, linewidth=1.0, label=label)
+    axes.set_xlim(*run.differ)
+
+
+def fit_charts(document: Document) -> dict[str, list[Chart]]:
+    """The readings of every run and, below them on the same axis, the residuals, under the name ``fit``.
+
+    They show the cycles first in which the models differ most; there are none without ``maps``.
+    """
+    runs = fitted_runs(document)
+    if not runs:
+        return {}
+    models = [{"label": _NOMINAL, "role": "before"}, {"label": _CAUSES, "role": "after"}]
+    measured = {"label": _MEASURED, "role": "quiet", "width": 6}
+    fits = [_view(run, run.reading, run.reading - run.before, run.reading - run.after) for run in runs]
+    residuals = [_view(run, run.before, run.after) for run in runs]
+    return {
+        "fit": [
+            {
+                "kind": "lines",
+                "title": title,
+                "height": height,
+                "x": {"label": TIME, "log": False},
+                "y": {"label": f"{title.lower()} [{runs[0].unit}]", "log": False},
+                "series": series,
+                "views": views,
+            }
+            for title, height, series, views in (
+                ("Reading", 300, [measured, *models], fits),
+                ("Residual", 200, models, residuals),
+            )
+        ]
+    }
+
+
+def _view(run: Curves, *curves: Array) -> Chart:
+    """Curves over time, which break where samples are missing, and the stretch that is shown first."""
+    time, *values = with_breaks(run.time, *curves)
+    data = [_rounded(time, 6), *(_rounded(one, 5) for one in values)]
+    return {"label": run.label, "run": run.id, "data": data, "range": list(run.differ)}

@@ -14,7 +14,7 @@ import pytest
 from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench.workspace import Session
-from tunnel_lab.report import advice
+from tunnel_lab.report import view
 from tunnel_lab.terminal import outputs
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -89,7 +89,7 @@ def test_the_page_shows_what_is_tried(tmp_path: Path, monkeypatch: pytest.Monkey
     lines = ("2.5 s: fitting sets of effects", "3.0 s: fitting sets of effects: free_play + mains_hum")
     state = work.Work("tunnel diagnose rig", 1, "2026-01-01T00:00:00+00:00", lines, running=True)
     monkeypatch.setattr(work, "work_of", lambda _: state)
-    shown = texts(diagnosis.build_diagnose, given)
+    shown = texts(diagnosis.DiagnosePage, given)
     (clock,) = [text for text in shown if "so far" in text]
     assert "s so far, now with free play + mains hum." in clock
     assert "fitting sets of effects … since 2.5 s" in shown
@@ -160,6 +160,6 @@ def test_other_runs_differ_in_what_can_be_chosen() -> None:
         ({"coefficients": NORMALISED}, "other wind speeds and release angles,"),
         ({"model": {"file": "a.xml"}}, "other wind speeds and release angles,"),
     ):
-        steps = advice.next_steps(document() | undecided | changes)
+        steps = view.next_steps(document() | undecided | changes)
         assert any(words in step for step in steps), steps
-    assert advice.run_to_make(document() | {"next_run": None}) is None
+    assert view.run_to_make(document() | {"next_run": None}) is None

@@ -9,8 +9,8 @@ import pytest
 
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import conditions, preview
+from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.records import write
-from tunnel_lab.bench.words import page_words
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.importing.conditions import read_recipe

@@ -76,9 +76,9 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
     hashes = {} if changed else file_hashes(session.campaign)
     session.diagnosis.write_text(json.dumps({"verdict": "A gap.", "provenance": {"sha256": hashes}}))
-    monkeypatch.setattr(diagnosis, "_Answer", lambda _, document: ui.label(document["verdict"]))
+    monkeypatch.setattr(diagnosis, "Answer", lambda _, document: ui.label(document["verdict"]))
     with Client(ui.page("/"), request=Request({"type": "http", "path": "/", "headers": []})) as client:
-        diagnosis.build_diagnose(session, Frame("Diagnose", session, "diagnose"))
+        diagnosis.DiagnosePage(session, Frame("Diagnose", session, "diagnose"))
     shown = [one.text for one in client.elements.values() if isinstance(one, ui.label)]
     assert ("A gap." in shown) is not changed
     assert any("has changed since it was diagnosed" in text for text in shown) is changed

@@ -13,7 +13,7 @@ from diagnosis.decision import decision
 from diagnosis.printing import gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tests.unit.diagnosis_document import campaign, document
-from tunnel_lab.report import advice, view
+from tunnel_lab.report import view
 from tunnel_lab.report.page import render_report
 
 
@@ -72,7 +72,7 @@ def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
     given = document()
     given["gap"] |= found.to_json_dict()
     given["verdict"] = said("quadratic_damping", size=found)
-    words = view.verdict_words(given)
+    words = view.typeset(given["verdict"])
     before, _, closed, probability = view.facts(given | {"candidates": [{"probability": 0.9}]})
     assert f"{before.value} root mean square, " in words
     assert before.note.rpartition("; ")[2] in words
@@ -202,5 +202,5 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     labels = [fact.label for fact in view.facts(given)]
     assert "With the most probable answer added" in labels
     assert "Probability of the most probable answer" in labels
-    assert any("Do not repair" in step for step in advice.next_steps(given))
+    assert any("Do not repair" in step for step in view.next_steps(given))
     assert parameters_table(given).title.startswith("Parameters of the most probable answer")

@@ -15,7 +15,7 @@ from matplotlib.transforms import Bbox
 
 from tests.unit.diagnosis_document import CAUSE, RIVAL, document
 from tests.unit.shown_numbers import assert_shows
-from tunnel_lab.report.waterfall import waterfall_figure
+from tunnel_lab.report.figures import waterfall_figure
 
 Document = dict[str, Any]
 
