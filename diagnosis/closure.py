@@ -247,30 +247,18 @@ class Closable:
         ceilings: by kind.
         kind: the simplest that closes about as much as any, of `KINDS`.
         words: the same in a sentence or two.
+        events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
         curve: of that kind; None where it has none.
         law: a formula; None where none is supported.
-        events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
     """
 
     excess: float
     ceilings: tuple[Ceiling, ...]
     kind: str
     words: str
+    events: tuple[Mapping[str, Any], ...] = ()
     curve: Curve | None = None
     law: Law | None = None
-    events: tuple[Mapping[str, Any], ...] = field(default=())
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields, in JSON's types."""
-        return {
-            "excess": self.excess,
-            "ceilings": as_json(self.ceilings),
-            "kind": self.kind,
-            "words": self.words,
-            "events": as_json(self.events),
-            "curve": as_json(self.curve),
-            "law": as_json(self.law),
-        }
 
 
 def closable_words(document: Mapping[str, Any]) -> str:
