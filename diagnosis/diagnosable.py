@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import free_frequency, frequency, response_to_input
-from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES
+from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
 from identification.examination.clock import with_clocks

@@ -53,37 +53,23 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
         return dict.fromkeys(_NAMES, 1.0)
     white = noise.white(trend.step)
     factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
     found = np.zeros(3)
     for factor in factors:
         level = {run: factor * std for run, std in white.items()}
-        found = np.maximum(found, _p_values(trend, _repetitions(fit, level, trend.step)))
+        repetitions = repeated(fit, level, trend.step, count)
+        chance = trend_statistics((reading, run.sample_times) for run, _, reading in repetitions)
+        assert chance is not None  # the campaign was judged
+        mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
+        score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / len(chance)))
+        two_sided = 2.0 * stdtr(len(chance) - 1, -np.abs(score[:2]))
+        found = np.maximum(found, np.append(two_sided, stdtr(len(chance) - 1, -score[2])))
     return dict(zip(_NAMES, found.tolist(), strict=True))
-
-
-def _p_values(trend: NoiseTrend, chance: Array) -> Array:
-    count = len(chance)
-    mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
-    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
-    score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
-    two_sided = 2.0 * stdtr(count - 1, -np.abs(score[:2]))
-    return np.append(two_sided, stdtr(count - 1, -score[2]))
-
-
-def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
-    """Statistics of the campaign repeated, shape (repetitions, 3)."""
-    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
-    readings = ((reading, run.sample_times) for run, _, reading in repeated(fit, white, step, count))
-    found = trend_statistics(readings)
-    assert found is not None  # the campaign was judged
-    return found
 
 
 def level_p_value(fit: Fit, noise: Noise) -> float:
     """Probability that noise as stated, allowing for its rounding, is estimated as high as it is.
-
-    Args:
-        fit: gives the records' lengths.
-        noise: of the campaign; its stated variance is not None.
 
     Returns:
         The p-value of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
@@ -141,7 +127,19 @@ def gap_test(
     Returns:
         The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
-    level, scatter = (np.ones(6), np.zeros(6)) if errors is None else _under_rounding(fit, errors)
+    level, scatter = np.ones(6), np.zeros(6)
+    if errors is not None:
+        # statistics under noise and rounding, and their scatter beyond that of white noise, as shares of what white
+        # noise of the fit's variance gives: the bands, then the offset
+        found, count = [], np.ones(len(BANDS) + 1)
+        for number in range(len(errors[0])):
+            residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
+            bands = _by_band(fit, residuals)
+            count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
+            found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
+        level = np.mean(found, axis=0)
+        beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
+        level, scatter = np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
     floor = (1.0 + FLOOR_TOLERANCE) * noise.margin * level
     tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
     tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
@@ -301,31 +299,8 @@ def _by_band(fit: Fit, residuals: Sequence[Array]) -> list[tuple[Array, Array]]:
     return [(power[where == index], place[where == index]) for index in range(len(BANDS))]
 
 
-def _under_rounding(fit: Fit, errors: Sequence[Array]) -> tuple[Array, Array]:
-    """Level of the tests' statistics under noise and rounding, and its scatter beyond that of white noise.
-
-    Both are shares of what white noise of the fit's variance gives, shape (tests,): the bands, then the offset.
-    """
-    found, count = [], np.ones(len(BANDS) + 1)
-    for number in range(len(errors[0])):
-        residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
-        bands = _by_band(fit, residuals)
-        count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
-        found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
-    level = np.mean(found, axis=0)
-    beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
-    return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
-
-
 def noise_remarks(noise: Noise, trend: NoiseTrend) -> tuple[Remark, ...]:
-    """What the user should know of the noise.
-
-    Args:
-        trend: of the noise with the motion.
-
-    Returns:
-        Remarks where the noise is coloured, and where the sampling is too slow to compare it with the motion.
-    """
+    """Remarks where the noise is coloured, and where the sampling is too slow to compare it with the motion."""
     found = []
     runs = tuple(noise.variance)
     if noise.colour is not None:
