@@ -13,6 +13,7 @@ from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
+from diagnosis.closure import UNPATCHED
 from diagnosis.diagnosable import (
     BY_MOMENT,
     NOT_SOUGHT,
@@ -24,7 +25,6 @@ from diagnosis.diagnosable import (
     with_law,
 )
 from diagnosis.noise.gap import noise_remarks
-from diagnosis.patched import UNPATCHED
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress, investigate
@@ -36,7 +36,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from diagnosis.patched import PatchedModel
+    from diagnosis.closure import PatchedModel
     from diagnosis.search.investigate import Study
     from tunnel_sim.engine.joint_model import JointModel
 

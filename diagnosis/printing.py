@@ -6,9 +6,16 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from diagnosis.closure import closable_table, closable_words, misfit_of, of_swing, rms_shown
+from diagnosis.closure import (
+    closable_table,
+    closable_words,
+    misfit_of,
+    of_swing,
+    patch_lines,
+    patch_table,
+    rms_shown,
+)
 from diagnosis.decision import plain, probability
-from diagnosis.patched import patch_lines, patch_table
 from diagnosis.policy import LISTED_PROBABILITY
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 from identification.status import Remark

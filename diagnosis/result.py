@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from diagnosis.closure import Closable, Misfit, Remainder, Waterfall
+from diagnosis.closure import Closable, Misfit, PatchedModel, Remainder, Waterfall
 from diagnosis.decision import Decision, decision
-from diagnosis.patched import PatchedModel
 from diagnosis.printing import diagnosis_brief, diagnosis_parts
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text

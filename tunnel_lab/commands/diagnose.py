@@ -270,7 +270,7 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
     Raises:
         TunnelError: when the answer has none, with the reason.
     """
-    from diagnosis.patched import UNPATCHED
+    from diagnosis.closure import UNPATCHED
     from tunnel_sim.vocabulary.errors import TunnelError
 
     if answer.model is None:
@@ -284,8 +284,7 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
 def show(document: dict[str, Any]) -> None:
     """Print an answer: the verdict in words, then the figures behind it."""
     from diagnosis import printing as parts
-    from diagnosis.closure import closable_table, closable_words
-    from diagnosis.patched import patch_lines, patch_table
+    from diagnosis.closure import closable_table, closable_words, patch_lines, patch_table
     from tunnel_lab.terminal.tables import rich_table, say, show_tables
 
     say(document["verdict"])
