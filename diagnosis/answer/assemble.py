@@ -21,9 +21,9 @@ from diagnosis.answer.verdict import blind_spots, cautions, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.answer.what_remains import remainder
 from diagnosis.closure import PatchedModel
-from diagnosis.decision import decision
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.policy import INTERVAL_SHARE, RIVAL_PROBABILITY
+from diagnosis.printing import decision
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, ParameterEstimate, Where
 from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, Weighed, main_effect

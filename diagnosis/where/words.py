@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
-from diagnosis.decision import plain
 from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
+from diagnosis.printing import plain
 from diagnosis.result import Where
 from diagnosis.where.place import Finding
 from diagnosis.where.survey import Survey

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from diagnosis.decision import plain
+from diagnosis.printing import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, address, button, show_command, show_parts
 from tunnel_lab.bench.workspace import Session, is_current, read_result

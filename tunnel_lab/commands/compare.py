@@ -67,8 +67,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
     Returns:
         Gap and answer, parameters of the answers, coefficients, and the coefficients' differences from the first.
     """
-    from diagnosis.decision import probability
-    from diagnosis.printing import share
+    from diagnosis.printing import probability, share
 
     answers: Rows = (
         ("gap [noise powers]", *(_excess(d, "excess_before") for d in documents)),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from diagnosis.decision import plain
-from diagnosis.printing import run_words
+from diagnosis.printing import plain, run_words
 from identification.printing import significant
 from tunnel_lab.report.view import Document, windy
 from tunnel_sim.effects import known_effects

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.decision import plain, probability
 from diagnosis.policy import LISTED_PROBABILITY
+from diagnosis.printing import plain, probability
 from identification.printing import coefficient_label
 from tunnel_lab.plotting.style import (
     COLOURS,

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.decision import plain
-from diagnosis.printing import excess_std
+from diagnosis.printing import excess_std, plain
 from identification.printing import significant
 from tunnel_lab.plotting.style import figure, grid, styled
 from tunnel_lab.report.drawing import (
