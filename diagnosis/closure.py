@@ -34,14 +34,7 @@ class Misfit:
     unit: str
 
     def rms(self, excess: float) -> float:
-        """Root mean square of what a model leaves beyond the noise.
-
-        Args:
-            excess: in noise variances of a sample; below zero it is chance.
-
-        Returns:
-            In ``unit``.
-        """
+        """Root mean square in ``unit`` of an excess in noise variances of a sample, which is chance below zero."""
         return self.noise * math.sqrt(max(excess, 0.0))
 
 
@@ -151,7 +144,6 @@ class Remainder:
         p_value: of the strongest test, corrected for the number of tests.
         material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
         moves: by coefficient.
-        words: the same in a sentence.
     """
 
     significant: bool
@@ -234,8 +226,7 @@ class Law:
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; of the parameters ``value`` and ``std``."""
         parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
-        effect = as_json(self.effect)
-        return {"effect": effect, "parameters": parameters, "closed": self.closed, "std": self.std}
+        return as_json({**vars(self), "parameters": parameters})
 
 
 @dataclass(frozen=True)
@@ -287,14 +278,11 @@ def closable_table(document: Mapping[str, Any]) -> TextTable:
 
 
 def percent(share: float, std: float | None = None) -> str:
-    """A share in per cent with its standard deviation.
+    """A share in per cent, such as ``94.2 ± 0.6 %``.
 
     Args:
         share: a fraction.
-        std: likewise; None: not given.
-
-    Returns:
-        Text such as ``94.2 ± 0.6 %``; a standard deviation beyond 100 % is not resolved further.
+        std: its standard deviation, a fraction; beyond 1 it is not resolved further.
     """
     beside = "" if std is None else f" ± {min(max(100.0 * std, 0.1), 100.0):.1f}"
     return f"{min(100.0 * share, 100.0):.1f}{beside} %"

@@ -64,10 +64,7 @@ class Colour:
     steep: float
 
     def at(self, frequency: Array) -> Array:
-        """Natural logarithm of the power ratio at frequencies above zero, Hz, any shape.
-
-        It is as high below the first band as chance allows.
-        """
+        """The level at frequencies above zero, Hz, of their shape; as high below the first band as chance allows."""
         return self._extended(frequency, self.steep)
 
     def _extended(self, frequency: Array, slope: float) -> Array:
@@ -76,24 +73,16 @@ class Colour:
         return np.asarray(np.interp(place, places, self.level) + slope * below)
 
     def mean(self, count: int, interval: float) -> float:
-        """The mean power over the frequencies of a record.
+        """The mean power over the frequencies of a record of a number of values.
 
         Args:
-            count: values in the record.
             interval: between them, s.
         """
         frequency = np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)
         return float(np.mean(np.exp(self._extended(frequency, self.slope))))
 
     def spread(self, frequency: Array) -> float:
-        """How well the mean power over some frequencies is known.
-
-        Args:
-            frequency: Hz, above zero, shape (n,).
-
-        Returns:
-            Standard deviation of the mean power, a share of it.
-        """
+        """Standard deviation of the mean power over frequencies above zero, Hz, shape (n,), a share of it."""
         place, places = np.log(frequency), np.log(self.frequency)
         nearest = np.argmin(np.abs(place[:, None] - places), axis=1)
         share = np.bincount(nearest, minlength=places.size) / place.size

@@ -40,9 +40,6 @@ _HANN = 1.57  # correlated bins of the windowed periodogram that carry the infor
 def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
     """Probability that white noise behaves like that of the campaign.
 
-    Args:
-        trend: of the campaign.
-
     Returns:
         P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise
         and the readings' lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993);
@@ -117,8 +114,6 @@ def gap_test(
     """Test whether a fit's residuals and the noise are consistent with white noise.
 
     Args:
-        fit: usually of the nominal model.
-        trend: of the noise with the motion.
         coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
             noise are then not tested.
         errors: what noise and rounding leave in the block means, by run, repetitions of it, shape (repetitions,
@@ -171,7 +166,6 @@ def gap_or_colour(
 
     Args:
         nominal: fit of the nominal model to runs prepared for white noise.
-        trend: of the noise with the motion.
         step: of the lattice of the readings, rad; 0 where there is none.
         coarse_step: as `gap_test` takes it.
 
@@ -238,11 +232,7 @@ def _known(_frequency: Array) -> float:
 def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatter: float = 0.0) -> float:
     """Probability that white noise alone moves the runs' means as far from the common zero.
 
-    Args:
-        fit: its residuals, in noise standard deviations.
-        floor: power assumed for white noise, a factor on the noise variance.
-        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
-        scatter: standard deviation of the floor, a share of it.
+    It takes arguments as in `band_p_values`.
 
     Returns:
         The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own
@@ -266,7 +256,6 @@ def band_p_values(
     """Probability that white noise alone gives as much power in each band, summed over the runs.
 
     Args:
-        fit: its residuals, in noise standard deviations.
         floor: power assumed for white noise, a factor on the noise variance; one for all bands, or shape (bands,).
         spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
         scatter: standard deviation of the floor, a share of it, of its shape.

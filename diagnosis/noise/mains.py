@@ -31,7 +31,7 @@ class Hum:
     Args:
         frequency: Hz.
         amplitude: of the fundamental, rad, root mean square over the runs.
-        std: its standard deviation, rad.
+        std: of the amplitude, rad.
         frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
         excess: what it adds to the mean squared residual over the noise variance, a ratio.
     """
@@ -44,11 +44,10 @@ class Hum:
 
 
 def find_hum(nominal: Fit) -> float | None:
-    """The hum in the residuals of the nominal fit.
+    """The frequency of a hum in the residuals of the nominal fit, Hz; None where there is none beyond chance.
 
-    Returns:
-        Its frequency, Hz; None where there is none beyond chance. A ringing rod and the harmonics of a motion with
-        corners also raise the spectrum beside the line, and are therefore rejected.
+    A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
+    therefore rejected.
     """
     line = mains_line(nominal)
     if line is None or line.contrast < HUM_CONTRAST:
@@ -58,13 +57,10 @@ def find_hum(nominal: Fit) -> float | None:
 
 
 def refine_frequency(campaign: Campaign, frequency: float) -> float:
-    """The frequency of the mains, to a small fraction of a spectral bin.
+    """The frequency at which a sine and its harmonics remove most power from all records, Hz.
 
     Args:
-        frequency: Hz, to within 0.02 Hz.
-
-    Returns:
-        The frequency at which a sine and its harmonics remove most power from all records, Hz.
+        frequency: of the mains, Hz, to within 0.02 Hz.
     """
     cleared = [_without_motion(run.record, np.hanning(run.record.time_s.size))[1] for run in campaign.runs]
 

@@ -64,13 +64,7 @@ def repeated(
 def rounding_errors(
     fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None
 ) -> list[Array] | None:
-    """What noise and rounding alone leave in the block means.
-
-    Args:
-        fit: gives the motion.
-        white: standard deviation of a sample's noise before rounding, rad, by run id.
-        step: of the lattice, rad.
-        levels: as `repeated` takes them, shape (levels,), rad.
+    """What noise and rounding alone leave in the block means, arguments as in `repeated`.
 
     Returns:
         By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make

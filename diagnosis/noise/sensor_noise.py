@@ -105,14 +105,7 @@ class Noise:
         return float(np.sqrt(self.used if self.colour is None else self.estimated))
 
     def spread(self, frequency: Array) -> float:
-        """How well the noise is known.
-
-        Args:
-            frequency: Hz, shape (n,).
-
-        Returns:
-            Standard deviation of its mean power over these frequencies, a share of it.
-        """
+        """Standard deviation of the mean power over some frequencies, Hz, shape (n,), a share of it."""
         return self.relative if self.colour is None else self.colour.spread(frequency)
 
 
@@ -142,14 +135,11 @@ def estimate_variance(record: Record, fastest: float | None = None) -> tuple[flo
 
 
 def floor_periodogram(values: Array, rate: float) -> tuple[Array, Array]:
-    """One-sided periodogram with a window whose leakage stays below the noise.
+    """One-sided periodogram with a window whose leakage stays below the noise: frequencies, Hz, and unit²/Hz.
 
     Args:
         values: samples, shape (n,).
         rate: Hz.
-
-    Returns:
-        Frequencies, Hz, and power, unit²/Hz.
     """
     window = np.hanning(values.size)
     spectrum = np.fft.rfft((values - np.mean(values)) * window)
@@ -329,11 +319,10 @@ def accuracy(record: Record, *, swings: bool = True) -> float:
 
 
 def reading_step(campaign: Campaign) -> float:
-    """The step of the lattice on which the readings lie.
+    """The step of the lattice on which the readings lie: the smallest difference between distinct readings, rad.
 
-    Returns:
-        The smallest difference between distinct readings, rad. This is the true resolution where the record
-        visits neighbouring steps, as every decay does; it is far below any step where readings are continuous.
+    This is the true resolution where the record visits neighbouring steps, as every decay does; it is far below any
+    step where readings are continuous.
     """
     return min((float(np.quantile(gaps, 0.02)) for gaps in _gaps(campaign)), default=0.0)
 
@@ -354,11 +343,7 @@ def reading_levels(campaign: Campaign) -> Array:
 
 
 def typical_step(levels: Array) -> float:
-    """The step of equal width whose rounding has the same power, rad.
-
-    Args:
-        levels: as `reading_levels` gives them, two or more, shape (levels,), rad.
-    """
+    """The step of equal width whose rounding has the power of `reading_levels`, two or more, rad."""
     widths = np.diff(levels)
     return float(np.sqrt(np.sum(widths**3) / np.sum(widths)))
 

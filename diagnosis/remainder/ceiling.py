@@ -148,15 +148,11 @@ def common_precision(parts: Sequence[Normal]) -> float:
 
 
 def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:
-    """χ² of every unit predicted without its group; of the fit to all units where it is in no group.
+    """χ² of every unit predicted without its group, or of the fit to all where it is in none, shape (units,).
 
     Args:
-        parts: by unit.
         groups: indices of the units left out together.
         precision: of the prior, as in `Ridge`, in the basis' units; None: the free columns alone.
-
-    Returns:
-        Shape (units,).
     """
 
     def solved(whole: Normal) -> Array:
@@ -177,14 +173,11 @@ def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision
 
 
 def ratio(drop: Array, left: Array) -> tuple[float, float]:
-    """Share of what was left that is closed.
+    """Share of what was left that is closed, and its standard deviation from the scatter of the units.
 
     Args:
         drop: of χ², by unit, shape (units,).
         left: excess before, by unit, shape (units,).
-
-    Returns:
-        Sum over sum, and its standard deviation from the scatter of the units.
     """
     whole = max(float(left.sum()), 1e-9)
     closed = float(drop.sum()) / whole
@@ -326,10 +319,5 @@ class Unexplained:
 
 
 def gaps(size: int, group: int = 1) -> NDArray[np.int_]:
-    """Which of the sets of short gaps left out in turn each of some samples belongs to, shape (size,).
-
-    Args:
-        size: number of samples.
-        group: samples for each row of a `Path`.
-    """
+    """The set of short gaps left out in turn to which each of ``size`` samples, ``group`` in a row, belongs."""
     return np.arange(size) // (_GAP * group) % _TURNS

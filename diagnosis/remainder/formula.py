@@ -161,7 +161,6 @@ class Formula:
     """A sum of terms with coefficients.
 
     Args:
-        terms: in the order in which they were found.
         coefficients: of each, in N m, or rad for a reading, over the term's own unit.
         of_reading: whether it is an error of the reading.
         delta: steps of the fit's common parameters that go with it, in their units, shape (common,).
@@ -189,11 +188,9 @@ class Proposal:
 
 
 def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | None:
-    """Find the terms, one after another.
+    """Find the terms of a kind, one after another.
 
     Args:
-        unexplained: what is left.
-        kind: of `diagnosis.closure.KINDS`.
         closable: drop of χ² on held-out runs that the kind's own basis reaches.
 
     Returns:

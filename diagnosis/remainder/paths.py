@@ -108,14 +108,7 @@ class Path:
         return np.ravel(found[0]), found[1]
 
     def response(self, moment: Array) -> Array:
-        """What a moment adds to the reading of the rig that was at rest.
-
-        Args:
-            moment: N m, shape (n, k).
-
-        Returns:
-            White residuals averaged in groups, shape (rows, k), in noise standard deviations.
-        """
+        """What a moment, N m, shape (n, k), adds to the reading of the rig that was at rest, as `rows`."""
         from scipy.signal import lfilter  # only here: slow to load
 
         run = self.run
@@ -130,14 +123,7 @@ class Path:
         return max(1, round(2.0 * np.pi / (self.omega * self.run.interval * _ROWS)))
 
     def seen(self, reading: Array) -> Array:
-        """A change of the reading as rows.
-
-        Args:
-            reading: unit of the reading, shape (n, k).
-
-        Returns:
-            Shape (rows, k), in noise standard deviations.
-        """
+        """A change of the reading, in its unit, shape (n, k), as `rows`."""
         run = self.run
         if run.samples is None:
             return self.rows(run.white(reading) / np.sqrt(run.noise_variance))
@@ -146,14 +132,7 @@ class Path:
         return self.rows(white * np.sqrt(count / (run.block * run.noise_variance)))
 
     def rows(self, white: Array) -> Array:
-        """Residuals averaged in groups.
-
-        Args:
-            white: in noise standard deviations, shape (n, k) or (n,).
-
-        Returns:
-            Of the same noise, shape (rows, k) or (rows,); an incomplete last group is left out.
-        """
+        """White residuals, shape (n, k) or (n,), averaged in whole groups to rows of the same noise."""
         count = white.shape[0] // self.group
         grouped = white[: count * self.group].reshape(count, self.group, *white.shape[1:])
         return np.asarray(grouped.sum(axis=1) / np.sqrt(self.group))

@@ -59,14 +59,15 @@ class Backbone:
 
 
 def backbones(fit: Fit) -> list[Backbone]:
-    """The backbone of every run; the fit is of the nominal model, and gives zero, noise and starting values."""
+    """The backbone of every run by a fit of the nominal model, in the measured rig's units."""
     found = []
+    seconds, hertz = (fit.problem.data.similarity.own(1.0, unit) for unit in ("s", "Hz"))
     for index, run in enumerate(fit.problem.data.runs):
         inertia, damping, stiffness = linear_coefficients(fit, index)
         if fit.problem.data.unrestrained:
             stiffness = inertia * (2.0 * np.pi * resonance(fit, index)) ** 2
         decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
-        nominal = decay.omega_n / (2.0 * np.pi), decay.zeta
+        nominal = decay.omega_n / (2.0 * np.pi) * hertz, decay.zeta
         if run.drive is not None:
             none = np.zeros(0)
             found.append(Backbone(run.id, none, none, none, none, none, none, *nominal))
@@ -80,13 +81,13 @@ def backbones(fit: Fit) -> list[Backbone]:
         alone: tuple[float | None, ...] = None, None, None
         if fitted and fitted[0].decay.omega_n > 0.0:
             own, excess = fitted[0].decay, float(np.mean((fitted[0].residual / std) ** 2)) - 1.0
-            alone = own.omega_n / (2.0 * np.pi), own.zeta, excess
+            alone = own.omega_n / (2.0 * np.pi) * hertz, own.zeta, excess
         backbone = Backbone(
             run.id,
-            np.array([run.start + w.start_s + 0.5 * w.duration_s for w in windows]),
+            np.array([run.start + w.start_s + 0.5 * w.duration_s for w in windows]) * seconds,
             np.array([w.amplitude.value / w.omega_n.value**run.derivative for w in windows]),
-            np.array([w.omega_n.value for w in windows]) / (2.0 * np.pi),
-            np.array([w.omega_n.std for w in windows]) / (2.0 * np.pi),
+            np.array([w.omega_n.value for w in windows]) / (2.0 * np.pi) * hertz,
+            np.array([w.omega_n.std for w in windows]) / (2.0 * np.pi) * hertz,
             np.array([w.zeta.value for w in windows]),
             np.array([w.zeta.std for w in windows]),
             *nominal,
@@ -222,7 +223,7 @@ def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
     """The map of the moment that the nominal model lacks in some runs, or in all where none is named.
 
     Returns:
-        The map; None where no run allows one.
+        In the measured rig's units; None where no run allows one.
     """
     data = fit.problem.data
     chosen = [i for i, run in enumerate(data.runs) if not run_ids or run.id in run_ids]
@@ -235,14 +236,17 @@ def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
     columns = [np.clip(np.digitize(a.angle, edges) - 1, 0, _BINS - 1) for a in runs]
     rows = [np.clip(np.digitize(a.rate, edges) - 1, 0, _BINS - 1) for a in runs]
     cells = [r * _BINS + c for r, c in zip(rows, columns, strict=True)]
-    plane, plane_std = (values.reshape(_BINS, _BINS) for values in _binned(runs, cells, _BINS * _BINS))
-    by_angle, by_rate = _binned(runs, columns, _BINS), _binned(runs, rows, _BINS)
     unit = "rad/s2" if data.normalised else "N m"
+    factor = data.similarity.own(1.0, unit)
+    plane, plane_std = (
+        values.reshape(_BINS, _BINS) for values in _binned(runs, cells, _BINS * _BINS, factor)
+    )
+    by_angle, by_rate = _binned(runs, columns, _BINS, factor), _binned(runs, rows, _BINS, factor)
     return PhasePlane(edges, plane, plane_std, *by_angle, *by_rate, unit, tuple(name for name, _ in found))
 
 
-def _binned(runs: list[Apparent], cells: list[np.ndarray], count: int) -> tuple[Array, Array]:
-    """Mean by cell over all runs, and its standard deviation under white noise."""
+def _binned(runs: list[Apparent], cells: list[np.ndarray], count: int, factor: float) -> tuple[Array, Array]:
+    """Mean by cell over all runs and its standard deviation under white noise, times a factor."""
     total, variance, number = np.zeros(count), np.zeros(count), np.zeros(count)
     for run, cell in zip(runs, cells, strict=True):
         for index in np.unique(cell):
@@ -253,4 +257,5 @@ def _binned(runs: list[Apparent], cells: list[np.ndarray], count: int) -> tuple[
             number[index] += int(inside.sum())
     shown = number >= _LEAST
     number = np.maximum(number, 1.0)
-    return np.where(shown, total / number, np.nan), np.where(shown, np.sqrt(variance) / number, np.nan)
+    mean, std = total / number, np.sqrt(variance) / number
+    return np.where(shown, mean, np.nan) * factor, np.where(shown, std, np.nan) * factor

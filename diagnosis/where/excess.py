@@ -39,7 +39,6 @@ class RunExcess:
     """One run's squared residual by frequency.
 
     Args:
-        id: of the run.
         frequency: of the coefficients, shape (n,), Hz.
         power: squared coefficients, shape (n,), in noise variances: one each under white noise.
         resonance: frequency of the run's free motion, Hz.
@@ -113,7 +112,6 @@ class BandExcess:
     """One band of the residual, all runs together.
 
     Args:
-        band: its name in `BANDS`.
         excess: sum of power beyond that of white noise, in units of the noise variance.
         mean: the same by coefficient, a ratio.
         p_value: probability of as much without a gap.

@@ -1,13 +1,12 @@
-"""Data of a diagnosis' figures: plain arrays, small enough to be part of its JSON, in the units of the campaign."""
+"""Data of a diagnosis' figures: plain arrays, small enough to be part of its JSON, in the measured rig's units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.where.along_motion import Backbone, PhasePlane
 from diagnosis.where.excess import BandExcess, Profile, ResidualLine
 from tunnel_sim.vocabulary.record import Array
@@ -212,62 +211,3 @@ def _plain(value: Any) -> Any:
 
 def _profile(values: Profile, edges: str) -> dict[str, Any]:
     return {edges: _plain(values.edges), "excess": _plain(values.mean), "std": _plain(values.std)}
-
-
-def maps_in_own_units(maps: Maps, similarity: Similarity) -> Maps:
-    """The maps with the times, frequencies, stiffnesses and moments of the measured rig.
-
-    Args:
-        maps: of the similar campaign.
-    """
-    seconds, hertz = similarity.own(1.0, "s"), similarity.own(1.0, "Hz")
-
-    def own(value: float | None, unit: str) -> Any:
-        return None if value is None else similarity.own(value, unit)
-
-    plane, grid = maps.phase_plane, maps.grid
-    if plane is not None:
-        factor = similarity.own(1.0, plane.unit)
-        moments = ("moment", "std", "by_angle", "by_angle_std", "by_rate", "by_rate_std")
-        plane = replace(plane, **{name: getattr(plane, name) * factor for name in moments})
-    return replace(
-        maps,
-        runs=tuple(
-            replace(
-                run, frequency=own(run.frequency, "Hz"), spring_stiffness=own(run.spring_stiffness, "N m/rad")
-            )
-            for run in maps.runs
-        ),
-        time=replace(maps.time, edges=maps.time.edges * seconds),
-        frequency=replace(maps.frequency, edges=maps.frequency.edges * hertz),
-        resonance=(own(maps.resonance[0], "Hz"), own(maps.resonance[1], "Hz")),
-        lines=tuple(replace(line, frequency=own(line.frequency, "Hz")) for line in maps.lines),
-        backbones=tuple(
-            replace(
-                curve,
-                time=curve.time * seconds,
-                frequency=curve.frequency * hertz,
-                frequency_std=curve.frequency_std * hertz,
-                nominal_frequency=curve.nominal_frequency * hertz,
-                alone_frequency=None if curve.alone_frequency is None else curve.alone_frequency * hertz,
-            )
-            for curve in maps.backbones
-        ),
-        phase_plane=plane,
-        grid=replace(grid, time=None if grid.time is None else grid.time * seconds),
-        traces=tuple(trace_in_own_units(trace, similarity) for trace in maps.traces),
-    )
-
-
-def trace_in_own_units(trace: Trace, similarity: Similarity) -> Trace:
-    """A trace of the similar campaign with the times and readings of the measured rig."""
-    factor = similarity.own(1.0, similarity.reading)
-    return replace(
-        trace,
-        time=trace.time * similarity.own(1.0, "s"),
-        reading=trace.reading * factor + similarity.rest,
-        before=trace.before * factor,
-        after=None if trace.after is None else trace.after * factor,
-        noise_std=trace.noise_std * factor,
-        differ=(similarity.own(trace.differ[0], "s"), similarity.own(trace.differ[1], "s")),
-    )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.run_data import RunData
 from diagnosis.where.along_motion import apparent_moment, backbones, motion, phase_plane
 from diagnosis.where.excess import (
     Profile,
@@ -19,7 +21,7 @@ from diagnosis.where.excess import (
     run_excesses,
     within_bands,
 )
-from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace, maps_in_own_units, trace_in_own_units
+from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -39,8 +41,6 @@ class Survey:
     """Maps, and what else the text about them needs.
 
     Args:
-        maps: the maps.
-        excesses: by run.
         frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
         moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
         moment_z: the sum of that over its standard deviation under white noise, a ratio.
@@ -75,10 +75,12 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     """Draw up all maps of the nominal model's residuals.
 
     Args:
-        nominal: fit of the nominal model.
-        scaled: the same with residuals in units of the noise that counts.
+        scaled: the nominal fit with residuals in units of the noise that counts.
         excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
+
+    Returns:
+        Maps and interval in the measured rig's units.
     """
     runs, similarity = nominal.problem.data.runs, nominal.problem.data.similarity
     bands = band_excesses(excesses)
@@ -103,29 +105,34 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         for run, time, left in zip(runs, samples.time, scaled.residuals, strict=True)
     ]
     starts = [float(amplitude[0]) for amplitude in samples.amplitude]
+    seconds, hertz = similarity.own(1.0, "s"), similarity.own(1.0, "Hz")
+    over_time, spectrum = samples.over(instants, samples.time), _spectrum(excesses, edges)
     maps = Maps(
         runs=_run_maps(scaled, excesses, starts),
         groups=_groups(scaled, excesses, starts),
-        time=samples.over(instants, samples.time),
+        time=replace(over_time, edges=instants * seconds),
         time_by_run=np.stack(by_run),
         moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
         amplitude=samples.over(np.linspace(0.0, widest, _AMPLITUDE_BINS + 1), samples.amplitude),
-        frequency=_spectrum(excesses, edges),
+        frequency=replace(spectrum, edges=edges * hertz),
         frequency_by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
         frequency_after=None,
-        resonance=(min(resonances), max(resonances)),
+        resonance=(similarity.own(min(resonances), "Hz"), similarity.own(max(resonances), "Hz")),
         bands=bands,
-        lines=residual_lines(excesses, runs),
+        lines=tuple(
+            replace(line, frequency=similarity.own(line.frequency, "Hz"))
+            for line in residual_lines(excesses, runs)
+        ),
         backbones=tuple(backbones(nominal)),
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, None, excesses),
-        grid=_grid(samples, [run.wind_speed for run in runs], np.linspace(0.0, widest, _GRID_ROWS + 1)),
+        grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), seconds),
         unit=similarity.reading,
     )
     interval = _frequency_interval(excesses, beyond)
     if interval is not None:
         interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
-    return Survey(maps_in_own_units(maps, similarity), excesses, interval, energy, z)
+    return Survey(maps, excesses, interval, energy, z)
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
@@ -137,27 +144,26 @@ def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) ->
         answer: fit with the causes.
     """
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
-    traces = _traces(nominal, answer, found.excesses)
-    own = tuple(trace_in_own_units(trace, nominal.problem.data.similarity) for trace in traces)
-    return replace(found.maps, frequency_after=after, traces=own)
+    return replace(found.maps, frequency_after=after, traces=_traces(nominal, answer, found.excesses))
 
 
 def _run_maps(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[RunMap, ...]:
+    own = fit.problem.data.similarity.own
     energy = [max(float(run.power.sum()) - run.power.size, 0.0) for run in excesses]
     whole = max(sum(energy), 1e-300)
     return tuple(
         RunMap(
             id=run.id,
-            spring_stiffness=run.spring_stiffness,
+            spring_stiffness=None if run.spring_stiffness is None else own(run.spring_stiffness, "N m/rad"),
             wind_speed=run.wind_speed,
             amplitude=start,
-            frequency=excess.resonance,
+            frequency=own(excess.resonance, "Hz"),
             excess=excess.excess / run.block,
             std=excess.std / run.block,
             p_value=excess.p_value(),
-            share=own / whole,
+            share=part / whole,
         )
-        for run, excess, start, own in zip(fit.problem.data.runs, excesses, starts, energy, strict=True)
+        for run, excess, start, part in zip(fit.problem.data.runs, excesses, starts, energy, strict=True)
     )
 
 
@@ -200,15 +206,15 @@ def _times(fit: Fit, index: int) -> Array:
     return run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
 
 
-def _grid(samples: _Samples, wind: list[float], rows: Array) -> Grid:
+def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: float) -> Grid:
     """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
-    speeds = sorted(set(wind))
+    speeds = sorted({run.wind_speed for run in runs})
     shared = len(speeds) == 1
     longest = max(float(time[-1]) for time in samples.time)
     edges = np.linspace(0.0, 1.0001 * longest, _GRID_COLUMNS + 1)
     places = [
-        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(speed))
-        for speed, time in zip(wind, samples.time, strict=True)
+        np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(run.wind_speed))
+        for run, time in zip(runs, samples.time, strict=True)
     ]
     columns = []
     for column in range(_GRID_COLUMNS if shared else len(speeds)):
@@ -219,7 +225,7 @@ def _grid(samples: _Samples, wind: list[float], rows: Array) -> Grid:
     return Grid(
         rows,
         None if shared else np.array(speeds),
-        edges if shared else None,
+        edges * seconds if shared else None,
         np.stack([column.mean for column in columns], axis=1),
         np.stack([column.std for column in columns], axis=1),
     )
@@ -267,6 +273,8 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
     """Every run against time, the largest excess first."""
     order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)
     most = max(_LEAST_POINTS, _TRACE_POINTS // len(order))
+    similarity = nominal.problem.data.similarity
+    factor = similarity.own(1.0, similarity.reading)
     traces = []
     for index in order:
         run, frequency = nominal.problem.data.runs[index], resonance(nominal, index)
@@ -281,14 +289,15 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
         else:
             filled = _means(run.samples.count.astype(np.float64), group) > 0.0
             time, reading, before, *after = (_means(values, group)[filled] for values in seen)
+        first, last = _most_energy(time, before - after[0] if after else before, _SHOWN_CYCLES / frequency)
         trace = Trace(
             run.id,
-            time,
-            reading,
-            before,
-            after[0] if after else None,
-            run.noise_std / float(np.sqrt(group)),
-            _most_energy(time, before - after[0] if after else before, _SHOWN_CYCLES / frequency),
+            time * similarity.own(1.0, "s"),
+            reading * factor + similarity.rest,
+            before * factor,
+            after[0] * factor if after else None,
+            run.noise_std / float(np.sqrt(group)) * factor,
+            (similarity.own(first, "s"), similarity.own(last, "s")),
         )
         traces.append(trace)
     return tuple(traces)
