@@ -81,8 +81,7 @@ class Diagnosable:
 def diagnosable(campaign: Campaign) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
 
-    Returns:
-        The free decays; the whole records of all runs where every one is in a limit cycle.
+    Where all are in one, their whole records remain.
 
     Raises:
         TunnelError: when the examination refuses the records.
@@ -147,14 +146,11 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
 
 
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out the runs that cannot be fitted together with the others.
+    """Leave out the runs that cannot be fitted together with the others, and say in sentences which and why.
 
-    Returns:
-        The campaign of the remaining runs, and sentences that say which were left out and why; none where all
-        runs remain. Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those
-        that state it, if equal). Of runs that do not state it, those with the same frequency at the same wind
-        speed remain: only they can have one spring. A wind-on run that swings in another mode than the wind-off
-        runs of its spring is left out.
+    Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
+    equal). Of runs that do not state it, those with the same frequency at the same wind speed remain: only they can
+    have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left out.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
@@ -341,11 +337,9 @@ def refuse_motionless(campaign: Campaign) -> None:
 def kinds_for(
     campaign: Campaign, kinds: Sequence[type[Effect]]
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
-    """The effects, of those to answer with, that can be fitted to a campaign.
+    """The effects, of those to answer with, that can be fitted to a campaign, and sentences that name the others.
 
-    Returns:
-        Those that act on free decays, and no sentence, where no run is driven; else those that can be fitted to
-        driven runs, and sentences that name the others.
+    Where no run is driven, they are those that act on free decays, without a sentence.
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()

@@ -67,12 +67,8 @@ class Identifiability:
 def identifiability(kind: type[Effect]) -> Identifiability:
     """Compare what an effect leaves beside the nominal model with what every known effect leaves.
 
-    Args:
-        kind: the effect, registered or not.
-
-    Returns:
-        The comparison by linear theory at typical sizes. Effects that are not fitted as a motion (random moments,
-        periodic effects, missing samples, coarse steps) are left out.
+    That is by linear theory at typical sizes. Effects that are not fitted as a motion (random moments, periodic
+    effects, missing samples, coarse steps) are left out.
     """
     base = _nominal(driven=kind.driven)
     own = unabsorbed(base, kind)

@@ -64,7 +64,7 @@ class Colour:
     steep: float
 
     def at(self, frequency: Array) -> Array:
-        """The level at frequencies above zero, Hz, of their shape; as high below the first band as chance allows."""
+        """The level at frequencies above zero, Hz, any shape; below the first band as high as chance allows."""
         return self._extended(frequency, self.steep)
 
     def _extended(self, frequency: Array, slope: float) -> Array:
@@ -203,10 +203,7 @@ def whitened(data: Data, colour: Colour) -> Data:
 
     The Levinson recursion (S. M. Kay, Modern Spectral Estimation, 1988, sect. 6.3) stops at the order beyond which
     all records together hold less than one nat of evidence for another; the gain of all further orders is known
-    from the spectrum (Kolmogorov).
-
-    Returns:
-        The runs with the filter and the variance of the innovations.
+    from the spectrum (Kolmogorov). The runs have the variance of the innovations.
     """
     longest = max(run.reading.size for run in data.runs)
     total = sum(run.reading.size for run in data.runs)
@@ -240,14 +237,10 @@ _WHITE = 30.0  # the level's natural logarithm stays within this of that of whit
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    Args:
-        nominal: the fit whose residuals have the colour, scaled as white.
-        colour: of its noise; its lowest band is the lowest corner of stationary noise that counts as seen.
-
-    Returns:
-        The verdict of a likelihood ratio at `COLOUR_FALSE_ALARM_RATE`. The spectrum is that of white noise and a
-        first-order process, which is a random walk where its corner is zero. It is fitted to the ordinates between
-        the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
+    This is decided by a likelihood ratio at `COLOUR_FALSE_ALARM_RATE`. The spectrum is that of white noise and a
+    first-order process, which is a random walk where its corner is zero; the colour's lowest band is the lowest
+    corner of stationary noise that counts as seen. It is fitted to the ordinates between the harmonics by Whittle's
+    likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
     """
     spectra = []
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):

@@ -38,13 +38,11 @@ _HANN = 1.57  # correlated bins of the windowed periodogram that carry the infor
 
 
 def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
-    """Probability that white noise behaves like that of the campaign.
+    """Probability that white noise behaves like that of the campaign, by name of the test.
 
-    Returns:
-        P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise
-        and the readings' lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993);
-        where the lattice hides the noise, the largest over several possible levels. All 1 where the sampling is
-        too slow for the test.
+    It is from Student's t of the campaign among repetitions of it simulated with white noise and the readings'
+    lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993); where the lattice hides the
+    noise, the largest over several possible levels. All are 1 where the sampling is too slow for the test.
     """
     if not trend.judged:
         return dict.fromkeys(_NAMES, 1.0)
@@ -56,21 +54,20 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
     for factor in factors:
         level = {run: factor * std for run, std in white.items()}
         repetitions = repeated(fit, level, trend.step, count)
-        chance = trend_statistics((reading, run.sample_times) for run, _, reading in repetitions)
-        assert chance is not None  # the campaign was judged
-        mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
-        score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / len(chance)))
-        two_sided = 2.0 * stdtr(len(chance) - 1, -np.abs(score[:2]))
-        found = np.maximum(found, np.append(two_sided, stdtr(len(chance) - 1, -score[2])))
+        seen = trend_statistics((reading, run.sample_times) for run, _, reading in repetitions)
+        assert seen is not None  # the campaign was judged
+        mean, scatter = seen.mean(axis=0), np.maximum(seen.std(axis=0, ddof=1), 1e-9)
+        score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
+        two_sided = 2.0 * stdtr(count - 1, -np.abs(score[:2]))
+        found = np.maximum(found, np.append(two_sided, stdtr(count - 1, -score[2])))
     return dict(zip(_NAMES, found.tolist(), strict=True))
 
 
 def level_p_value(fit: Fit, noise: Noise) -> float:
     """Probability that noise as stated, allowing for its rounding, is estimated as high as it is.
 
-    Returns:
-        The p-value of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
-        median found, at the largest noise that the statement allows.
+    It is that of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
+    median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
     level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
@@ -230,13 +227,10 @@ def _known(_frequency: Array) -> float:
 
 
 def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatter: float = 0.0) -> float:
-    """Probability that white noise alone moves the runs' means as far from the common zero.
+    """Probability that white noise alone moves the runs' means so far from the common zero.
 
-    It takes arguments as in `band_p_values`.
-
-    Returns:
-        The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own
-        or nothing holds the body.
+    It takes arguments as in `band_p_values`, and is 1 where the runs have zeros of their own or nothing holds the
+    body.
     """
     if fit.problem.data.own_zeros or fit.problem.data.unrestrained:
         return 1.0
@@ -253,15 +247,12 @@ def _offsets(residuals: Sequence[Array]) -> float:
 def band_p_values(
     fit: Fit, floor: float | Array = 1.0, spread: Spread = _known, scatter: float | Array = 0.0
 ) -> tuple[float, ...]:
-    """Probability that white noise alone gives as much power in each band, summed over the runs.
+    """Probability that white noise alone gives as much power in each band, summed over the runs, by `BANDS`.
 
     Args:
         floor: power assumed for white noise, a factor on the noise variance; one for all bands, or shape (bands,).
         spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
         scatter: standard deviation of the floor, a share of it, of its shape.
-
-    Returns:
-        One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.
     """
     values = []
     each = np.broadcast_to(floor, len(BANDS)), np.broadcast_to(scatter, len(BANDS))

@@ -77,11 +77,10 @@ def rounding_errors(
 
 
 def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
-    """The data, prepared for white noise, with noise of block means that is not below errors of `rounding_errors`.
+    """Data prepared for white noise, with noise of block means that is not below errors of `rounding_errors`.
 
-    Returns:
-        The runs, their noise variance raised where averaging does not reduce the errors as it reduces white noise;
-        at most to that of one sample. None where none is raised.
+    It is raised where averaging does not reduce the errors as it reduces white noise, at most to that of one
+    sample. None where none is raised.
     """
     raised = [
         float(np.clip(np.mean(error**2), run.noise_variance, run.noise_variance * run.block))

@@ -248,11 +248,10 @@ def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, f
 def campaign_noise(campaign: Campaign) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
-    Returns:
-        The stated noise where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
-        standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another.
-        A data sheet may give the noise before or after rounding: the closer one counts. Where a run contains less
-        noise than the accuracy of the fits, that stands in for it.
+    It is as stated where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
+    standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another. A
+    data sheet may give the noise before or after rounding: the closer one counts. Where a run contains less noise
+    than the accuracy of the fits, that stands in for it.
     """
     fastest = max((frequency(run.record) for run in campaign.runs if not run.record.uniform), default=None)
     measured: dict[str, float] = {}
@@ -388,11 +387,9 @@ _SHORTEST = 5.0 * _WINDOW  # s: of a record with several windows
 def noise_trend(campaign: Campaign) -> NoiseTrend:
     """Measure whether the noise is as strong in motion as at rest, and the same at all times.
 
-    Returns:
-        Trends of the variance of fourth divided differences of the reading in windows of 20 ms, pooled over the
-        runs that are not shorter than five windows. Their null distribution is simulated
-        (`diagnosis.noise.gap`). Not judged where a run is driven: its motion may be as fast as the
-        noise.
+    These are trends of the variance of fourth divided differences of the reading in windows of 20 ms, pooled over
+    the runs that are not shorter than five windows. Their null distribution is simulated (`diagnosis.noise.gap`).
+    Not judged where a run is driven: its motion may be as fast as the noise.
     """
     if campaign.driven:
         return NoiseTrend(0.0, 0.0, 0.0, judged=False)
@@ -409,14 +406,11 @@ def noise_trend(campaign: Campaign) -> NoiseTrend:
 
 
 def trend_statistics(readings: Iterable[tuple[Array, Array]]) -> Array | None:
-    """The statistics of `NoiseTrend`.
+    """The statistics of `NoiseTrend`, shape (repetitions, 3); None where no run is fast enough.
 
     Args:
         readings: by run, readings of any number of repetitions, shape (repetitions, n), rad, and their times, shape
             (n,), s; taken one after another, so that a generator holds those of one run at a time.
-
-    Returns:
-        Shape (repetitions, 3): ``amplitude_z``, ``rate_z`` and ``spread``; None where none is fast enough.
     """
     parts = [_local_levels(reading, time) for reading, time in readings if _in_window(time) >= _FEWEST]
     if not parts:

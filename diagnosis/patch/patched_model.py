@@ -180,17 +180,13 @@ _SHIFT = 1e-4  # of the start, for its derivatives
 def native_closure(
     nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut, simulate: Simulate
 ) -> NativeClosure:
-    """Simulate what was held out with the patched model of the fit that has not seen it.
+    """Simulate what was held out with the patched model of the fit that has not seen it; only with the wind off.
 
     Args:
         nominal: fit of the model as given.
         chosen: fit with the causes.
         nominal_out: runs held out of the first.
         chosen_out: runs held out of the second.
-        simulate: the patched model of a fit.
-
-    Returns:
-        The closure; runs with the wind on do not count.
 
     Raises:
         TunnelError: when nothing could be held out, or the patched model's motion grows without bound.
@@ -289,9 +285,6 @@ def _start(problem: Problem, own: Array, index: int) -> Start:
 def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
     """Refuse a model that no answer about a campaign could be written into, before the work.
 
-    Args:
-        path: where the patched model is to be written.
-
     Raises:
         TunnelError: when every run has the wind on, or the engine cannot write or simulate the model as given.
     """
@@ -309,13 +302,9 @@ def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> Non
 
 
 def patched_model(study: Study, model: JointModel) -> PatchedModel:
-    """Write the answer of a study into the model, and simulate it against what was held out.
+    """Write the answer of a study into the model whose joint it is of, and simulate it against what was held out.
 
-    Args:
-        study: whose nominal model is the law of the model's joint.
-
-    Returns:
-        The patched model: with the causes, or with the free parameters alone where none is named.
+    Without causes only the free parameters are written.
 
     Raises:
         TunnelError: when the engine refuses the patched model, or its motion grows without bound.

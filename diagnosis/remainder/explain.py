@@ -89,15 +89,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
 
 
 def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str:
-    """The simplest kind that closes about as much as any.
-
-    Args:
-        common: kinds whose law holds in every run, the simpler first.
-        single: kinds that differ from run to run.
-
-    Returns:
-        One of `diagnosis.closure.KINDS`.
-    """
+    """The simplest kind of `KINDS` that closes about as much as any; those of a common law are in that order."""
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )
@@ -181,12 +173,10 @@ _OVER: Mapping[str, tuple[str, ...]] = {
 
 
 def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> Curve | None:
-    """The law of a kind without a formula, in the measured campaign's units.
+    """The law of a kind without a formula, in the measured campaign's units; None where it has no common law.
 
-    Returns:
-        For the median spring, and the greatest wind speed where it is of the wind; a moment in time is that at the
-        greatest angle, without rate. What the model's own coefficients and its zero absorb is taken out. None where
-        the kind has no common law.
+    It is for the median spring, and the greatest wind speed where it is of the wind; a moment in time is that at
+    the greatest angle, without rate. What the model's own coefficients and its zero absorb is taken out.
     """
     kind = found.ceiling.kind
     if found.solution is None or kind not in _OVER:
@@ -306,9 +296,8 @@ def _line_words(line: SteadyLine, similarity: Similarity) -> str:
 def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
 
-    Returns:
-        None where chance may explain it, at a rate of `PLACE_FALSE_ALARM_RATE` for all frequencies together, and
-        where it is the skirt of something broader or does not keep its phase in a run.
+    None where chance may explain it, at a rate of `PLACE_FALSE_ALARM_RATE` for all frequencies together, and where
+    it is the skirt of something broader or does not keep its phase in a run.
     """
     start, floor = _strongest(unexplained)
     if start is None:

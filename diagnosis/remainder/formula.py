@@ -294,11 +294,7 @@ def _drops(whole: Normal, chosen: Sequence[int]) -> Array:
 
 
 def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal | None:
-    """Fit a formula from `choose` like any other effect, added to what is left unexplained; the kind names it.
-
-    Returns:
-        The effect and its fit; None where the fit fails.
-    """
+    """Fit a formula from `choose` like any other effect, named after the kind; None where the fit fails."""
     taken = {known.name for known in known_effects()}
     numbered = (f"proposed_{kind}_{number}" for number in range(2, len(taken) + 3))
     table = effect_table(formula, next(n for n in chain((f"proposed_{kind}",), numbered) if n not in taken))

@@ -98,11 +98,10 @@ def backbones(fit: Fit) -> list[Backbone]:
 
 
 def drift(curves: list[Backbone]) -> tuple[float, float]:
-    """How far the curves are from level.
+    """How far the curves are from level: χ² beyond that of level lines, of frequency and of damping.
 
-    Returns:
-        χ² beyond that of level lines, of frequency and of damping: an effect on stiffness raises the first, one
-        on damping the second. In each window the two are known equally well in ω, so that they can be compared.
+    An effect on stiffness raises the first, one on damping the second. In each window the two are known equally
+    well in ω, so that they can be compared.
     """
     return (
         sum(_departure(c.frequency, c.frequency_std) for c in curves),
@@ -147,11 +146,7 @@ class Apparent:
 
 
 def motion(fit: Fit, index: int) -> tuple[Array, Array]:
-    """Angle and rate of the fitted motion of one run.
-
-    Returns:
-        Angle from the zero, rad, and rate over the angular frequency, rad, each of shape (n,).
-    """
+    """Angle and rate over the angular frequency of the fitted motion of a run, from the zero, rad, shape (n,)."""
     run = fit.problem.data.runs[index]
     reading = run.reading - run.unscaled(fit.residuals[index]) - fit.zero(index)
     omega = 2.0 * np.pi * resonance(fit, index)
@@ -162,11 +157,7 @@ def motion(fit: Fit, index: int) -> tuple[Array, Array]:
 
 
 def apparent_moment(fit: Fit, index: int) -> Apparent | None:
-    """The moment that the nominal model lacks in one run.
-
-    Returns:
-        The moment; None where the run is sampled too slowly or too short, or the reading is not an angle.
-    """
+    """The moment that the model lacks in a run; None where that is too short, too slow or not of an angle."""
     run = fit.problem.data.runs[index]
     inertia, damping, stiffness = linear_coefficients(fit, index)
     frequency = resonance(fit, index)
@@ -220,11 +211,7 @@ class PhasePlane:
 
 
 def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
-    """The map of the moment that the nominal model lacks in some runs, or in all where none is named.
-
-    Returns:
-        In the measured rig's units; None where no run allows one.
-    """
+    """The map of the moment that the model lacks in some runs, or in all where none is named; None without any."""
     data = fit.problem.data
     chosen = [i for i, run in enumerate(data.runs) if not run_ids or run.id in run_ids]
     found = [(data.runs[i].id, a) for i in chosen if (a := apparent_moment(fit, i)) is not None]

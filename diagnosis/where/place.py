@@ -87,12 +87,7 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 
 
 def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
-    """The runs that show the gap.
-
-    Returns:
-        Ids of the runs beyond chance (false-alarm rate 1 % over all of them) that have a tenth or more of the
-        largest excess among them, in the campaign's order.
-    """
+    """The runs beyond chance (1 % over all) that have a tenth or more of the largest excess among them."""
     clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < PLACE_FALSE_ALARM_RATE}
     least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)

@@ -136,13 +136,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
-    """The maps with what the answer leaves beside the nominal model's residuals.
-
-    Args:
-        campaign: as measured, of the units of the fits.
-        nominal: fit of the nominal model, from which the maps were drawn up.
-        answer: fit with the causes.
-    """
+    """The maps with what a fit with the causes leaves beside the nominal model's residuals."""
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
     return replace(found.maps, frequency_after=after, traces=_traces(nominal, answer, found.excesses))
 

@@ -45,14 +45,7 @@ def nowhere(found: Survey) -> str:
 def describe(
     where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
 ) -> str:
-    """Where the gap is, in sentences.
-
-    Args:
-        where: the same in fields.
-        bands: names of the bands that show the gap.
-        channel: what it acts on, with the reason.
-        condition: when it acts, with the reason.
-    """
+    """Where the gap is, in sentences; the bands are those that show it."""
     parts, places = [_runs(where, found)], []
     length, greatest = float(found.maps.time.edges[-1]), float(found.maps.amplitude.edges[-1])
     if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
@@ -114,15 +107,7 @@ def _runs(where: Where, found: Survey) -> str:
 
 
 def agreement(where: Where, kinds: Sequence[type[Effect]]) -> str:
-    """Whether causes act where the residuals say that the gap is.
-
-    Args:
-        where: from the residuals.
-        kinds: the causes that are compared; none where none is named.
-
-    Returns:
-        A sentence; empty where there is nothing to compare.
-    """
+    """Whether causes act where the residuals say that the gap is; empty where there is nothing to compare."""
     if not kinds or where.channel is None:
         return ""
     names = plain(*(kind.name for kind in kinds))
