@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
 
 
+_NOT_SOLVED = "How much of what remains could be closed was not found: its equations cannot be solved."
+
+
 def diagnose(
     campaign: Campaign | Path | str,
     *,
@@ -83,7 +86,14 @@ def diagnose(
             answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
         else:
             say("what no effect explains")
-            answer = _with_closable(answer, study)
+            decided = answer.decision.decided  # of an undecided diagnosis the whole gap remains
+            significant = not decided or (answer.rest is not None and answer.rest.significant)
+            try:
+                with np.errstate(over="raise"):  # a fitted model that runs away
+                    found = closable(study, significant=significant, decided=decided)
+                answer = replace(answer, closable=found)
+            except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
+                answer = replace(answer, cautions=(*answer.cautions, _NOT_SOLVED))
         # below one half a set of effects comes first, though each of them may be less probable than none
         odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
         likeliest = max(odds, key=odds.__getitem__, default="")
@@ -141,21 +151,6 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
         data=chosen.examined,
     )
     return in_own_units(sized, study.similarity)
-
-
-def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:
-    """The answer with what could be closed of what remains, or a caution that it was not found.
-
-    Of an undecided diagnosis the whole gap remains.
-    """
-    decided = answer.decision.decided
-    significant = not decided or (answer.rest is not None and answer.rest.significant)
-    try:
-        with np.errstate(over="raise"):  # a fitted model that runs away
-            return replace(answer, closable=closable(study, significant=significant, decided=decided))
-    except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
-        said = "How much of what remains could be closed was not found: its equations cannot be solved."
-        return replace(answer, cautions=(*answer.cautions, said))
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -226,7 +226,8 @@ class Law:
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; of the parameters ``value`` and ``std``."""
         parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
-        return as_json({**vars(self), "parameters": parameters})
+        found: dict[str, Any] = as_json({**vars(self), "parameters": parameters})
+        return found
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,10 @@ from identification.status import Remark
 from tunnel_sim.effects import known_effects
 
 _SHOWN = 5  # answers in words; the document lists all
+_SHOWN_ANSWERS, _SHOWN_PROBABILITY = (
+    6,
+    0.005,
+)  # more answers, and less probable ones, are counted in the table
 
 
 def plain(*names: str) -> str:
@@ -115,12 +119,6 @@ def undecided_words(found: Decision) -> str:
     return f"{common} The answer is one of these, with probability {together} together: {most}."
 
 
-SHOWN_PROBABILITY = 0.005
-"""Answers less probable than this are counted, not listed."""
-
-SHOWN_ANSWERS = 6
-"""At most this many answers are listed."""
-
 Document = Mapping[str, Any]
 
 
@@ -167,7 +165,7 @@ def diagnosis_brief(document: Document) -> str:
 def candidates_table(document: Document) -> TextTable:
     """The answers considered and the shares that they close, most probable first; a last row counts the others."""
     rows, given = [], document["candidates"]
-    shown = [c for c in given[:SHOWN_ANSWERS] if c["probability"] >= SHOWN_PROBABILITY] or given[:1]
+    shown = [c for c in given[:_SHOWN_ANSWERS] if c["probability"] >= _SHOWN_PROBABILITY] or given[:1]
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
         closed = share(candidate["closed"]) if fitted else "–"

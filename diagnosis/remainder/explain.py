@@ -80,10 +80,18 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in found
     )
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
-    what = "what the causes leave" if study.named and decided else "the gap"
-    words = _words(kind, ceilings, law, where, what)
+    words = _words(
+        kind, ceilings, law, where, "what the causes leave" if study.named and decided else "the gap"
+    )
     if line is not None and kind == "line":
-        words = f"{words} {_line_words(line, similarity)}"
+        unit = similarity.reading
+        sizes = [similarity.own(value, "Hz") for value in (line.frequency, line.frequency_std)]
+        sizes += [1e3 * similarity.own(value, unit) for value in (line.amplitude, line.amplitude_std)]
+        words += (
+            f" The line is at {with_std(*sizes[:2])} Hz, with an amplitude of {with_std(*sizes[2:])} "
+            f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
+            f"{100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
+        )
     excess = left.excess / left.problem.data.runs[0].block
     return Closable(excess, ceilings, kind, words, where, shape, law)
 
@@ -280,19 +288,6 @@ class SteadyLine:
     events: Events
 
 
-def _line_words(line: SteadyLine, similarity: Similarity) -> str:
-    def own(values: tuple[float, float], unit: str, factor: float = 1.0) -> str:
-        return with_std(*(factor * similarity.own(value, unit) for value in values))
-
-    unit = similarity.reading
-    frequency = own((line.frequency, line.frequency_std), "Hz")
-    amplitude = own((line.amplitude, line.amplitude_std), unit, 1e3)
-    return (
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(unit)}, root mean square "
-        f"over the runs; chance alone shows one in less than {100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
-    )
-
-
 def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
 
@@ -319,6 +314,18 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     sizes = np.array([run.reading.size for run in runs])
     squares = 2.0 * np.maximum(drops - 2.0, 0.0) / sizes * noise**2  # two of the drop are chance
     amplitude = float(np.sqrt(np.mean(squares)))
+    # short gaps are predicted from the line around them, as for every kind that differs from run to run
+    closed, left = [], []
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency)
+        turn, after = gaps(residual.size, path.group), 0.0
+        for out in (turn == t for t in np.unique(turn)):
+            size = np.linalg.lstsq(waves[~out], residual[~out], rcond=None)[0]
+            after += float(np.sum((residual[out] - waves[out] @ size) ** 2))
+        power = float(residual @ residual)
+        closed.append(power - after)
+        left.append(power - residual.size)
+    ceiling = Ceiling("line", *ratio(np.array(closed), np.array(left)), GAPS)
     times = [path.time + path.run.start for path in unexplained.paths]
     spans = [(float(time[0]), float(time[-1])) for time in times]
     return SteadyLine(
@@ -326,7 +333,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
         frequency_std,
         amplitude,
         amplitude * float(np.sqrt(floor / whole)),
-        _line_evidence(unexplained, frequency),
+        Evidence(ceiling, sum(closed), 0.0),
         _listed(unexplained, drops.tolist(), whole, spans),
     )
 
@@ -387,18 +394,3 @@ def _steadiness(unexplained: Unexplained, frequency: float, floor: float) -> flo
             predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
             fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
     return predicted / max(fitted, 1e-300)  # chance lowers the one by 2 in every half, and raises the other
-
-
-def _line_evidence(unexplained: Unexplained, frequency: float) -> Evidence:
-    """Short gaps are predicted from the line around them, as for every kind that differs from run to run."""
-    drops, left = [], []
-    for path in unexplained.paths:
-        waves, residual = _waves(path, frequency)
-        turn, after = gaps(residual.size, path.group), 0.0
-        for out in (turn == t for t in np.unique(turn)):
-            size = np.linalg.lstsq(waves[~out], residual[~out], rcond=None)[0]
-            after += float(np.sum((residual[out] - waves[out] @ size) ** 2))
-        power = float(residual @ residual)
-        drops.append(power - after)
-        left.append(power - residual.size)
-    return Evidence(Ceiling("line", *ratio(np.array(drops), np.array(left)), GAPS), sum(drops), 0.0)

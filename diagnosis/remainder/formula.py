@@ -19,7 +19,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.problem import Point
 from diagnosis.policy import LAW_FALSE_RATE, LAW_REACHES, LAW_TERM_SHARE
 from diagnosis.remainder.ceiling import Normal, Ridge, Unexplained, held_out, total
-from diagnosis.remainder.paths import Path, Ranges
+from diagnosis.remainder.paths import Ranges
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
@@ -218,7 +218,16 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         ]
     if not candidates:
         return None
-    columns = [_responses(path, candidates, of_reading=of_reading) for path in unexplained.paths]
+    columns = []
+    for path in unexplained.paths:
+        places: dict[str, float | Array] = {
+            "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
+            "Kr": path.stiffness, "omega": path.still_omega,
+        }  # fmt: skip
+        values = np.column_stack(
+            [np.broadcast_to(term.value(places), path.angle.shape) for term in candidates]
+        )
+        columns.append(path.seen(values) if of_reading else path.response(values))
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = unexplained.normals([c / size for c in columns])
     chosen, gained = _greedy(unexplained, parts, len(candidates), closable)
@@ -235,16 +244,6 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         solution[:common] / unexplained.size,
         gained,
     )
-
-
-def _responses(path: Path, candidates: Sequence[Term], *, of_reading: bool) -> Array:
-    """Responses to every term in one run, shape (rows, terms)."""
-    places: dict[str, float | Array] = {
-        "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
-        "Kr": path.stiffness, "omega": path.still_omega,
-    }  # fmt: skip
-    values = [np.broadcast_to(term.value(places), path.angle.shape) for term in candidates]
-    return path.seen(np.column_stack(values)) if of_reading else path.response(np.column_stack(values))
 
 
 def _of(whole: Normal, chosen: Sequence[int]) -> Normal:

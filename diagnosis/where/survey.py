@@ -129,7 +129,13 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), seconds),
         unit=similarity.reading,
     )
-    interval = _frequency_interval(excesses, beyond)
+    # the shortest interval that holds most of the excess of the bands that show the gap
+    kept = [replace(run, power=np.where(run.inside(beyond), run.power, 1.0)) for run in excesses]
+    high = max(float(run.frequency[-1]) for run in excesses)
+    # no bin is narrower than the shortest record resolves
+    resolved = max(float(run.frequency[1]) for run in excesses)
+    fine = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
+    interval = _spectrum(kept, fine).interval()
     if interval is not None:
         interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
     return Survey(maps, excesses, interval, energy, z)
@@ -251,16 +257,6 @@ def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
     ones = [1.0] * len(excesses)
     places, powers = [run.frequency for run in excesses], [run.power for run in excesses]
     return profile(edges, places, powers, ones, [2.0] * len(excesses))
-
-
-def _frequency_interval(excesses: list[RunExcess], bands: tuple[str, ...]) -> tuple[float, float] | None:
-    """Shortest interval in Hz that holds most of the excess of the bands that show the gap."""
-    kept = [replace(run, power=np.where(run.inside(bands), run.power, 1.0)) for run in excesses]
-    high = max(float(run.frequency[-1]) for run in excesses)
-    # no bin is narrower than the shortest record resolves
-    resolved = max(float(run.frequency[1]) for run in excesses)
-    edges = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
-    return _spectrum(kept, edges).interval()
 
 
 def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
