@@ -35,10 +35,8 @@ class Closure:
     """How far the gap closes with causes chosen by hand.
 
     Args:
-        effects: names, sorted.
         before: excess of the nominal model on what is held out, in noise variances of a sample.
         after: excess with the effects, likewise, in noise variances of a sample.
-        held_out: what is held out, in words.
         parameters: of the effects, by name; ``effect.parameter`` where there are several effects.
     """
 

@@ -101,7 +101,6 @@ class Waterfall:
         steps: the nominal model first; then the cause that closes most, and so on.
         without: excess by cause, when it alone is taken out and the others are refitted, likewise held out. A cause
             beside a random moment has none: the random moment would absorb it.
-        held_out: what was held out, in words.
     """
 
     steps: tuple[Step, ...] = ()
@@ -125,7 +124,6 @@ class Move:
         value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
         relative: the same over the coefficient's absolute value, a fraction; None where the coefficient is zero.
         std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
-        unit: of the coefficient.
     """
 
     value: float
@@ -143,7 +141,6 @@ class Remainder:
         excess: on readings held out of the fit, in noise variances of a sample.
         p_value: of the strongest test, corrected for the number of tests.
         material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
-        moves: by coefficient.
     """
 
     significant: bool
@@ -175,10 +172,8 @@ class Ceiling:
     """How much one kind could close at most.
 
     Args:
-        kind: of `KINDS`.
         closed: share of what is left, on readings held out of the fit; negative where the prediction is worse.
         std: its standard deviation from the scatter of the runs, a share.
-        held_out: what was held out, in words.
     """
 
     kind: str
@@ -193,7 +188,6 @@ class Curve:
 
     Args:
         over: the quantities: ``angle`` (rad), ``rate`` (rad/s) or ``time`` (s).
-        places: of every quantity, where the curve is given.
         values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or rate
             belongs to the model's own coefficients, and is taken out.
         std: their standard deviations, in ``unit``.
@@ -236,12 +230,9 @@ class Closable:
 
     Args:
         excess: that the answer leaves in the fitted runs, in noise variances of a sample.
-        ceilings: by kind.
         kind: the simplest that closes about as much as any, of `KINDS`.
-        words: the same in a sentence or two.
         events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
         curve: of that kind; None where it has none.
-        law: a formula; None where none is supported.
     """
 
     excess: float
@@ -301,7 +292,6 @@ class NativeClosure:
         before: mean squared residual of the nominal model, in units of the noise power of a block mean.
         fit: of the fits' own integrator with the causes, in the same unit.
         native: of the patched model, simulated by the engine, in the same unit.
-        on: what was held out, in words.
     """
 
     before: float
@@ -328,11 +318,9 @@ class PatchedModel:
     """The model with the causes written into it.
 
     Args:
-        spec: the patched specification.
         written: attributes that changed.
         notes: where the native element is not the same law, in sentences.
         zero: the reading less the joint's position, rad; the median of the runs.
-        closure: of the patched model, simulated by the engine.
     """
 
     model: JointModel

@@ -109,9 +109,7 @@ class Chosen:
         examined: all runs that show the kind of motion diagnosed.
         campaign: those of them that one model can be fitted to.
         kinds: the effects to answer with; none where all runs are in limit cycles.
-        remarks: of the examination.
         left_out: sentences that say which runs and effects were left out, and why.
-        limit_cycles: whether all runs are in limit cycles.
     """
 
     examined: Campaign

@@ -126,11 +126,9 @@ class Where:
     Args:
         channel: ``stiffness``, ``damping``, ``forcing``, ``sensor`` or ``calibration``; None: nowhere.
         condition: ``always`` or ``wind_on``; None: nowhere.
-        runs: ids of the runs that show it.
         time_s: where in the runs most of it lies, s.
         amplitude_rad: amplitudes at which most of it lies, rad.
         frequency_hz: frequencies at which most of it lies, Hz.
-        words: the same in a sentence or two.
     """
 
     channel: str | None
@@ -167,7 +165,6 @@ class CauseSize:
     """What a cause does to three cycles of a swing, by the fitted model with it and without it.
 
     Args:
-        effect: its name.
         run: id of the run whose conditions are taken.
         amplitude: of the release, rad.
         damping_ratio: with the cause, dimensionless.
@@ -245,7 +242,6 @@ class NoiseSummary:
         std: of one sample, quantisation included, rad.
         stated_std: likewise as the campaign states it, rad; None where it does not.
         source: ``stated``, ``estimated`` or ``floor``: whose ``std`` is; the floor is the accuracy of the fits.
-        reason: why, in words.
     """
 
     std: float
@@ -259,18 +255,14 @@ class Diagnosis:
     """The whole answer.
 
     Args:
-        campaign: its name.
         causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary closes.
-        verdict: the answer in plain words.
         candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
         ambiguous_with: effects that these runs cannot distinguish from the causes.
         next_run: the run expected to distinguish them; None where not needed.
         confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
-        cautions: caveats, in sentences.
         maps: data of the figures, in JSON's types.
-        provenance: versions.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
         rest: what remains after the causes.

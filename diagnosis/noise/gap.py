@@ -87,7 +87,6 @@ class GapTest:
     """The tests of a gap.
 
     Args:
-        detected: whether any of them rejects the absence of a gap.
         p_value: the smallest p-value, times the number of tests (at most 1).
         tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is

@@ -39,7 +39,6 @@ class Noise:
         stated_variance: of one sample as the campaign states it, rad²; None where it does not.
         source: of the variance used: ``stated``, ``estimated`` or ``floor``. The floor is the accuracy of the
             fits, where the records contain less noise than that.
-        reason: why, in words.
         estimate: the records' own variance, mean over the runs, rad²; None: the one used.
         relative: standard deviation of that estimate, a share of it.
         colour: of the noise of block means, relative to white noise of the variance used; None where it is white.

@@ -78,7 +78,6 @@ class Ridge:
     """The solution for a prior of one width, coefficients independent and normal.
 
     Args:
-        whole: the normal equations.
         precision: of the prior, one over the variance of a coefficient, in the basis' units.
     """
 
@@ -217,7 +216,6 @@ class Evidence:
     """What the runs say of a kind.
 
     Args:
-        ceiling: how much it closes.
         drop: of χ² on what was held out, dimensionless.
         precision: one over the variance of a coefficient in its prior, in the basis' units.
         solution: the coefficients, where one set holds in all runs.

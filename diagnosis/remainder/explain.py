@@ -276,7 +276,6 @@ class SteadyLine:
         frequency_std: its standard deviation, Hz.
         amplitude: in the unit of the reading, root mean square over the runs.
         amplitude_std: its standard deviation, in the same unit.
-        evidence: of the kind ``line``.
         events: the runs that show it, over their whole time.
     """
 

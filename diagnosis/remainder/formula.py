@@ -162,7 +162,6 @@ class Formula:
 
     Args:
         coefficients: of each, in N m, or rad for a reading, over the term's own unit.
-        of_reading: whether it is an error of the reading.
         delta: steps of the fit's common parameters that go with it, in their units, shape (common,).
         gained: drop of χ² on held-out runs, dimensionless.
     """
@@ -180,7 +179,6 @@ class Proposal:
 
     Args:
         table: of an effects file, in the units of the fit.
-        fit: of the answer with the effect added.
     """
 
     table: dict[str, Any]

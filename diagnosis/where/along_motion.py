@@ -30,7 +30,6 @@ class Backbone:
     """One run's frequency and damping by windows of three cycles; none where it decays too quickly or is driven.
 
     Args:
-        id: of the run.
         time: mid-window since the start of the record, shape (n,), s.
         amplitude: at mid-window, shape (n,), rad.
         frequency: undamped natural frequency, shape (n,), Hz.
@@ -196,7 +195,6 @@ class PhasePlane:
         by_rate: mean over all angles, shape (n,).
         by_rate_std: of each, shape (n,).
         unit: of the moment: ``N m``, or ``rad/s2`` in normalised form.
-        runs: ids of the runs included.
     """
 
     edges: Array

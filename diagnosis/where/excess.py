@@ -241,7 +241,6 @@ class ResidualLine:
     """A line in one run.
 
     Args:
-        run: id.
         frequency: Hz.
         share: of the run's excess squared residual, a fraction.
         amplitude: of the reading, rad.

@@ -19,7 +19,6 @@ class RunMap:
     """One run in the map of runs.
 
     Args:
-        id: of the run.
         spring_stiffness: stated, N m/rad; None in normalised form.
         wind_speed: stated, m/s.
         amplitude: at the start of the record, rad.
@@ -48,7 +47,6 @@ class GroupExcess:
     Args:
         by: ``wind``, ``spring``, ``speed`` or ``amplitude``.
         label: in words, with unit.
-        runs: how many.
         excess: mean over the runs, a ratio.
         std: its standard deviation where there is no gap, a ratio.
     """
@@ -67,7 +65,6 @@ class Trace:
     What a model predicts is the reading minus its residual.
 
     Args:
-        id: of the run.
         time: s, shape (n,); without the times at which the record has no sample.
         reading: means of the reading as it is fitted, shape (n,), rad.
         before: residuals of the nominal model, shape (n,), rad.
@@ -110,8 +107,6 @@ class Maps:
     """All maps of a campaign.
 
     Args:
-        runs: by run.
-        groups: by condition.
         time: excess over time since the start of the record, s.
         time_by_run: mean excess by run (rows) and bin of time (columns), shape (runs, n); NaN after a run's end.
         moment_time: energy of the apparent moment by bin of ``time``, shape (n,), as shares of the whole.
@@ -121,8 +116,6 @@ class Maps:
         frequency_after: mean by bin with the causes added, shape of ``frequency.mean``; None where not added.
         resonance: least and greatest frequency of the runs' free motion, Hz.
         bands: the residual by multiples of the runs' own frequency.
-        lines: narrow lines.
-        backbones: by run.
         phase_plane: missing moment by angle and rate; None where there is none.
         traces: every run against time, the largest excess first.
         grid: excess by amplitude and speed, or amplitude and time.

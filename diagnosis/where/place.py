@@ -35,7 +35,6 @@ class Finding:
 
     Args:
         value: the conclusion; None where the runs do not allow one.
-        reason: why, a clause.
     """
 
     value: str | None
@@ -47,10 +46,7 @@ class Place:
     """Where a gap is.
 
     Args:
-        survey: maps of the residuals.
         runs: ids of the runs beyond chance.
-        channel: what it acts on.
-        condition: when it acts.
     """
 
     survey: Survey
