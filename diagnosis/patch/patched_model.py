@@ -87,7 +87,13 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
                 constant: known.get(constant, 0.0) or TEXTBOOK_POWERS.get(constant, 0.0)
                 for constant in formula.names - {"b", "r"}
             }
-            found, missed = _polynomial(forms, -formula.value({**values, name: grid}))
+            wanted = -formula.value({**values, name: grid})
+            columns, greatest = np.array(forms).T, np.max(np.abs(wanted))
+            sizes = np.max(np.abs(columns), axis=0)
+            found = np.linalg.lstsq(columns / sizes, wanted, rcond=1e-12)[0]
+            found[np.abs(found) < 1e-9 * greatest] = 0.0
+            found /= sizes
+            missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
             if missed < _FAITHFUL and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
                 native += found
                 if missed >= 1e-6:
@@ -111,16 +117,6 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
         noise=noise,
     )
     return FoundLaw(patch, (*notes, *_unwritten(physics, problem)))
-
-
-def _polynomial(forms: tuple[Array, ...], wanted: Array) -> tuple[Array, float]:
-    """Coefficients of native forms, and what they miss as a share of the greatest moment."""
-    columns = np.array(forms).T
-    sizes = np.max(np.abs(columns), axis=0)
-    found = np.linalg.lstsq(columns / sizes, wanted, rcond=1e-12)[0]
-    found[np.abs(found) < 1e-9 * np.max(np.abs(wanted))] = 0.0
-    found /= sizes
-    return found, float(np.max(np.abs(columns @ found - wanted)) / np.max(np.abs(wanted)))
 
 
 def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:

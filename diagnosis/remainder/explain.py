@@ -97,7 +97,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
 
 
 def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str:
-    """The simplest kind of `KINDS` that closes about as much as any; those of a common law are in that order."""
+    """The simplest kind of `KINDS` that closes about as much as any; of common laws the simpler come first."""
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )

@@ -279,7 +279,15 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
         else:
             filled = _means(run.samples.count.astype(np.float64), group) > 0.0
             time, reading, before, *after = (_means(values, group)[filled] for values in seen)
-        first, last = _most_energy(time, before - after[0] if after else before, _SHOWN_CYCLES / frequency)
+        # the few cycles that hold the most of the difference's energy; the whole where that is shorter
+        first, last, length = float(time[0]), float(time[-1]), _SHOWN_CYCLES / frequency
+        if last - first > length:
+            difference = before - after[0] if after else before
+            energy = np.concatenate([[0.0], np.cumsum(difference**2)])
+            ends = np.searchsorted(time, time + length, side="right")
+            whole = time <= last - length
+            first = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
+            last = first + length
         trace = Trace(
             run.id,
             time * similarity.own(1.0, "s"),
@@ -297,15 +305,3 @@ def _means(values: Array, group: int) -> Array:
     """Means of groups of neighbouring values; an incomplete last group is left out."""
     count = values.size // group
     return np.asarray(values[: count * group].reshape(count, group).mean(axis=1), np.float64)
-
-
-def _most_energy(time: Array, difference: Array, length: float) -> tuple[float, float]:
-    """The stretch of a length, s, that holds the most of a difference's energy; the whole where that is shorter."""
-    first, last = float(time[0]), float(time[-1])
-    if last - first <= length:
-        return first, last
-    energy = np.concatenate([[0.0], np.cumsum(difference**2)])
-    ends = np.searchsorted(time, time + length, side="right")
-    whole = time <= last - length
-    start = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
-    return start, start + length
