@@ -21,6 +21,7 @@ from diagnosis.remainder.explain import closable
 from diagnosis.search.investigate import investigate
 from identification.statistics import Proportion
 from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.files.writing import as_json
 
 STATE = ("angle", "rate", "state")
 TIME = ("time", "event")
@@ -46,8 +47,7 @@ def answer(folder: Path) -> dict[str, Any]:
     begun = time.process_time()
     study = investigate(read_campaign(folder), ())
     found = closable(study, significant=study.test.detected) if study.test.detected else None
-    document = None if found is None else found.to_json_dict()
-    return {"detected": study.test.detected, "closable": document, "cpu_s": time.process_time() - begun}
+    return {"detected": study.test.detected, "closable": as_json(found), "cpu_s": time.process_time() - begun}
 
 
 def _closes(found: Mapping[str, Any]) -> float:

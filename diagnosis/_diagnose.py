@@ -13,6 +13,7 @@ from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
+from diagnosis.closure import UNPATCHED, PatchedModel
 from diagnosis.diagnosable import (
     BY_MOMENT,
     NOT_SOUGHT,
@@ -24,7 +25,6 @@ from diagnosis.diagnosable import (
     with_law,
 )
 from diagnosis.noise.gap import noise_remarks
-from diagnosis.patched import UNPATCHED
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress, investigate
@@ -36,9 +36,11 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from diagnosis.patched import PatchedModel
     from diagnosis.search.investigate import Study
     from tunnel_sim.engine.joint_model import JointModel
+
+
+_NOT_SOLVED = "How much of what remains could be closed was not found: its equations cannot be solved."
 
 
 def diagnose(
@@ -67,8 +69,36 @@ def diagnose(
     refuse_undiagnosable(campaign, own_model=model is not None)
     kinds = known_effects() if kinds is None else kinds
     campaign = campaign if model is None else with_law(campaign, model.law)
+    say = progress or (lambda _: None)
     with answering_with(kinds):
-        return _diagnose(campaign, kinds, progress, model)
+        chosen = choose(campaign, kinds)
+        try:  # noise, nominal fit, where, search
+            study = investigate(chosen.campaign, chosen.kinds, progress)
+        except TunnelError as error:
+            if not chosen.limit_cycles:
+                raise
+            raise refused_limit_cycles(chosen.remarks) from error
+        say("how far it closes")
+        answer = _answered(study, chosen, model)
+        if chosen.limit_cycles:
+            return limit_cycle_answer(answer, chosen.remarks)
+        if chosen.campaign.driven:  # the remainder's laws are sought along free decays
+            answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
+        else:
+            say("what no effect explains")
+            decided = answer.decision.decided  # of an undecided diagnosis the whole gap remains
+            significant = not decided or (answer.rest is not None and answer.rest.significant)
+            try:
+                with np.errstate(over="raise"):  # a fitted model that runs away
+                    found = closable(study, significant=significant, decided=decided)
+                answer = replace(answer, closable=found)
+            except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
+                answer = replace(answer, cautions=(*answer.cautions, _NOT_SOLVED))
+        # below one half a set of effects comes first, though each of them may be less probable than none
+        odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
+        likeliest = max(odds, key=odds.__getitem__, default="")
+        modes = second_modes(chosen.campaign) if likeliest in UNKNOWN else ()
+        return replace(answer, verdict=" ".join((*modes, answer.verdict)))
 
 
 def read_model(
@@ -99,38 +129,18 @@ def read_model(
     return read_joint_model(Path(path), joint, reach(campaign), free, assets)
 
 
-def _diagnose(
-    campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None, model: JointModel | None
-) -> Diagnosis:
-    say = progress or (lambda _: None)
-    chosen = choose(campaign, kinds)
-    study = _studied(chosen, progress)  # noise, nominal fit, where, search
-    say("how far it closes")
-    answer = _answered(study, chosen, model)
-    if chosen.limit_cycles:
-        return limit_cycle_answer(answer, chosen.remarks)
-    if chosen.campaign.driven:  # the remainder's laws are sought along free decays
-        answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
-    else:
-        say("what no effect explains")
-        answer = _with_closable(answer, study)
-    return _with_second_modes(answer, chosen.campaign)
-
-
-def _studied(chosen: Chosen, progress: Progress | None) -> Study:
-    """The study of the chosen runs; limit cycles that have no nominal fit are refused as what they are."""
-    try:
-        return investigate(chosen.campaign, chosen.kinds, progress)
-    except TunnelError as error:
-        if not chosen.limit_cycles:
-            raise
-        raise refused_limit_cycles(chosen.remarks) from error
-
-
 def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnosis:
     """The answer in the units of the measured campaign, without what no effect explains."""
     where, maps = localise(study)
-    patched, unpatched = (None, ()) if model is None else _patched(study, model)
+    patched: PatchedModel | None = None
+    unpatched: tuple[str, ...] = ()
+    if model is not None:
+        from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
+
+        try:
+            patched = patched_model(study, model)
+        except TunnelError as error:
+            unpatched = (f"{UNPATCHED}: {error.what}.",)
     by_moment = (BY_MOMENT,) if study.by_moment else ()
     left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
     assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
@@ -141,40 +151,6 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
         data=chosen.examined,
     )
     return in_own_units(sized, study.similarity)
-
-
-def _with_second_modes(answer: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """The answer, whose verdict begins with a second mode where ``unknown`` is most probable and a mode is seen."""
-    # below one half a set of effects comes first, though each of them may be less probable than none
-    odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
-    likeliest = max(odds, key=odds.__getitem__, default="")
-    modes = second_modes(campaign) if likeliest in UNKNOWN else ()
-    return replace(answer, verdict=" ".join((*modes, answer.verdict)))
-
-
-def _with_closable(answer: Diagnosis, study: Study) -> Diagnosis:
-    """The answer with what could be closed of what remains, or a caution that it was not found.
-
-    Of an undecided diagnosis the whole gap remains.
-    """
-    decided = answer.decision.decided
-    significant = not decided or (answer.rest is not None and answer.rest.significant)
-    try:
-        with np.errstate(over="raise"):  # a fitted model that runs away
-            return replace(answer, closable=closable(study, significant=significant, decided=decided))
-    except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
-        said = "How much of what remains could be closed was not found: its equations cannot be solved."
-        return replace(answer, cautions=(*answer.cautions, said))
-
-
-def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[str, ...]]:
-    """The patched model, or none and a sentence that says why."""
-    from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
-
-    try:
-        return patched_model(study, model), ()
-    except TunnelError as error:
-        return None, (f"{UNPATCHED}: {error.what}.",)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,9 +16,9 @@ from diagnosis.answer.reported import excess_base
 from diagnosis.answer.units import own_next_run
 from diagnosis.answer.waterfall import both_ends, one_more
 from diagnosis.closure import share_closed
-from diagnosis.decision import plain
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.printing import plain
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
@@ -34,10 +35,8 @@ class Closure:
     """How far the gap closes with causes chosen by hand.
 
     Args:
-        effects: names, sorted.
         before: excess of the nominal model on what is held out, in noise variances of a sample.
         after: excess with the effects, likewise, in noise variances of a sample.
-        held_out: what is held out, in words.
         parameters: of the effects, by name; ``effect.parameter`` where there are several effects.
     """
 
@@ -84,7 +83,11 @@ class ByHand:
             TunnelError: when an effect cannot be fitted to these runs.
         """
         names = frozenset(effects)
-        fitted = self._polished(names) if converged else self._fit(names)
+        fitted = self._fit(names)
+        if converged:
+            if names not in self._whole:
+                self._whole[names] = polish(Hypothesis(tuple(sorted(names)), fitted)).fit
+            fitted = self._whole[names]
         for one in (self._study.nominal, fitted):
             if one not in self._held_out:
                 self._held_out[one] = predict_held_out(one)
@@ -114,34 +117,23 @@ class ByHand:
         found = separating_run(self._fit(frozenset(first)), self._fit(frozenset(second)))
         return None if found is None else own_next_run(found, self._study.similarity)
 
-    def _polished(self, names: frozenset[str]) -> Fit:
-        if names not in self._whole:
-            self._whole[names] = polish(Hypothesis(tuple(sorted(names)), self._fit(names))).fit
-        return self._whole[names]
-
     def _fit(self, names: frozenset[str]) -> Fit:
-        if names not in self._fits:
-            larger = [known for known in self._fits if known > names]
-            found = self._from_larger(min(larger, key=len), names) if larger else None
-            self._fits[names] = found or self._from_smaller(names)
-        return self._fits[names]
-
-    def _from_larger(self, known: frozenset[str], names: frozenset[str]) -> Fit | None:
-        start = restricted(self._fits[known], names)
-        try:
-            return fit(start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS)
-        except (FitError, np.linalg.LinAlgError):
-            return None
-
-    def _from_smaller(self, names: frozenset[str]) -> Fit:
-        """The missing effects added one after another to the largest set that is fitted."""
-        known = max((known for known in self._fits if known < names), key=len)
-        for name in sorted(names - known):
-            found = one_more(self._fits[known], effect_class(name))
-            if found is None:
-                raise TunnelError(
-                    f"{plain(name)} cannot be fitted to these runs", remedy="choose another effect"
+        """Started from the smallest set with more effects that is fitted, or from the largest with fewer."""
+        larger = [known for known in self._fits if known > names]
+        if names not in self._fits and larger:
+            start = restricted(self._fits[min(larger, key=len)], names)
+            with suppress(FitError, np.linalg.LinAlgError):
+                self._fits[names] = fit(
+                    start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS
                 )
-            known |= {name}
-            self._fits[known] = found
+        if names not in self._fits:
+            known = max((known for known in self._fits if known < names), key=len)
+            for name in sorted(names - known):
+                found = one_more(self._fits[known], effect_class(name))
+                if found is None:
+                    raise TunnelError(
+                        f"{plain(name)} cannot be fitted to these runs", remedy="choose another effect"
+                    )
+                known |= {name}
+                self._fits[known] = found
         return self._fits[names]

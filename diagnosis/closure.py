@@ -1,15 +1,22 @@
-"""How far the gap closes: in which units, with each cause, and what more could be closed; with their JSON."""
+"""How far the gap closes and what more could be closed, with their JSON; and the model with the causes in it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from identification.printing import TextTable, significant
+from identification.printing import TextTable, significant, unit_mark
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.writing import as_json
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tunnel_sim.engine.joint_model import JointModel
+    from tunnel_sim.engine.joint_patch import Written
 
 
 @dataclass(frozen=True)
@@ -27,26 +34,12 @@ class Misfit:
     unit: str
 
     def rms(self, excess: float) -> float:
-        """Root mean square of what a model leaves beyond the noise.
-
-        Args:
-            excess: in noise variances of a sample; below zero it is chance.
-
-        Returns:
-            In ``unit``.
-        """
+        """Root mean square in ``unit`` of an excess in noise variances of a sample, which is chance below zero."""
         return self.noise * math.sqrt(max(excess, 0.0))
 
 
 def unit_shown(unit: str) -> tuple[str, float]:
-    """The unit in which readings are shown to people.
-
-    Args:
-        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
-
-    Returns:
-        Its mark, and the factor on values in ``unit``.
-    """
+    """The mark of the unit in which readings are shown to people, and the factor on values in the unit given."""
     return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
 
 
@@ -108,7 +101,6 @@ class Waterfall:
         steps: the nominal model first; then the cause that closes most, and so on.
         without: excess by cause, when it alone is taken out and the others are refitted, likewise held out. A cause
             beside a random moment has none: the random moment would absorb it.
-        held_out: what was held out, in words.
     """
 
     steps: tuple[Step, ...] = ()
@@ -132,7 +124,6 @@ class Move:
         value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
         relative: the same over the coefficient's absolute value, a fraction; None where the coefficient is zero.
         std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
-        unit: of the coefficient.
     """
 
     value: float
@@ -150,8 +141,6 @@ class Remainder:
         excess: on readings held out of the fit, in noise variances of a sample.
         p_value: of the strongest test, corrected for the number of tests.
         material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
-        moves: by coefficient.
-        words: the same in a sentence.
     """
 
     significant: bool
@@ -183,10 +172,8 @@ class Ceiling:
     """How much one kind could close at most.
 
     Args:
-        kind: of `KINDS`.
         closed: share of what is left, on readings held out of the fit; negative where the prediction is worse.
         std: its standard deviation from the scatter of the runs, a share.
-        held_out: what was held out, in words.
     """
 
     kind: str
@@ -201,7 +188,6 @@ class Curve:
 
     Args:
         over: the quantities: ``angle`` (rad), ``rate`` (rad/s) or ``time`` (s).
-        places: of every quantity, where the curve is given.
         values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or rate
             belongs to the model's own coefficients, and is taken out.
         std: their standard deviations, in ``unit``.
@@ -234,8 +220,8 @@ class Law:
     def to_json_dict(self) -> dict[str, Any]:
         """Fields by name; of the parameters ``value`` and ``std``."""
         parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
-        effect = as_json(self.effect)
-        return {"effect": effect, "parameters": parameters, "closed": self.closed, "std": self.std}
+        found: dict[str, Any] = as_json({**vars(self), "parameters": parameters})
+        return found
 
 
 @dataclass(frozen=True)
@@ -244,41 +230,22 @@ class Closable:
 
     Args:
         excess: that the answer leaves in the fitted runs, in noise variances of a sample.
-        ceilings: by kind.
         kind: the simplest that closes about as much as any, of `KINDS`.
-        words: the same in a sentence or two.
-        curve: of that kind; None where it has none.
-        law: a formula; None where none is supported.
         events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
+        curve: of that kind; None where it has none.
     """
 
     excess: float
     ceilings: tuple[Ceiling, ...]
     kind: str
     words: str
+    events: tuple[Mapping[str, Any], ...] = ()
     curve: Curve | None = None
     law: Law | None = None
-    events: tuple[Mapping[str, Any], ...] = field(default=())
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields, in JSON's types."""
-        return {
-            "excess": self.excess,
-            "ceilings": as_json(self.ceilings),
-            "kind": self.kind,
-            "words": self.words,
-            "events": as_json(self.events),
-            "curve": as_json(self.curve),
-            "law": as_json(self.law),
-        }
 
 
 def closable_words(document: Mapping[str, Any]) -> str:
-    """What could be closed, in words.
-
-    Returns:
-        A line; empty where there is no gap, or it was not found.
-    """
+    """What could be closed, in a line; empty where there is no gap, or it was not found."""
     if found := document.get("closable"):
         return f"What could be closed: {found['words']}"
     rest = document.get("rest")
@@ -292,33 +259,133 @@ def closable_words(document: Mapping[str, Any]) -> str:
 
 
 def closable_table(document: Mapping[str, Any]) -> TextTable:
-    """How much each kind could close.
-
-    Returns:
-        A table of shares in per cent with one standard deviation; without rows where nothing remains beyond chance.
-    """
+    """Share that each kind could close, in per cent; a table without rows where nothing remains beyond chance."""
     found = document.get("closable") or {"ceilings": ()}
     rows = [
         (KINDS[one["kind"]], percent(max(one["closed"], 0.0), one["std"]), one["held_out"])
         for one in found["ceilings"]
     ]
-    return TextTable(
-        "Share of what is left that could be closed at most",
-        ("by", "share", "held out"),
-        tuple(rows),
-        ("share",),
-    )
+    title = "Share of what is left that could be closed at most"
+    return TextTable(title, ("by", "share", "held out"), tuple(rows), ("share",))
 
 
 def percent(share: float, std: float | None = None) -> str:
-    """A share in per cent with its standard deviation.
+    """A share in per cent, such as ``94.2 ± 0.6 %``.
 
     Args:
         share: a fraction.
-        std: likewise; None: not given.
-
-    Returns:
-        Text such as ``94.2 ± 0.6 %``; a standard deviation beyond 100 % is not resolved further.
+        std: its standard deviation, a fraction; beyond 1 it is not resolved further.
     """
     beside = "" if std is None else f" ± {min(max(100.0 * std, 0.1), 100.0):.1f}"
     return f"{min(100.0 * share, 100.0):.1f}{beside} %"
+
+
+UNPATCHED = "The causes could not be written into the model"
+"""How a caution begins where an answer has no patched model."""
+
+
+@dataclass(frozen=True)
+class NativeClosure:
+    """How far the gap closes on readings held out of the fit.
+
+    Args:
+        before: mean squared residual of the nominal model, in units of the noise power of a block mean.
+        fit: of the fits' own integrator with the causes, in the same unit.
+        native: of the patched model, simulated by the engine, in the same unit.
+    """
+
+    before: float
+    fit: float
+    native: float
+    on: str
+
+    @property
+    def fit_closed(self) -> float:
+        """Share of the gap that the fit closes."""
+        return self._closed(self.fit)
+
+    @property
+    def native_closed(self) -> float:
+        """Share of the gap that the patched model closes."""
+        return self._closed(self.native)
+
+    def _closed(self, after: float) -> float:
+        return min(max(1.0 - max(after - 1.0, 0.0) / max(self.before - 1.0, 1e-9), 0.0), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PatchedModel:
+    """The model with the causes written into it.
+
+    Args:
+        written: attributes that changed.
+        notes: where the native element is not the same law, in sentences.
+        zero: the reading less the joint's position, rad; the median of the runs.
+    """
+
+    model: JointModel
+    spec: mujoco.MjSpec
+    written: tuple[Written, ...]
+    notes: tuple[str, ...]
+    zero: float
+    closure: NativeClosure
+
+    def write(self, path: Path | str) -> Path:
+        """Write the patched model to an MJCF file, which it replaces, completely or not at all.
+
+        Raises:
+            TunnelError: when it cannot be written.
+        """
+        from tunnel_sim.engine.joint_patch import patched_xml
+        from tunnel_sim.files.writing import write_whole
+
+        target = Path(path)
+        return write_whole(target, patched_xml(self.spec, self.model, target.parent).encode())
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The patch in JSON's types."""
+        return {
+            "file": self.model.path.name,
+            "joint": self.model.joint,
+            "free": list(self.model.law.free),
+            "rest_rad": self.model.law.rest,
+            "zero_rad": self.zero,
+            "written": as_json(self.written),
+            "notes": list(self.notes),
+            "closed": self.closure.native_closed,
+            "closed_by_fit": self.closure.fit_closed,
+            "closed_on": self.closure.on,
+        }
+
+
+def patch_table(document: Mapping[str, Any]) -> TextTable:
+    """What the patch changes; a table without rows where no model was given."""
+    model = document.get("model") or {"written": (), "file": ""}
+    rows = []
+    for one in model["written"]:
+        mark = "" if one["unit"] == "1" else unit_mark(one["unit"])
+        rows.append((one["name"], _numbers(one["before"]), _numbers(one["after"]), mark))
+    heads = ("", "before", "after", "")
+    return TextTable(f"Changes to {model['file']}", heads, tuple(rows), ("before", "after"))
+
+
+def patch_lines(document: Mapping[str, Any]) -> list[str]:
+    """How far the patched model closes the gap, and each difference from the law found; none without a model."""
+    model = document.get("model")
+    if model is None:
+        return []
+    if document["causes"] in ([], ["unknown"]):
+        said = f"No cause is written into the patched model, only what was free: {', '.join(model['free'])}."
+    else:
+        closed, by_fit = (f"{100.0 * model[name]:.1f} %" for name in ("closed", "closed_by_fit"))
+        said = (
+            f"The patched model, simulated by MuJoCo as it stands, closes {closed} of the gap "
+            f"{model['closed_on']}; the fit itself {by_fit}."
+        )
+    reading = f"The reading is the position of {model['joint']} {model['zero_rad']:+.4g} rad."
+    return [f"{said} {reading}", *(f"- {note}" for note in model["notes"])]
+
+
+def _numbers(values: list[float]) -> str:
+    last = max((i for i, value in enumerate(values) if value), default=0)
+    return " ".join(significant(value, 4) for value in values[: last + 1])

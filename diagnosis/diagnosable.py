@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import free_frequency, frequency, response_to_input
-from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES
+from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
@@ -28,11 +28,7 @@ SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout
 
 
 def reach(campaign: Campaign) -> float:
-    """The greatest displacement in the records.
-
-    Returns:
-        rad; from the frequency where the sensor measures a rate or an acceleration.
-    """
+    """The greatest displacement in the records, rad; by way of the frequency where the sensor reads a rate."""
     found = []
     for run in campaign.runs:
         readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
@@ -42,13 +38,7 @@ def reach(campaign: Campaign) -> float:
 
 
 def with_law(campaign: Campaign, law: JointLaw) -> Campaign:
-    """The campaign with a joint's law in place of a spring.
-
-    Args:
-        law: of the joint.
-
-    Returns:
-        The campaign; its runs state the stiffness at rest.
+    """The campaign with a joint's law in place of a spring; its runs state the stiffness at rest.
 
     Raises:
         TunnelError: when the runs state more than one spring, or the wind blows and a reference size is missing.
@@ -90,22 +80,21 @@ class Diagnosable:
 def diagnosable(campaign: Campaign) -> Diagnosable:
     """Examine a campaign, and separate its free decays from runs in a limit cycle.
 
-    Returns:
-        The free decays; the whole records of all runs where every one is in a limit cycle.
+    Where all are in one, their whole records remain.
 
     Raises:
         TunnelError: when the examination refuses the records.
     """
     examined = examine(campaign).accepted()
     cycling = {name for r in examined.remarks if in_limit_cycle(r.figures) for name in r.runs}
-    decays = tuple(run for run in examined.campaign.runs if run.id not in cycling)
-    remarks = tuple(
-        replace(r, outcome=Outcome.LEFT_OUT, remedy=_LEFT_OUT) if in_limit_cycle(r.figures) else r
-        for r in examined.remarks
-    )
     if not cycling:
         return Diagnosable(examined.campaign, examined.remarks)
+    decays = tuple(run for run in examined.campaign.runs if run.id not in cycling)
     if decays:
+        remarks = tuple(
+            replace(r, outcome=Outcome.LEFT_OUT, remedy=_LEFT_OUT) if in_limit_cycle(r.figures) else r
+            for r in examined.remarks
+        )
         return Diagnosable(replace(examined.campaign, runs=decays), remarks)
     whole, _ = with_clocks(replace(campaign, runs=tuple(r for r in campaign.runs if r.id in cycling)))
     return Diagnosable(whole, examined.remarks, limit_cycles=True)
@@ -119,9 +108,7 @@ class Chosen:
         examined: all runs that show the kind of motion diagnosed.
         campaign: those of them that one model can be fitted to.
         kinds: the effects to answer with; none where all runs are in limit cycles.
-        remarks: of the examination.
         left_out: sentences that say which runs and effects were left out, and why.
-        limit_cycles: whether all runs are in limit cycles.
     """
 
     examined: Campaign
@@ -135,16 +122,12 @@ class Chosen:
 def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
     """Choose the runs of a campaign that are diagnosed together, and the effects to answer with.
 
-    Args:
-        kinds: the effects known.
-
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
     """
     found = diagnosable(campaign)
     if not found.limit_cycles:
-        refuse_hopeless(found.campaign)
-        refuse_without_resonance(found.campaign)
+        refuse_motionless(found.campaign)
     compared, left_out = comparable_runs(found.campaign)
     if compared.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
@@ -160,14 +143,11 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
 
 
 def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out the runs that cannot be fitted together with the others.
+    """Leave out the runs that cannot be fitted together with the others, and say in sentences which and why.
 
-    Returns:
-        The campaign of the remaining runs, and sentences that say which were left out and why; none where all
-        runs remain. Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those
-        that state it, if equal). Of runs that do not state it, those with the same frequency at the same wind
-        speed remain: only they can have one spring. A wind-on run that swings in another mode than the wind-off
-        runs of its spring is left out.
+    Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
+    equal). Of runs that do not state it, those with the same frequency at the same wind speed remain: only they can
+    have one spring. A wind-on run that swings in another mode than the wind-off runs of its spring is left out.
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
@@ -190,7 +170,17 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
                 f"these separately."
             )
         kept = same
-    elsewhere = _in_another_mode(kept)
+    still: dict[float | None, list[float]] = defaultdict(list)
+    for run in kept:
+        if not run.wind_on:
+            still[run.spring_stiffness].append(free_frequency(run))
+    elsewhere = [
+        run
+        for run in kept
+        if run.wind_on
+        and run.spring_stiffness in still
+        and free_frequency(run) > ANOTHER_MODE * median(still[run.spring_stiffness])
+    ]
     if elsewhere:
         said.append(
             f"Left out, since they swing in another mode, {ANOTHER_MODE:g} times as fast as the same spring with "
@@ -205,44 +195,31 @@ def _ids(runs: Sequence[Run]) -> str:
     return ", ".join(run.id for run in runs)
 
 
-def _in_another_mode(runs: Sequence[Run]) -> list[Run]:
-    """Wind-on runs far above the frequency of the wind-off runs of the same spring."""
-    still: dict[float | None, list[float]] = defaultdict(list)
-    for run in runs:
-        if not run.wind_on:
-            still[run.spring_stiffness].append(free_frequency(run))
-    windy = [run for run in runs if run.wind_on and run.spring_stiffness in still]
-    return [run for run in windy if free_frequency(run) > ANOTHER_MODE * median(still[run.spring_stiffness])]
-
-
 def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
     """The largest group of runs that may have one spring.
 
     The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
     same at each speed.
     """
-    by_speed: dict[float, list[Run]] = defaultdict(list)
+    by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     for run in runs:
-        by_speed[run.wind_speed].append(run)
-    groups = {speed: _by_frequency(alike) for speed, alike in by_speed.items()}
-    counts = {len(found) for found in groups.values()}
+        by_speed[run.wind_speed].append((free_frequency(run), run))
+    # by speed, groups of runs with about the same frequency, lowest first
+    groups: list[list[list[Run]]] = []
+    for alike in by_speed.values():
+        ranked = sorted(alike, key=lambda pair: pair[0])
+        found = [[ranked[0][1]]]
+        for (last, _), (now, run) in itertools.pairwise(ranked):
+            if now > SAME_SPRING * last:
+                found.append([])
+            found[-1].append(run)
+        groups.append(found)
+    counts = {len(found) for found in groups}
     if counts == {1}:
         return list(runs)
     if len(counts) == 1:
-        ranks = [[run for found in groups.values() for run in found[rank]] for rank in range(counts.pop())]
-        return max(ranks, key=len)
-    return max((group for found in groups.values() for group in found), key=len)
-
-
-def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
-    """Groups of runs with about the same frequency, lowest first."""
-    found = sorted(((free_frequency(run), run) for run in runs), key=lambda pair: pair[0])
-    groups = [[found[0][1]]]
-    for (last, _), (now, run) in itertools.pairwise(found):
-        if now > SAME_SPRING * last:
-            groups.append([])
-        groups[-1].append(run)
-    return groups
+        return max(([run for group in rank for run in group] for rank in zip(*groups, strict=True)), key=len)
+    return max((group for found in groups for group in found), key=len)
 
 
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
@@ -278,6 +255,7 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
     driven = [run for run in campaign.runs if run.drive is not None]
     for run in driven:
         assert run.drive is not None
+        where = f"{campaign.name}, run '{run.id}'"
         why = ""
         if not run.drive.on_body:
             why = "is driven by the motion of the spring's root"
@@ -293,27 +271,12 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             raise TunnelError(
                 f"the run is driven and has {run.record.yaw_rad.size} samples: too few to tell its noise from its "
                 "response",
-                where=f"{campaign.name}, run '{run.id}'",
+                where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
         if why:
-            raise TunnelError(
-                f"the run {why}, which is not diagnosed yet",
-                where=f"{campaign.name}, run '{run.id}'",
-                remedy="leave the run out",
-            )
-    _refuse_beside_springs(campaign)
-    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
-    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
-        raise TunnelError(
-            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
-            where=campaign.name,
-            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
-        )
-
-
-def _refuse_beside_springs(campaign: Campaign) -> None:
-    """Refuse runs without a spring beside others, or with an input that shows no inertia."""
+            what = f"the run {why}, which is not diagnosed yet"
+            raise TunnelError(what, where=where, remedy="leave the run out")
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -327,14 +290,29 @@ def _refuse_beside_springs(campaign: Campaign) -> None:
             where=campaign.name,
             remedy="state drive_gain, or record the moment as moment_nm",
         )
+    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
+    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
+        raise TunnelError(
+            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
+            where=campaign.name,
+            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+        )
 
 
-def refuse_without_resonance(campaign: Campaign) -> None:
-    """Refuse a driven run whose motion does not follow from its input, as an oscillation where there is a spring.
+def refuse_motionless(campaign: Campaign) -> None:
+    """Refuse a run that shows no motion to diagnose; the estimators leave out the same free decays.
 
     Raises:
-        TunnelError: for the first such run.
+        TunnelError: for the first run without a decaying motion, or the first driven one whose motion does not
+            follow from its input, as an oscillation where there is a spring.
     """
+    for run in campaign.runs:
+        if run.drive is not None:
+            continue
+        status = identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
+        if status in (Status.NO_OSCILLATION, Status.NOT_DETERMINED):
+            what, _, remedy = status.value.partition(": ")
+            raise TunnelError(what, where=f"run {run.id}", remedy=f"{remedy}; or leave the run out")
     for run in campaign.runs:
         if run.drive is None:
             continue
@@ -356,14 +334,9 @@ def refuse_without_resonance(campaign: Campaign) -> None:
 def kinds_for(
     campaign: Campaign, kinds: Sequence[type[Effect]]
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
-    """The effects that can be fitted to a campaign.
+    """The effects, of those to answer with, that can be fitted to a campaign, and sentences that name the others.
 
-    Args:
-        kinds: the effects to answer with.
-
-    Returns:
-        Those that act on free decays, and no sentence, where no run is driven; else those that can be fitted to
-        driven runs, and sentences that name the others.
+    Where no run is driven, they are those that act on free decays, without a sentence.
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
@@ -378,15 +351,7 @@ def kinds_for(
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
-    """The gain of the input in a fit.
-
-    Args:
-        campaign: as measured.
-        fit: of the similar campaign.
-
-    Returns:
-        A sentence, in the measured campaign's units; none where the gain is known.
-    """
+    """The gain of the input in the fit of a campaign, in a sentence; none where the gain is known."""
     if "drive_gain" not in fit.problem.names:
         return ()
     data = fit.problem.data
@@ -402,29 +367,8 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
     return (f"The gain of the input is {value:.5g} ± {std:.2g} {per} per unit.",)
 
 
-_HOPELESS = (Status.NO_OSCILLATION, Status.NOT_DETERMINED)
-
-
-def refuse_hopeless(campaign: Campaign) -> None:
-    """Refuse a campaign with a run that shows no decaying motion; the estimators leave out the same runs.
-
-    Raises:
-        TunnelError: for the first such run.
-    """
-    for run in campaign.runs:
-        if run.drive is not None:
-            continue
-        status = identify_run(run, campaign.sensor, cycles_per_window=NO_WINDOWS).estimate.status
-        if status in _HOPELESS:
-            what, _, remedy = status.value.partition(": ")
-            raise TunnelError(what, where=f"run {run.id}", remedy=f"{remedy}; or leave the run out")
-
-
 def refuse_indefinite(fit: Fit) -> None:
     """Refuse a nominal fit that the runs do not determine.
-
-    Args:
-        fit: of the nominal model.
 
     Raises:
         TunnelError: when a parameter or its standard deviation is not finite, or the inertia is not positive.

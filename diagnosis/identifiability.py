@@ -67,12 +67,8 @@ class Identifiability:
 def identifiability(kind: type[Effect]) -> Identifiability:
     """Compare what an effect leaves beside the nominal model with what every known effect leaves.
 
-    Args:
-        kind: the effect, registered or not.
-
-    Returns:
-        The comparison by linear theory at typical sizes. Effects that are not fitted as a motion (random moments,
-        periodic effects, missing samples, coarse steps) are left out.
+    That is by linear theory at typical sizes. Effects that are not fitted as a motion (random moments, periodic
+    effects, missing samples, coarse steps) are left out.
     """
     base = _nominal(driven=kind.driven)
     own = unabsorbed(base, kind)
@@ -85,19 +81,19 @@ def identifiability(kind: type[Effect]) -> Identifiability:
         if other.fitted and not (other.line or other.skips):
             left = unabsorbed(base, other)
             if left is not None:
-                found[other.name] = _cosine(own[0], left[0])
+                size = float(np.linalg.norm(own[0]) * np.linalg.norm(left[0]))
+                found[other.name] = abs(float(own[0] @ left[0])) / size if size > 0.0 else 0.0
     return Identifiability(own[1], dict(sorted(found.items(), key=lambda pair: -pair[1])), kind.driven)
-
-
-def _cosine(one: np.ndarray, other: np.ndarray) -> float:
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return abs(float(one @ other)) / size if size > 0.0 else 0.0
 
 
 @cache
 def _nominal(*, driven: bool) -> Fit:
-    """The nominal fit of a campaign without any effect."""
-    from tunnel_sim.engine.virtual_campaign import simulate_campaign  # only here: loads MuJoCo
+    """The nominal fit of a campaign without any effect.
+
+    Where it is driven, there is a moment beside the release: a chirp from 1 to 5 Hz, over all resonances.
+    """
+    from tunnel_sim.engine.effect_laws import record  # only here: loads MuJoCo
+    from tunnel_sim.engine.virtual_campaign import run_settings, simulate_campaign, stated_run
 
     conditions = tuple(
         Condition(f"s{spring:g}-v{speed:g}-a{degrees:g}", spring, speed, 1.204, math.radians(degrees), 8.0)
@@ -107,22 +103,16 @@ def _nominal(*, driven: bool) -> Fit:
     )
     truth, sensor = Truth(0.47, -0.12, 0.1014, 0.018), SensorModel(sample_rate=200.0)
     plan = CampaignPlan("laws", 1, truth, conditions, sensor)
-    campaign = _driven(plan) if driven else simulate_campaign(plan)
-    variance = {run.id: sensor.noise_std**2 for run in campaign.runs}
-    return fit_nominal(prepare(campaign, variance))
-
-
-def _driven(plan: CampaignPlan) -> Campaign:
-    """The runs of a plan with a moment beside the release: a chirp from 1 to 5 Hz, over all their resonances."""
-    from tunnel_sim.engine.effect_laws import record
-    from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
-
-    runs = []
-    for number, condition in enumerate(plan.conditions):
-        time = np.arange(round(condition.duration * plan.sensor.sample_rate)) / plan.sensor.sample_rate
-        values = 0.5 * np.sin(2.0 * np.pi * (1.0 + 2.0 * time / condition.duration) * time)
-        settings = replace(run_settings(plan.truth, condition), drive=DriveMoment(time, values))
-        seen = record((), settings, np.random.default_rng([plan.seed, number]), plan.sensor)
-        runs.append(replace(stated_run(condition, seen), drive=Drive("moment_nm", values)))
-    stated = RigProperties.of(load_rig()), SensorProperties.of(plan.sensor)
-    return Campaign(plan.name, *stated, tuple(runs))
+    if driven:
+        runs = []
+        for number, condition in enumerate(conditions):
+            time = np.arange(round(condition.duration * sensor.sample_rate)) / sensor.sample_rate
+            values = 0.5 * np.sin(2.0 * np.pi * (1.0 + 2.0 * time / condition.duration) * time)
+            settings = replace(run_settings(truth, condition), drive=DriveMoment(time, values))
+            seen = record((), settings, np.random.default_rng([plan.seed, number]), sensor)
+            runs.append(replace(stated_run(condition, seen), drive=Drive("moment_nm", values)))
+        stated = RigProperties.of(load_rig()), SensorProperties.of(sensor)
+        campaign = Campaign(plan.name, *stated, tuple(runs))
+    else:
+        campaign = simulate_campaign(plan)
+    return fit_nominal(prepare(campaign, {run.id: sensor.noise_std**2 for run in campaign.runs}))

@@ -1,34 +1,129 @@
-"""A diagnosis as lines and tables, from its JSON document."""
+"""A diagnosis in words: how decided it is; and as lines and tables, from its JSON document."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.closure import closable_table, closable_words, misfit_of, of_swing, rms_shown
-from diagnosis.decision import plain, probability
-from diagnosis.patched import patch_lines, patch_table
-from diagnosis.policy import LISTED_PROBABILITY
+from diagnosis.closure import (
+    closable_table,
+    closable_words,
+    misfit_of,
+    of_swing,
+    patch_lines,
+    patch_table,
+    rms_shown,
+)
+from diagnosis.policy import CREDIBLE, DECIDED_FROM, LISTED_PROBABILITY
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 from identification.status import Remark
+from tunnel_sim.effects import known_effects
 
-SHOWN_PROBABILITY = 0.005
-"""Answers less probable than this are counted, not listed."""
+_SHOWN = 5  # answers in words; the document lists all
+_SHOWN_ANSWERS, _SHOWN_PROBABILITY = (
+    6,
+    0.005,
+)  # more answers, and less probable ones, are counted in the table
 
-SHOWN_ANSWERS = 6
-"""At most this many answers are listed."""
+
+def plain(*names: str) -> str:
+    """Effect names as words: ``mains hum, free play and coulomb friction``."""
+    *first, last = (name.replace("_", " ") for name in names)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def probability(value: float) -> str:
+    """A probability to two decimals, never rounded to 0 or 1, such as ``0.97`` or ``> 0.99``."""
+    if value >= 0.995:
+        return "> 0.99"
+    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the probabilities of the answers allow to be said.
+
+    Args:
+        decided: whether the answer has at least one half of the probability.
+        credible: the fewest answers that together have nine tenths, with their probabilities, most probable first.
+        effects: effects that nine tenths of the probability have among the causes, with their probabilities.
+        channels: channels on which nine tenths of the probability act, likewise.
+    """
+
+    decided: bool
+    credible: tuple[tuple[str, float], ...]
+    effects: Mapping[str, float]
+    channels: Mapping[str, float]
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields ``decided``, ``credible`` and ``common`` of a document."""
+        return {
+            "decided": self.decided,
+            "credible": [{"effect": effect, "probability": value} for effect, value in self.credible],
+            "common": {"effects": dict(self.effects), "channels": dict(self.channels)},
+        }
+
+
+def decision(answers: Sequence[tuple[str, float]]) -> Decision:
+    """Judge the answers by their probabilities.
+
+    Args:
+        answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
+            first.
+    """
+    credible, together = [], 0.0
+    for answer in sorted(answers, key=lambda given: -given[1]):
+        credible.append(answer)
+        together += answer[1]
+        if together >= CREDIBLE:
+            break
+    channel_of = {kind.name: kind.channel for kind in known_effects()}
+    causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
+    return Decision(
+        decided=answers[0][1] >= DECIDED_FROM,
+        credible=tuple(credible),
+        effects=_common(causes),
+        channels=_common([({channel_of[name] for name in names}, value) for names, value in causes]),
+    )
+
+
+def _common(held: Iterable[tuple[set[str], float]]) -> dict[str, float]:
+    """What answers of nine tenths of the probability hold, with that probability, the most probable first."""
+    found: dict[str, float] = {}
+    for names, value in held:
+        for name in sorted(names):
+            found[name] = min(found.get(name, 0.0) + value, 1.0)
+    ranked = sorted(found.items(), key=lambda item: -item[1])
+    return {name: value for name, value in ranked if value >= CREDIBLE}
+
+
+def undecided_words(found: Decision) -> str:
+    """What an undecided diagnosis does say, in sentences."""
+    channels = {kind.name: kind.channel for kind in known_effects()}
+    named = {channels[name] for name in found.effects}
+    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in found.effects.items()]
+    for name, value in found.channels.items():
+        if name not in named:
+            parts.append(f"act on the {name} ({probability(value)})")
+    common = f"The likely answers {' and '.join(parts or ['have no effect and no channel in common'])}."
+    answers = []
+    for effect, value in found.credible[:_SHOWN]:
+        words = "no effect of the vocabulary" if effect == "unknown" else plain(*effect.split(" + "))
+        answers.append(f"{words} ({probability(value)})")
+    if len(found.credible) > _SHOWN:
+        answers.append(f"{len(found.credible) - _SHOWN} more")
+    most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
+    together = probability(sum(value for _, value in found.credible))
+    return f"{common} The answer is one of these, with probability {together} together: {most}."
+
 
 Document = Mapping[str, Any]
 
 
 def diagnosis_parts(document: Document) -> list[str | TextTable]:
-    """What is printed of a diagnosis.
-
-    Returns:
-        The verdict, where the gap is, the rivals, the answers considered, parameters, the gap as causes are added,
-        the coefficients, and the caveats.
-    """
+    """What is printed of a diagnosis, in order."""
     return [
         str(document["verdict"]),
         where_line(document),
@@ -68,38 +163,23 @@ def diagnosis_brief(document: Document) -> str:
 
 
 def candidates_table(document: Document) -> TextTable:
-    """The answers considered, most probable first.
-
-    Returns:
-        A table with probability and share of the gap closed; a last row counts the others.
-    """
-    rows = []
-    shown = [
-        c for c in document["candidates"][:SHOWN_ANSWERS] if c["probability"] >= SHOWN_PROBABILITY
-    ] or document["candidates"][:1]
+    """The answers considered and the shares that they close, most probable first; a last row counts the others."""
+    rows, given = [], document["candidates"]
+    shown = [c for c in given[:_SHOWN_ANSWERS] if c["probability"] >= _SHOWN_PROBABILITY] or given[:1]
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
         closed = share(candidate["closed"]) if fitted else "–"
         name = candidate["effect"].replace(" + ", " +\n")
         rows.append((name, probability(candidate["probability"]), closed))
-    left = document["candidates"][len(shown) :]
-    if left:
+    if left := given[len(shown) :]:
         together = sum(candidate["probability"] for candidate in left)
         rows.append((f"{len(left)} more, together", probability(together), ""))
-    return TextTable(
-        f"Answers for {document['campaign']}",
-        ("answer", "probability", "share closed"),
-        tuple(rows),
-        right=("probability", "share closed"),
-    )
+    heads = ("answer", "probability", "share closed")
+    return TextTable(f"Answers for {document['campaign']}", heads, tuple(rows), right=heads[1:])
 
 
 def parameters_table(document: Document) -> TextTable:
-    """The parameters of the answer.
-
-    Returns:
-        A table with one standard deviation; without rows where the answer has none.
-    """
+    """The parameters of the answer; a table without rows where it has none."""
     answer = document["candidates"][0]
     rows, effect = [], ""
     for full, given in answer["parameters"].items():
@@ -113,12 +193,7 @@ def parameters_table(document: Document) -> TextTable:
 
 
 def gap_table(document: Document) -> TextTable:
-    """The gap before and after, all runs first.
-
-    Returns:
-        A table of misfits and, beside them, of excesses in multiples of the noise power; without rows where no gap
-        was found.
-    """
+    """The gap before and after, all runs first; a table without rows where no gap was found."""
     gap = document["gap"]
     named = document["causes"] != ["unknown"]
     listed = [("all", gap["excess_before"], gap["excess_after"])]
@@ -146,38 +221,22 @@ def misfit_text(document: Document, excess: float) -> str:
 
 
 def inclusion_line(document: Document) -> str:
-    """The effects that may be among the causes, most probable first.
-
-    Returns:
-        A line with their probabilities; empty where none reaches 0.01.
-    """
+    """The effects that may be among the causes, most probable first; empty where none reaches 0.01."""
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
     shown = [f"{name} {probability(value)}" for name, value in found if value >= LISTED_PROBABILITY]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 
 def waterfall_table(document: Document) -> TextTable:
-    """How far the gap closes with each cause, and without each.
-
-    Returns:
-        A table of misfits and of excesses in multiples of the noise power; without rows where no cause is named.
-    """
+    """How far the gap closes with each cause, and without each; a table without rows where no cause is named."""
     steps, without = document.get("waterfall", ()), document.get("without", {})
-    rows = [
-        (
-            step["effect"] or "nominal model",
-            misfit_text(document, step["excess"]),
-            misfit_text(document, without[step["effect"]]) if step["effect"] in without else "",
-        )
-        for step in (steps if len(steps) > 1 else ())
-    ]
-    title = (
-        f"Gap as the causes are added, root mean square (× noise power), {document.get('waterfall_on', '')}"
-    )
-    return TextTable(title, ("added", "left", "left without it alone"), tuple(rows), _LEFT)
-
-
-_LEFT = ("left", "left without it alone")
+    rows = []
+    for step in steps if len(steps) > 1 else ():
+        alone = misfit_text(document, without[step["effect"]]) if step["effect"] in without else ""
+        rows.append((step["effect"] or "nominal model", misfit_text(document, step["excess"]), alone))
+    title = "Gap as the causes are added, root mean square (× noise power)"
+    heads = ("added", "left", "left without it alone")
+    return TextTable(f"{title}, {document.get('waterfall_on', '')}", heads, tuple(rows), heads[1:])
 
 
 def excess_std(document: Document) -> float | None:
@@ -187,24 +246,12 @@ def excess_std(document: Document) -> float | None:
 
 
 def held_out_excess(value: float) -> str:
-    """An excess of any size.
-
-    Args:
-        value: in noise powers, a ratio.
-
-    Returns:
-        Three decimals where it is small, or four significant digits.
-    """
+    """An excess in noise powers, a ratio: three decimals where it is small, or four significant digits."""
     return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
 
 
 def coefficients_table(document: Document) -> TextTable:
-    """The coefficients of the nominal model before and after the causes are added.
-
-    Returns:
-        A table with one standard deviation, the central 95 % where that is not ± 1.96 of them, and the change;
-        without rows where there are none.
-    """
+    """The coefficients of the nominal model before and after the causes are added, and their changes."""
     rows = []
     before, after = document["coefficients"]["before"], document["coefficients"]["after"]
     for name in before:
@@ -212,34 +259,21 @@ def coefficients_table(document: Document) -> TextTable:
             one, two = before[name], after[name]
             change = 100.0 * (two["value"] - one["value"]) / abs(one["value"]) if one["value"] else 0.0
             known = all(given.get("determined", True) for given in (one, two))
-            row = (
-                coefficient_label(name, one["unit"]),
-                estimated(one),
-                estimated(two),
-                f"{change:+.2g} %" if known else "–",
-            )
-            rows.append(row)
+            moved = f"{change:+.2g} %" if known else "–"
+            rows.append((coefficient_label(name, one["unit"]), estimated(one), estimated(two), moved))
     skewed = any(given.get("interval") for given in after.values())
     title = "Coefficients ± one standard deviation" + " (central 95 %)" * skewed
     return TextTable(title, ("", "before", "after", "change"), tuple(rows), ("change",))
 
 
 def where_line(document: Document) -> str:
-    """Where the gap is, in words.
-
-    Returns:
-        A line; empty where the document has no words on it.
-    """
+    """Where the gap is, in a line; empty where the document has no words on it."""
     words = document["where"]["words"]
     return f"Where: {words}" if words else ""
 
 
 def rival_lines(document: Document) -> list[str]:
-    """Effects that the runs cannot distinguish from the causes, and the run that could.
-
-    Returns:
-        Lines; none where the answer has no rival.
-    """
+    """Effects that the runs cannot distinguish from the causes, and the run that could; none without a rival."""
     decided = document.get("decided", True)
     rivals, run = document["ambiguous_with"] if decided else (), document["next_run"]
     lines = []
@@ -290,23 +324,12 @@ def closing_lines(document: Document) -> list[str]:
 
 
 def noise_powers(excess: float) -> str:
-    """What is left, as the verdict states it.
-
-    Args:
-        excess: in noise powers, a ratio.
-    """
+    """What is left, in noise powers, a ratio, as the verdict states it."""
     return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
 
 
 def share(value: float) -> str:
-    """A share in per cent, never rounded to 0 or 100 %.
-
-    Args:
-        value: share, at most 1.
-
-    Returns:
-        Text such as ``98.2 %`` or ``> 99.9 %``.
-    """
+    """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``."""
     if value > 0.9995:
         return "> 99.9 %" if value < 1.0 else "100 %"
     if 0.0 <= value < 0.0005:

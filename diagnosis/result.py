@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from diagnosis.closure import Closable, Misfit, Remainder, Waterfall
-from diagnosis.decision import Decision, decision
-from diagnosis.patched import PatchedModel
-from diagnosis.printing import diagnosis_brief, diagnosis_parts
+from diagnosis.closure import Closable, Misfit, PatchedModel, Remainder, Waterfall
+from diagnosis.printing import Decision, decision, diagnosis_brief, diagnosis_parts
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text
 from identification.status import Remark
@@ -60,12 +58,13 @@ class ParameterEstimate:
     def to_json_dict(self) -> dict[str, Any]:
         """Value, std, unit; bound, shares and interval where there are any, ``determined`` where it is false."""
         data: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
-        bound = {} if self.bound is None else {"bound": self.bound}
         if self.shares and self.std is not None:
             data["shares"] = dict(self.shares)
         if self.interval is not None and self.std is not None:
             data["interval"] = list(self.interval)
-        return data | bound | ({} if self.determined else {"determined": False})
+        if self.bound is not None:
+            data["bound"] = self.bound
+        return data if self.determined else data | {"determined": False}
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,6 @@ class RunGap:
     """A run's excess before and after the causes are added.
 
     Args:
-        id: of the run.
         before: ratio of mean squared residual to noise variance, minus one, of the nominal model, predicted from
             the other runs where it could be held out.
         after: likewise with the causes added.
@@ -91,17 +89,14 @@ class GapSummary:
     """The gap of the campaign.
 
     Args:
-        detected: whether the gap is beyond chance.
         excess_before: of the nominal model, in units of the noise variance, on readings that are held out of the
             fits; where nothing is found, in the fitted runs.
         excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap closed, 0 to 1.
         closed_on: what these are measured on, in words.
-        runs: by run.
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
-        misfit: what turns an excess into a misfit of the readings.
     """
 
     detected: bool
@@ -131,11 +126,9 @@ class Where:
     Args:
         channel: ``stiffness``, ``damping``, ``forcing``, ``sensor`` or ``calibration``; None: nowhere.
         condition: ``always`` or ``wind_on``; None: nowhere.
-        runs: ids of the runs that show it.
         time_s: where in the runs most of it lies, s.
         amplitude_rad: amplitudes at which most of it lies, rad.
         frequency_hz: frequencies at which most of it lies, Hz.
-        words: the same in a sentence or two.
     """
 
     channel: str | None
@@ -172,7 +165,6 @@ class CauseSize:
     """What a cause does to three cycles of a swing, by the fitted model with it and without it.
 
     Args:
-        effect: its name.
         run: id of the run whose conditions are taken.
         amplitude: of the release, rad.
         damping_ratio: with the cause, dimensionless.
@@ -238,15 +230,8 @@ class Confirmation:
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields, with units in their names."""
-        return {
-            "model": "mujoco",
-            "agrees": self.agrees,
-            "largest_difference_rad": self.largest_difference,
-            "run": self.run,
-            "rms_difference_rad": self.rms_difference,
-            "tolerance_rad": self.tolerance,
-            "failure": self.failure,
-        }
+        names = {name: f"{name}_rad" for name in ("largest_difference", "rms_difference", "tolerance")}
+        return {"model": "mujoco", **{names.get(name, name): value for name, value in vars(self).items()}}
 
 
 @dataclass(frozen=True)
@@ -257,7 +242,6 @@ class NoiseSummary:
         std: of one sample, quantisation included, rad.
         stated_std: likewise as the campaign states it, rad; None where it does not.
         source: ``stated``, ``estimated`` or ``floor``: whose ``std`` is; the floor is the accuracy of the fits.
-        reason: why, in words.
     """
 
     std: float
@@ -271,25 +255,16 @@ class Diagnosis:
     """The whole answer.
 
     Args:
-        campaign: its name.
         causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary closes.
-        verdict: the answer in plain words.
-        gap: how large, before and after.
-        where: where it is.
         candidates: the answers considered, the answer first, ``none`` and ``unknown`` among them.
         ambiguous_with: effects that these runs cannot distinguish from the causes.
         next_run: the run expected to distinguish them; None where not needed.
-        coefficients: before and after.
         confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
-        noise: what the gap is measured against.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
-        cautions: caveats, in sentences.
         maps: data of the figures, in JSON's types.
-        provenance: versions.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
-        waterfall: how far the gap closes with each cause.
         rest: what remains after the causes.
         model: the model given, with the causes written into it; None where none was given.
         closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
@@ -373,10 +348,9 @@ class Diagnosis:
         return draw(self.to_json_dict(), what, runs)
 
     def write_report(self, path: Path | str, *, author: str = "", notes: str = "") -> Path:
-        """Write the report, one HTML page.
+        """Write the report, one HTML page, which replaces an older one.
 
         Args:
-            path: of the page; replaced when it exists.
             author: who made the diagnosis.
             notes: for the head of the page.
 
@@ -393,8 +367,7 @@ class Diagnosis:
     def to_frame(self) -> pl.DataFrame:
         """The answer in one table: a row for each size of the gap, parameter and coefficient.
 
-        Returns:
-            ``part`` (``gap``, a cause, ``before`` or ``after``), ``quantity``, ``value``, ``std``, ``unit``.
+        Its ``part`` is ``gap``, a cause, ``before`` or ``after``.
         """
         gap = self.gap
         rows: list[tuple[str, str, float, float | None, str]] = []
@@ -409,9 +382,8 @@ class Diagnosis:
             rows.append((owner or first.effect, parameter, given.value, given.std, given.unit))
         for part, found in (("before", self.coefficients.before), ("after", self.coefficients.after)):
             rows += [(part, name, given.value, given.std, given.unit) for name, given in found.items()]
-        kinds = {"value": pl.Float64, "std": pl.Float64}
-        names = ("part", "quantity", "value", "std", "unit")
-        return pl.DataFrame(rows, schema={name: kinds.get(name, pl.String) for name in names}, orient="row")
+        kinds = {"part": pl.String, "quantity": pl.String, "value": pl.Float64, "std": pl.Float64}
+        return pl.DataFrame(rows, schema={**kinds, "unit": pl.String}, orient="row")
 
     def to_pandas(self) -> DataFrame:
         """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
@@ -436,15 +408,10 @@ class Diagnosis:
     def coefficients_frame(self) -> pl.DataFrame:
         """A row for each coefficient: its unit, and ``before`` and ``after`` with each ``_std``."""
         before, after = as_json(self.coefficients.before), as_json(self.coefficients.after)
-        rows = [
-            {
-                "quantity": name,
-                "unit": (before.get(name) or after[name])["unit"],
-                "before": before.get(name),
-                "after": after.get(name),
-            }
-            for name in {**before, **after}
-        ]
+        rows = []
+        for name in {**before, **after}:
+            both = {"before": before.get(name), "after": after.get(name)}
+            rows.append({"quantity": name, "unit": (both["before"] or after[name])["unit"], **both})
         return wide_frame(rows, {"quantity": pl.String, "unit": pl.String}, ("before", "after"))
 
     def runs_frame(self) -> pl.DataFrame:

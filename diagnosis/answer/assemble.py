@@ -20,10 +20,10 @@ from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, cnr_note, verdict
 from diagnosis.answer.waterfall import waterfall
 from diagnosis.answer.what_remains import remainder
-from diagnosis.decision import decision
+from diagnosis.closure import PatchedModel
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.patched import PatchedModel
 from diagnosis.policy import INTERVAL_SHARE, RIVAL_PROBABILITY
+from diagnosis.printing import decision
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, ParameterEstimate, Where
 from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, Weighed, main_effect

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from diagnosis.closure import Remainder, of_swing, rms_shown
-from diagnosis.decision import Decision, plain, probability, undecided_words
 from diagnosis.noise.sensor_noise import Noise
 from diagnosis.policy import FEW_RUNS, NOISE_CONTRADICTED
-from diagnosis.printing import share
+from diagnosis.printing import Decision, plain, probability, share, undecided_words
 from diagnosis.result import Confirmation, GapSummary, RunGap
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import significant

@@ -64,14 +64,7 @@ class Colour:
     steep: float
 
     def at(self, frequency: Array) -> Array:
-        """The level at some frequencies, as high below the first band as chance allows.
-
-        Args:
-            frequency: Hz, above zero, any shape.
-
-        Returns:
-            Natural logarithm of the power ratio, of the frequency's shape.
-        """
+        """The level at frequencies above zero, Hz, any shape; below the first band as high as chance allows."""
         return self._extended(frequency, self.steep)
 
     def _extended(self, frequency: Array, slope: float) -> Array:
@@ -80,24 +73,16 @@ class Colour:
         return np.asarray(np.interp(place, places, self.level) + slope * below)
 
     def mean(self, count: int, interval: float) -> float:
-        """The mean power over the frequencies of a record.
+        """The mean power over the frequencies of a record of a number of values.
 
         Args:
-            count: values in the record.
             interval: between them, s.
         """
         frequency = np.asarray(np.fft.rfftfreq(count, interval)[1:], np.float64)
         return float(np.mean(np.exp(self._extended(frequency, self.slope))))
 
     def spread(self, frequency: Array) -> float:
-        """How well the mean power over some frequencies is known.
-
-        Args:
-            frequency: Hz, above zero, shape (n,).
-
-        Returns:
-            Standard deviation of the mean power, a share of it.
-        """
+        """Standard deviation of the mean power over frequencies above zero, Hz, shape (n,), a share of it."""
         place, places = np.log(frequency), np.log(self.frequency)
         nearest = np.argmin(np.abs(place[:, None] - places), axis=1)
         share = np.bincount(nearest, minlength=places.size) / place.size
@@ -117,7 +102,14 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
         The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
         parts of the records, of which there must be four.
     """
-    parts = [part for i in range(len(nominal.residuals)) for part in _parts(nominal, i)]
+    parts = []
+    wanted = max(2, -(-_PARTS // len(nominal.residuals)))
+    for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
+        own, values = resonance(nominal, index), run.unscaled(residual)
+        pieces = min(wanted, int(run.reading.size * run.interval * own / _CYCLES))
+        length = values.size // max(pieces, 1)
+        for piece in (slice(i * length, (i + 1) * length) for i in range(pieces)):
+            parts.append(_part(values[piece], run.reading[piece] - values[piece], run, own))
     sizes = [part.motion for part in parts]
     if len(sizes) < _FEWEST_PARTS or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
         return None
@@ -128,7 +120,8 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     highest = 0.5 / max(run.interval for run in nominal.problem.data.runs)
     if highest < 2.0 * lowest:
         return None
-    edges = _band_edges(lowest, highest)
+    # of equal ratio, an octave or more apart
+    edges = np.geomspace(lowest, highest, round(_OCTAVE_PARTS * np.log2(highest / lowest)) + 1)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
     steady = _steady(power, count)
@@ -137,29 +130,20 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
     std = np.sqrt(1.0 / total[steady])
-    if _flat(level, std):
+    weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
+    departure = float(weight @ (level - float(weight @ level / weight.sum())) ** 2)
+    if departure < float(chdtri(level.size - 1, COLOUR_FALSE_ALARM_RATE)):  # one constant within chance
         return None
     centres = np.sqrt(edges[1:] * edges[:-1])[steady]
-    slope, slope_std = _slope(np.log(centres), level, std)
+    lowest_bands = slice(0, _SLOPE_BANDS)
+    place, weight = np.log(centres)[lowest_bands], 1.0 / std[lowest_bands] ** 2
+    centred = place - float(weight @ place / weight.sum())
+    information = float(weight @ centred**2)
+    slope = float((weight * centred) @ level[lowest_bands]) / information
+    slope_std = float(np.sqrt(1.0 / information))
     # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
     steep = slope - CHANCE_STDS * slope_std if steady[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
-
-
-def between_harmonics(fit: Fit, index: int) -> tuple[Array, Array]:
-    """The periodogram of a run's residuals between the harmonics of its motion.
-
-    Args:
-        fit: its residuals are scaled as white.
-        index: of the run.
-
-    Returns:
-        Frequency (Hz) and power (in units of white noise), shape (n,) each.
-    """
-    run = fit.problem.data.runs[index]
-    values = run.unscaled(fit.residuals[index])
-    whole = _part(values, run.reading - values, run, resonance(fit, index))
-    return whole.frequency[whole.between], whole.power[whole.between]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,21 +164,6 @@ class _Part:
         return power / np.maximum(count, 1), count / HANN
 
 
-def _parts(fit: Fit, index: int) -> list[_Part]:
-    """The parts of one run; none where it is shorter than one part."""
-    run, own = fit.problem.data.runs[index], resonance(fit, index)
-    cycles = run.reading.size * run.interval * own
-    wanted = max(2, -(-_PARTS // len(fit.residuals)))
-    count = min(wanted, int(cycles / _CYCLES))
-    values = run.unscaled(fit.residuals[index])
-    return [_part(values[p], run.reading[p] - values[p], run, own) for p in _pieces(values.size, count)]
-
-
-def _pieces(size: int, count: int) -> list[slice]:
-    length = size // max(count, 1)
-    return [slice(i * length, (i + 1) * length) for i in range(count)]
-
-
 def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
     window = np.hanning(values.size)
     scale = run.noise_variance * float(window @ window)
@@ -206,11 +175,6 @@ def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
     beside &= frequency * values.size * run.interval > _LOWEST
     beside[-1] = False  # the ordinate at half the sampling rate has one degree of freedom
     return _Part(np.asarray(frequency), np.asarray(power), beside, float(np.std(motion)))
-
-
-def _band_edges(low: float, high: float) -> Array:
-    """Edges of equal ratio, Hz, an octave or more apart."""
-    return np.geomspace(low, high, round(_OCTAVE_PARTS * np.log2(high / low)) + 1)
 
 
 def _steady(power: Array, count: Array) -> np.ndarray:
@@ -229,72 +193,40 @@ def _steady(power: Array, count: Array) -> np.ndarray:
     return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
 
 
-def _flat(level: Array, std: Array) -> bool:
-    """Whether the levels are one constant within the tolerance and chance."""
-    weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
-    mean = float(weight @ level / weight.sum())
-    return float(weight @ (level - mean) ** 2) < float(chdtri(level.size - 1, COLOUR_FALSE_ALARM_RATE))
-
-
-def _slope(place: Array, level: Array, std: Array) -> tuple[float, float]:
-    """Slope of the lowest bands, and its standard deviation."""
-    use = slice(0, _SLOPE_BANDS)
-    weight = 1.0 / std[use] ** 2
-    centred = place[use] - float(weight @ place[use] / weight.sum())
-    power = float(weight @ centred**2)
-    return float((weight * centred) @ level[use]) / power, float(np.sqrt(1.0 / power))
-
-
 def _red(slope: float) -> float:
     """A slope between that of white noise and that of a random walk."""
     return float(np.clip(slope, -2.0, 0.0))
 
 
 def whitened(data: Data, colour: Colour) -> Data:
-    """The data with a filter that makes noise of a colour white.
-
-    Args:
-        data: prepared for white noise.
-        colour: of its noise.
-
-    Returns:
-        The runs with the filter and the variance of the innovations.
-    """
-    longest = max(run.reading.size for run in data.runs)
-    total = sum(run.reading.size for run in data.runs)
-    filters = {run.interval: _filter(colour, run.interval, longest, total) for run in data.runs}
-    return data.with_runs(
-        tuple(
-            replace(
-                run,
-                whitening=filters[run.interval][0],
-                noise_variance=run.noise_variance * filters[run.interval][1],
-            )
-            for run in data.runs
-        )
-    )
-
-
-def _filter(colour: Colour, interval: float, longest: int, total: int) -> tuple[Array, float]:
-    """Whitening filter at an interval (s), and the variance of the innovations over that of the white noise.
+    """The data, prepared for white noise, with a filter that makes noise of a colour white.
 
     The Levinson recursion (S. M. Kay, Modern Spectral Estimation, 1988, sect. 6.3) stops at the order beyond which
     all records together hold less than one nat of evidence for another; the gain of all further orders is known
-    from the spectrum (Kolmogorov).
+    from the spectrum (Kolmogorov). The runs have the variance of the innovations.
     """
+    longest = max(run.reading.size for run in data.runs)
+    total = sum(run.reading.size for run in data.runs)
     size = 2 ** int(np.ceil(np.log2(8 * longest)))
-    frequency = np.maximum(np.arange(size // 2 + 1) / size, 0.25 / longest) / interval
-    spectrum = colour.at(frequency)
-    covariance = np.fft.irfft(np.exp(spectrum), size)
-    least = np.exp(np.mean(np.concatenate([spectrum, spectrum[-2:0:-1]])))
-    whitening, variance = np.ones(1), float(covariance[0])
-    while whitening.size <= _LONGEST and 0.5 * total * np.log(variance / least) > 1.0:
-        order = whitening.size
-        reflection = -float(whitening @ covariance[order:0:-1]) / variance
-        grown = np.append(whitening, 0.0)
-        whitening = grown + reflection * grown[::-1]
-        variance *= 1.0 - reflection**2
-    return whitening, variance
+    filters: dict[float, tuple[Array, float]] = {}
+    for interval in {run.interval for run in data.runs}:
+        frequency = np.maximum(np.arange(size // 2 + 1) / size, 0.25 / longest) / interval
+        spectrum = colour.at(frequency)
+        covariance = np.fft.irfft(np.exp(spectrum), size)
+        least = np.exp(np.mean(np.concatenate([spectrum, spectrum[-2:0:-1]])))
+        whitening, variance = np.ones(1), float(covariance[0])
+        while whitening.size <= _LONGEST and 0.5 * total * np.log(variance / least) > 1.0:
+            order = whitening.size
+            reflection = -float(whitening @ covariance[order:0:-1]) / variance
+            grown = np.append(whitening, 0.0)
+            whitening = grown + reflection * grown[::-1]
+            variance *= 1.0 - reflection**2
+        filters[interval] = whitening, variance
+    runs = []
+    for run in data.runs:
+        whitening, variance = filters[run.interval]
+        runs.append(replace(run, whitening=whitening, noise_variance=run.noise_variance * variance))
+    return data.with_runs(tuple(runs))
 
 
 _LOWEST_CORNER = 1e-3  # of the colour's lowest frequency: as good as none
@@ -305,16 +237,16 @@ _WHITE = 30.0  # the level's natural logarithm stays within this of that of whit
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    Args:
-        nominal: the fit whose residuals have the colour, scaled as white.
-        colour: of its noise; its lowest band is the lowest corner of stationary noise that counts as seen.
-
-    Returns:
-        The verdict of a likelihood ratio at `COLOUR_FALSE_ALARM_RATE`. The spectrum is that of white noise and a
-        first-order process, which is a random walk where its corner is zero. It is fitted to the ordinates between
-        the harmonics by Whittle's likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
+    This is decided by a likelihood ratio at `COLOUR_FALSE_ALARM_RATE`. The spectrum is that of white noise and a
+    first-order process, which is a random walk where its corner is zero; the colour's lowest band is the lowest
+    corner of stationary noise that counts as seen. It is fitted to the ordinates between the harmonics by Whittle's
+    likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
     """
-    spectra = [between_harmonics(nominal, index) for index in range(len(nominal.residuals))]
+    spectra = []
+    for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
+        values = run.unscaled(residual)
+        whole = _part(values, run.reading - values, run, resonance(nominal, index))
+        spectra.append((whole.frequency[whole.between], whole.power[whole.between]))
     frequency, power = (np.concatenate(column) for column in zip(*spectra, strict=True))
     relative = frequency / colour.frequency[0]
     seen = _least_loss(relative, power, 1.0)
@@ -323,13 +255,7 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
 
 
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:
-    """Least negative log-likelihood, nats, with the corner at or above a frequency.
-
-    Args:
-        frequency: over the colour's lowest, shape (n,).
-        power: in units of white noise, shape (n,).
-        lowest: corner, in the same unit.
-    """
+    """Least negative log-likelihood, nats, with the corner at or above a frequency over the colour's lowest."""
 
     def loss(place: Array) -> tuple[float, Array]:
         white, slow, corner = np.exp(place)

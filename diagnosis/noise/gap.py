@@ -38,56 +38,36 @@ _HANN = 1.57  # correlated bins of the windowed periodogram that carry the infor
 
 
 def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, float]:
-    """Probability that white noise behaves like that of the campaign.
+    """Probability that white noise behaves like that of the campaign, by name of the test.
 
-    Args:
-        trend: of the campaign.
-
-    Returns:
-        P-values by name, from Student's t of the campaign among repetitions of it simulated with white noise
-        and the readings' lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993);
-        where the lattice hides the noise, the largest over several possible levels. All 1 where the sampling is
-        too slow for the test.
+    It is from Student's t of the campaign among repetitions of it simulated with white noise and the readings'
+    lattice (a prediction interval for one more; Geisser, Predictive Inference, 1993); where the lattice hides the
+    noise, the largest over several possible levels. All are 1 where the sampling is too slow for the test.
     """
     if not trend.judged:
         return dict.fromkeys(_NAMES, 1.0)
     white = noise.white(trend.step)
     factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
     found = np.zeros(3)
     for factor in factors:
         level = {run: factor * std for run, std in white.items()}
-        found = np.maximum(found, _p_values(trend, _repetitions(fit, level, trend.step)))
+        repetitions = repeated(fit, level, trend.step, count)
+        seen = trend_statistics((reading, run.sample_times) for run, _, reading in repetitions)
+        assert seen is not None  # the campaign was judged
+        mean, scatter = seen.mean(axis=0), np.maximum(seen.std(axis=0, ddof=1), 1e-9)
+        score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
+        two_sided = 2.0 * stdtr(count - 1, -np.abs(score[:2]))
+        found = np.maximum(found, np.append(two_sided, stdtr(count - 1, -score[2])))
     return dict(zip(_NAMES, found.tolist(), strict=True))
-
-
-def _p_values(trend: NoiseTrend, chance: Array) -> Array:
-    count = len(chance)
-    mean, scatter = chance.mean(axis=0), np.maximum(chance.std(axis=0, ddof=1), 1e-9)
-    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
-    score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
-    two_sided = 2.0 * stdtr(count - 1, -np.abs(score[:2]))
-    return np.append(two_sided, stdtr(count - 1, -score[2]))
-
-
-def _repetitions(fit: Fit, white: Mapping[str, float], step: float) -> Array:
-    """Statistics of the campaign repeated, shape (repetitions, 3)."""
-    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
-    readings = ((reading, run.sample_times) for run, _, reading in repeated(fit, white, step, count))
-    found = trend_statistics(readings)
-    assert found is not None  # the campaign was judged
-    return found
 
 
 def level_p_value(fit: Fit, noise: Noise) -> float:
     """Probability that noise as stated, allowing for its rounding, is estimated as high as it is.
 
-    Args:
-        fit: gives the records' lengths.
-        noise: of the campaign; its stated variance is not None.
-
-    Returns:
-        The p-value of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
-        median found, at the largest noise that the statement allows.
+    It is that of a sign test: that at least half the ordinates of the periodogram above the motion exceed the
+    median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
     level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
@@ -107,7 +87,6 @@ class GapTest:
     """The tests of a gap.
 
     Args:
-        detected: whether any of them rejects the absence of a gap.
         p_value: the smallest p-value, times the number of tests (at most 1).
         tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
@@ -133,8 +112,6 @@ def gap_test(
     """Test whether a fit's residuals and the noise are consistent with white noise.
 
     Args:
-        fit: usually of the nominal model.
-        trend: of the noise with the motion.
         coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
             noise are then not tested.
         errors: what noise and rounding leave in the block means, by run, repetitions of it, shape (repetitions,
@@ -143,7 +120,19 @@ def gap_test(
     Returns:
         The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
-    level, scatter = (np.ones(6), np.zeros(6)) if errors is None else _under_rounding(fit, errors)
+    level, scatter = np.ones(6), np.zeros(6)
+    if errors is not None:
+        # statistics under noise and rounding, and their scatter beyond that of white noise, as shares of what white
+        # noise of the fit's variance gives: the bands, then the offset
+        found, count = [], np.ones(len(BANDS) + 1)
+        for number in range(len(errors[0])):
+            residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
+            bands = _by_band(fit, residuals)
+            count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
+            found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
+        level = np.mean(found, axis=0)
+        beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
+        level, scatter = np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
     floor = (1.0 + FLOOR_TOLERANCE) * noise.margin * level
     tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
     tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
@@ -175,7 +164,6 @@ def gap_or_colour(
 
     Args:
         nominal: fit of the nominal model to runs prepared for white noise.
-        trend: of the noise with the motion.
         step: of the lattice of the readings, rad; 0 where there is none.
         coarse_step: as `gap_test` takes it.
 
@@ -252,17 +240,10 @@ def _known(_frequency: Array) -> float:
 
 
 def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatter: float = 0.0) -> float:
-    """Probability that white noise alone moves the runs' means as far from the common zero.
+    """Probability that white noise alone moves the runs' means so far from the common zero.
 
-    Args:
-        fit: its residuals, in noise standard deviations.
-        floor: power assumed for white noise, a factor on the noise variance.
-        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
-        scatter: standard deviation of the floor, a share of it.
-
-    Returns:
-        The p-value; the zero takes one degree of freedom. 1 where the runs have zeros of their own
-        or nothing holds the body.
+    It takes arguments as in `band_p_values`, and is 1 where the runs have zeros of their own or nothing holds the
+    body.
     """
     if fit.problem.data.own_zeros or fit.problem.data.unrestrained:
         return 1.0
@@ -279,16 +260,12 @@ def _offsets(residuals: Sequence[Array]) -> float:
 def band_p_values(
     fit: Fit, floor: float | Array = 1.0, spread: Spread = _known, scatter: float | Array = 0.0
 ) -> tuple[float, ...]:
-    """Probability that white noise alone gives as much power in each band, summed over the runs.
+    """Probability that white noise alone gives as much power in each band, summed over the runs, by `BANDS`.
 
     Args:
-        fit: its residuals, in noise standard deviations.
         floor: power assumed for white noise, a factor on the noise variance; one for all bands, or shape (bands,).
         spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
         scatter: standard deviation of the floor, a share of it, of its shape.
-
-    Returns:
-        One p-value per band of `BANDS`; the bands are multiples of each run's own frequency.
     """
     values = []
     each = np.broadcast_to(floor, len(BANDS)), np.broadcast_to(scatter, len(BANDS))
@@ -313,22 +290,6 @@ def _by_band(fit: Fit, residuals: Sequence[Array]) -> list[tuple[Array, Array]]:
     where, power, place = (np.concatenate(column) for column in (bands, powers, frequencies))
     # each ordinate is half a χ² of two degrees of freedom
     return [(power[where == index], place[where == index]) for index in range(len(BANDS))]
-
-
-def _under_rounding(fit: Fit, errors: Sequence[Array]) -> tuple[Array, Array]:
-    """Level of the tests' statistics under noise and rounding, and its scatter beyond that of white noise.
-
-    Both are shares of what white noise of the fit's variance gives, shape (tests,): the bands, then the offset.
-    """
-    found, count = [], np.ones(len(BANDS) + 1)
-    for number in range(len(errors[0])):
-        residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
-        bands = _by_band(fit, residuals)
-        count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
-        found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
-    level = np.mean(found, axis=0)
-    beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
-    return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
 
 
 def noise_remarks(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Remark, ...]:

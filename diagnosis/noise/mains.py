@@ -13,7 +13,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
 from diagnosis.likelihood.residuals import mains_line, smooth_spectra
-from diagnosis.noise.scattered_and_driven import beside_the_motion
+from diagnosis.noise.sensor_noise import SmoothCurve
 from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, HUM_RUNS, SWELL_FALSE_ALARM_RATE
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
@@ -21,6 +21,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 _HARMONICS = 5
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
+_KNOTS = 12.0  # per cycle of the motion: a curve follows what is slower than six times the motion
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Hum:
     Args:
         frequency: Hz.
         amplitude: of the fundamental, rad, root mean square over the runs.
-        std: its standard deviation, rad.
+        std: of the amplitude, rad.
         frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
         excess: what it adds to the mean squared residual over the noise variance, a ratio.
     """
@@ -43,14 +44,10 @@ class Hum:
 
 
 def find_hum(nominal: Fit) -> float | None:
-    """The hum in the residuals of the nominal fit.
+    """The frequency of a hum in the residuals of the nominal fit, Hz; None where there is none beyond chance.
 
-    Args:
-        nominal: its residuals.
-
-    Returns:
-        Its frequency, Hz; None where there is none beyond chance. A ringing rod and the harmonics of a motion with
-        corners also raise the spectrum beside the line, and are therefore rejected.
+    A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
+    therefore rejected.
     """
     line = mains_line(nominal)
     if line is None or line.contrast < HUM_CONTRAST:
@@ -60,19 +57,23 @@ def find_hum(nominal: Fit) -> float | None:
 
 
 def refine_frequency(campaign: Campaign, frequency: float) -> float:
-    """The frequency of the mains, to a small fraction of a spectral bin.
+    """The frequency at which a sine and its harmonics remove most power from all records, Hz.
 
     Args:
-        frequency: Hz, to within 0.02 Hz.
-
-    Returns:
-        The frequency at which a sine and its harmonics remove most power from all records, Hz.
+        frequency: of the mains, Hz, to within 0.02 Hz.
     """
-    cleared = [_without_motion(run.record, np.hanning(run.record.time_s.size)) for run in campaign.runs]
+    cleared = [_without_motion(run.record, np.hanning(run.record.time_s.size))[1] for run in campaign.runs]
 
     def left(trial: float) -> float:
-        runs = zip(campaign.runs, cleared, strict=True)
-        return -float(sum(_line_power(run.record, reading, trial) for run, (_, reading) in runs))
+        total = 0.0
+        for run, reading in zip(campaign.runs, cleared, strict=True):
+            wave = np.exp(-2j * np.pi * trial * (run.record.time_s - run.record.time_s[0]))
+            turn, power = wave, 0.0
+            for _ in _harmonics(run.record, trial):
+                power += float(abs(reading @ turn) ** 2)
+                turn = turn * wave
+            total += power
+        return -total
 
     found = minimize_scalar(
         left, bounds=(frequency - 0.02, frequency + 0.02), method="bounded", options={"xatol": 1e-4}
@@ -88,76 +89,53 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
         variance: of the noise of one sample, rad².
 
     Returns:
-        The campaign without it, and the hum that was removed.
+        The campaign without it, and the hum that was removed. The standard deviation of its frequency is that of
+        the peak of all records' windowed spectra under white noise, of the fundamental only. Of one record of
+        window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that is the bound
+        24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi 10.1109/TIT.1974.1055282).
     """
+    from scipy.signal.windows import tukey  # only here: slow to load
+
     cleaned, squares, powers = [], [], []
+    curvature, scatter = 0.0, 0.0
     swells = _swells([run.record for run in campaign.runs], frequency, variance)
     for run in campaign.runs:
-        record, amplitude, power = _remove(run.record, frequency, swells)
-        cleaned.append(dataclasses.replace(run, record=record))
-        squares.append(amplitude**2)
-        powers.append(power)
+        record = run.record
+        flat = np.hanning(record.time_s.size)
+        design = np.column_stack(
+            [_lines(record, frequency), *([_swell(record, frequency)] if swells else [])]
+        )
+        # a window that keeps the ends, where a swelling hum may be strongest
+        clear, reading = _without_motion(record, tukey(record.time_s.size, 0.3) if swells else flat)
+        coefficients = np.linalg.lstsq(clear(design), reading, rcond=None)[0]
+        wave: Array = design @ coefficients
+        cleaned.append(dataclasses.replace(run, record=Record(record.time_s, record.yaw_rad - wave)))
+        squares.append(float(np.hypot(coefficients[0], coefficients[1])) ** 2)
+        powers.append(float(np.mean(wave**2)))
+        time = record.time_s - record.time_s.mean()
+        curvature += float(flat.sum() * (flat @ time**2))
+        scatter += float(flat.sum() ** 2 * (flat**2 @ time**2))
     count = sum(run.record.yaw_rad.size for run in campaign.runs) / len(campaign.runs)
     noise = 4.0 * variance / count  # of a squared amplitude
     amplitude = float(np.sqrt(max(sum(squares) / len(squares) - noise, 0.0)))
     std = float(np.sqrt(2.0 * variance / (count * len(squares))))
-    frequency_std = _frequency_std([run.record for run in campaign.runs], amplitude, variance)
+    frequency_std = None
+    if amplitude > 0.0:
+        frequency_std = float(np.sqrt(2.0 * variance * scatter) / (amplitude * curvature * 2.0 * np.pi))
     hum = Hum(frequency, amplitude, std, frequency_std, float(np.mean(powers)) / variance)
     return dataclasses.replace(campaign, runs=tuple(cleaned)), hum
 
 
-def _frequency_std(records: list[Record], amplitude: float, variance: float) -> float | None:
-    """Standard deviation of the peak of all records' windowed spectra under white noise, Hz; fundamental only.
-
-    Of one record of window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that
-    is the bound 24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591,
-    doi 10.1109/TIT.1974.1055282).
-    """
-    if not amplitude > 0.0:
-        return None
-    curvature, scatter = 0.0, 0.0
-    for record in records:
-        time = record.time_s - record.time_s.mean()
-        window = np.hanning(time.size)
-        curvature += float(window.sum() * (window @ time**2))
-        scatter += float(window.sum() ** 2 * (window**2 @ time**2))
-    return float(np.sqrt(2.0 * variance * scatter) / (amplitude * curvature * 2.0 * np.pi))
-
-
-def _line_power(record: Record, values: Array, frequency: float) -> float:
-    """Squared amplitudes of the reading without motion at a frequency and its harmonics, summed."""
-    time = record.time_s - record.time_s[0]
-    wave = np.exp(-2j * np.pi * frequency * time)
-    turn, total = wave, 0.0
-    for k in range(1, _HARMONICS + 1):
-        if k * frequency < 0.48 * record.sample_rate:
-            total += float(abs(values @ turn) ** 2)
-        turn = turn * wave
-    return total
-
-
-def _remove(record: Record, frequency: float, swells: bool) -> tuple[Record, float, float]:
-    """A record without the line and its harmonics, the fundamental's amplitude and the mean square removed."""
-    from scipy.signal.windows import tukey  # only here: slow to load
-
-    design = np.column_stack([_lines(record, frequency), *([_swell(record, frequency)] if swells else [])])
-    # a window that keeps the ends, where a swelling hum may be strongest
-    window = tukey(record.time_s.size, 0.3) if swells else np.hanning(record.time_s.size)
-    coefficients = _windowed_fit(record, design, window)
-    wave: Array = design @ coefficients
-    amplitude = float(np.hypot(coefficients[0], coefficients[1]))
-    return Record(record.time_s, record.yaw_rad - wave), amplitude, float(np.mean(wave**2))
+def _harmonics(record: Record, frequency: float) -> list[int]:
+    """The multiples of a frequency that a record resolves."""
+    return [k for k in range(1, _HARMONICS + 1) if k * frequency < 0.48 * record.sample_rate]
 
 
 def _lines(record: Record, frequency: float) -> Array:
     """Sine and cosine of the fundamental, then of its harmonics, shape (n, 2 harmonics)."""
     time = record.time_s - record.time_s[0]
-    columns = []
-    for k in range(1, _HARMONICS + 1):
-        if k * frequency < 0.48 * record.sample_rate:
-            phase = 2.0 * np.pi * k * frequency * time
-            columns += [np.sin(phase), np.cos(phase)]
-    return np.stack(columns, axis=1)
+    phases = [2.0 * np.pi * k * frequency * time for k in _harmonics(record, frequency)]
+    return np.stack([wave(phase) for phase in phases for wave in (np.sin, np.cos)], axis=1)
 
 
 def _swell(record: Record, frequency: float) -> Array:
@@ -187,12 +165,6 @@ def _swells(records: list[Record], frequency: float, variance: float) -> bool:
     return count > 0 and power > float(chdtri(count, SWELL_FALSE_ALARM_RATE))
 
 
-def _windowed_fit(record: Record, design: Array, window: Array) -> Array:
-    """Coefficients of the columns."""
-    clear, reading = _without_motion(record, window)
-    return np.asarray(np.linalg.lstsq(clear(design), reading, rcond=None)[0])
-
-
 def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Array], Array]:
     """What takes the slow motion out of columns of samples, and the windowed reading without it.
 
@@ -200,12 +172,8 @@ def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Ar
     frequencies, so that a curve takes it out first.
     """
     if record.uniform:
-        return lambda columns: columns * window[:, None], _detrended(record.yaw_rad) * window
-    curve = beside_the_motion(record, motion_frequency(record))
+        level = np.linspace(record.yaw_rad[0], record.yaw_rad[-1], record.yaw_rad.size)
+        return lambda columns: columns * window[:, None], (record.yaw_rad - level) * window
+    piece = max(2, round(record.sample_rate / (_KNOTS * motion_frequency(record))))
+    curve = SmoothCurve(record.time_s, piece)
     return lambda columns: curve.left(columns) * window[:, None], curve.left(record.yaw_rad) * window
-
-
-def _detrended(values: Array) -> Array:
-    line = np.linspace(values[0], values[-1], values.size)
-    result: Array = values - line
-    return result

@@ -24,11 +24,6 @@ _BLURS = 0.5
 _REPETITIONS, _FEWEST, _SAMPLES = 16, 4, 2.5e6
 
 
-def seeded(fit: Fit) -> np.random.Generator:
-    """A generator seeded by the readings, so that one campaign is always compared with the same repetitions."""
-    return np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in fit.problem.data.runs])
-
-
 def samples(fit: Fit) -> int:
     """Number of samples in all runs of a fit."""
     return sum(run.reading.size * run.block for run in fit.problem.data.runs)
@@ -49,41 +44,27 @@ def repeated(
     Yields:
         Every run with the samples of its motion, shape (n,), and of the readings, shape (count, n), rad.
     """
-    rng = seeded(fit)
+    # seeded by the readings, so that one campaign is always compared with the same repetitions
+    rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in fit.problem.data.runs])
     for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
-        motion = _motion(run.reading - run.unscaled(residual), run)
+        motion = run.reading - run.unscaled(residual)
+        if run.block > 1 or run.samples is not None:  # samples from block means
+            seen = slice(None) if run.samples is None else run.samples.count > 0
+            motion = np.asarray(CubicSpline(run.times[seen], motion[seen])(run.sample_times), np.float64)
         reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
-        if step > 0.0:
-            shift = step * rng.uniform(size=(count, 1)) if levels is None else 0.0
+        if step > 0.0 and levels is None:
+            shift = step * rng.uniform(size=(count, 1))
             # back to the angle: the origin belongs to the lattice, not to the motion
-            reading = _rounded(reading + shift, step, levels) - shift
+            reading = step * np.round((reading + shift) / step) - shift
+        elif step > 0.0 and levels is not None:
+            reading = levels[np.searchsorted(0.5 * (levels[1:] + levels[:-1]), reading)]
         yield run, motion, reading
-
-
-def _rounded(values: Array, step: float, levels: Array | None) -> Array:
-    if levels is None:
-        return np.asarray(step * np.round(values / step), np.float64)
-    return np.asarray(levels[np.searchsorted(0.5 * (levels[1:] + levels[:-1]), values)], np.float64)
-
-
-def _motion(blocks: Array, run: RunData) -> Array:
-    """Samples of a motion from its block means."""
-    if run.block == 1 and run.samples is None:
-        return blocks
-    seen = slice(None) if run.samples is None else run.samples.count > 0
-    return np.asarray(CubicSpline(run.times[seen], blocks[seen])(run.sample_times), np.float64)
 
 
 def rounding_errors(
     fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None
 ) -> list[Array] | None:
-    """What noise and rounding alone leave in the block means.
-
-    Args:
-        fit: gives the motion.
-        white: standard deviation of a sample's noise before rounding, rad, by run id.
-        step: of the lattice, rad.
-        levels: as `repeated` takes them.
+    """What noise and rounding alone leave in the block means, arguments as in `repeated`.
 
     Returns:
         By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
@@ -96,15 +77,10 @@ def rounding_errors(
 
 
 def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
-    """The data with noise of block means that is not below the errors of rounding.
+    """Data prepared for white noise, with noise of block means that is not below errors of `rounding_errors`.
 
-    Args:
-        data: prepared for white noise.
-        errors: from `rounding_errors`.
-
-    Returns:
-        The runs, their noise variance raised where averaging does not reduce the errors as it reduces white noise;
-        at most to that of one sample. None where none is raised.
+    It is raised where averaging does not reduce the errors as it reduces white noise, at most to that of one
+    sample. None where none is raised.
     """
     raised = [
         float(np.clip(np.mean(error**2), run.noise_variance, run.noise_variance * run.block))

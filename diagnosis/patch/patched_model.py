@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,21 +12,162 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.answer.held_out import FOLDS, HeldOut, fit_seen, predict_held_out, predict_stretches, turns_of
+from diagnosis.closure import NativeClosure, PatchedModel
 from diagnosis.diagnosable import reach
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.problem import Problem, blocks_beyond, sample_means
-from diagnosis.patch.joint_law import FoundLaw, found_law, start_of
-from diagnosis.patched import NativeClosure, PatchedModel
+from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
 from diagnosis.search.investigate import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
-from tunnel_sim.physics.run_settings import Motion
+from tunnel_sim.physics.expression import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS, parse
+from tunnel_sim.physics.moment_law import operation_names
+from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-Simulate = Callable[[Array, Array, Start, float], Motion]
-"""From common parameters, the run's own, its start and a duration (s) to a motion in the measured rig's units."""
+_FAITHFUL = 0.02  # of a moment's greatest value: what a polynomial may miss of it
+_GRID = 201
+_NAMES = frozenset(
+    {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
+)
+
+
+@dataclass(frozen=True)
+class FoundLaw:
+    """The law found for a joint, in the units of the model given.
+
+    Args:
+        patch: what is written into the model: native elements, and the rest as a program.
+        notes: where the native element is not the same law, and what is left out, in sentences.
+    """
+
+    patch: JointPatch
+    notes: tuple[str, ...]
+
+
+def found_law(problem: Problem, common: Array, release: Array, noise: float, index: int = 0) -> FoundLaw:
+    """The law of a fit, in the units of the measured campaign.
+
+    Args:
+        common: its common parameters, shape (common,).
+        release: of a run, shape (own,).
+        noise: of the sensor, rad; 0: not written.
+        index: of that run, with the wind off.
+    """
+    data = problem.data
+    law, own = data.law, data.similarity.own
+    assert law is not None
+    chain = problem.chain(common, release, data.runs[index])
+    physics = condensed(chain.physics(), data)
+    reach = max(float(np.max(np.abs(run.reading))) for run in data.runs)
+    b = np.linspace(-reach, reach, _GRID)
+    rate = reach * np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
+    r = np.linspace(-rate, rate, _GRID)
+    notes: list[str] = []
+    loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
+        physics.spring_stiffness * physics.yaw_inertia
+    )
+    spring = np.array([0.0, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
+    damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
+    # the part of the program that effects added to the model's own
+    program = physics.program[len(data.program) :]
+    if data.program and program:
+        program = (_number("number"), 0.0, *program)
+    known = {"Kr": physics.spring_stiffness, **physics.parameters}
+    for terms, name, grid, forms, native in (
+        (OF_ANGLE, "b", b, (b**0, b, b**2, b**3), spring),
+        (OF_RATE, "r", r, (r, np.abs(r) * r, r**3), damping),
+    ):
+        for coefficient, words, text in terms:
+            if physics.parameters.get(coefficient, 0.0) == 0.0:
+                continue
+            formula = parse(text, _NAMES)
+            values = {
+                constant: known.get(constant, 0.0) or TEXTBOOK_POWERS.get(constant, 0.0)
+                for constant in formula.names - {"b", "r"}
+            }
+            wanted = -formula.value({**values, name: grid})
+            columns, greatest = np.array(forms).T, np.max(np.abs(wanted))
+            sizes = np.max(np.abs(columns), axis=0)
+            found = np.linalg.lstsq(columns / sizes, wanted, rcond=1e-12)[0]
+            found[np.abs(found) < 1e-9 * greatest] = 0.0
+            found /= sizes
+            missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
+            if missed < _FAITHFUL and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
+                native += found
+                if missed >= 1e-6:
+                    notes.append(
+                        f"The {words} is written as a polynomial of third order, which misses "
+                        f"{100.0 * missed:.2g} % of its greatest moment within the records."
+                    )
+            else:
+                added = formula.program(values, {"b": "angle", "r": "rate"})
+                program = (*program, *added, _number("add")) if program else added
+                notes.append(f"The {words} has no native element; the plugin vwt.yaw_moment adds it.")
+    units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
+    k0, k1, k2, k3 = (own(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
+    c0, c1, c2 = (own(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
+    patch = JointPatch(
+        inertia=own(physics.yaw_inertia, "kg m2"),
+        spring=(k0, k1, k2, k3),
+        damping=(c0, c1, c2),
+        friction=own(physics.parameters.get("friction_moment", 0.0), "N m"),
+        program=_own_program(program, law.rest + data.similarity.rest, own) if program else (),
+        noise=noise,
+    )
+    return FoundLaw(patch, (*notes, *_unwritten(physics, problem)))
+
+
+def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
+    """What the patched model does otherwise than the law found, or leaves out."""
+    notes = []
+    if physics.parameters.get("friction_moment"):
+        notes.append(
+            "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint creeps. Its "
+            "time constant is set to two steps, the shortest allowed."
+        )
+    if physics.parameters.get("presliding"):
+        notes.append("The presliding of the friction has no native element and is left out.")
+    if physics.rod_twist is not None:
+        notes.append("The twist of the rod is left out: it needs a body and a joint of its own.")
+    if problem.data.wind_on:
+        notes.append("The air's moment is left out: the patched model is that of the runs with the wind off.")
+    sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
+    if sensors:
+        named = ", ".join(name.replace("_", " ") for name in sensors)
+        notes.append(
+            f"Of the sensor, and not part of the model: {named}; the comparison applies it to the reading."
+        )
+    return notes
+
+
+def _number(operation: str) -> float:
+    return float(operation_names().index(operation))
+
+
+def _own_program(
+    program: tuple[float, ...], rest: float, own: Callable[[float, str], float]
+) -> tuple[float, ...]:
+    """A program of the similar campaign as one of the model's joint: its position, rate, time and moment."""
+    value = _number("number")
+    replaced = {
+        _number("angle"): (value, rest, _number("subtract")),
+        _number("rate"): (value, 1.0 / own(1.0, "rad/s"), _number("multiply")),
+        _number("time"): (value, 1.0 / own(1.0, "s"), _number("multiply")),
+    }
+    code: list[float] = []
+    elements = iter(program)
+    for element in elements:
+        code.append(element)
+        if element == value:
+            code.append(next(elements))
+        code += replaced.get(element, ())
+    return (*code, value, own(1.0, "N m"), _number("multiply"))
+
+
+Simulate = Callable[[Array, Start, float], Motion]
+"""From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
 
 _RELEASE_STEPS = 2  # Gauss–Newton steps of a run's start in the engine
 _SHIFT = 1e-4  # of the start, for its derivatives
@@ -34,17 +176,13 @@ _SHIFT = 1e-4  # of the start, for its derivatives
 def native_closure(
     nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut, simulate: Simulate
 ) -> NativeClosure:
-    """Simulate what was held out with the patched model of the fit that has not seen it.
+    """Simulate what was held out with the patched model of the fit that has not seen it; only with the wind off.
 
     Args:
         nominal: fit of the model as given.
         chosen: fit with the causes.
         nominal_out: runs held out of the first.
         chosen_out: runs held out of the second.
-        simulate: the patched model of a fit.
-
-    Returns:
-        The closure; runs with the wind on do not count.
 
     Raises:
         TunnelError: when nothing could be held out, or the patched model's motion grows without bound.
@@ -55,37 +193,34 @@ def native_closure(
     before: list[Array] = []
     fitted: list[Array] = []
     native: list[Array] = []
-    if held:
-        for i in held:
-            common, own = chosen_out.points[runs[i].id]
-            before.append(nominal_out.residuals[runs[i].id])
-            fitted.append(chosen_out.residuals[runs[i].id])
-            native.append(_residual(chosen.problem, common, own, i, simulate))
-        return NativeClosure(_power(before), _power(fitted), _power(native), "on runs held out of the fit")
-    ids = [run.id for run in runs if not run.wind_on]
-    turns = turns_of(nominal, ids)
-    plain, caused = predict_stretches(nominal, turns), predict_stretches(chosen, turns)
-    for number in range(FOLDS if ids else 0):
-        out = [turn == number for turn in turns]
-        try:
-            point, _ = fit_seen(chosen, [~left for left in out])
-        except np.linalg.LinAlgError:
-            continue
-        for i, left in enumerate(out):
-            if left.any():
-                seen = _residual(chosen.problem, point.common, point.release[i], i, simulate, seen=~left)
-                before.append(plain[runs[i].id][left])
-                fitted.append(caused[runs[i].id][left])
-                native.append(seen[left])
+    on = "runs" if held else "stretches of time"
+    for i in held:
+        common, own = chosen_out.points[runs[i].id]
+        before.append(nominal_out.residuals[runs[i].id])
+        fitted.append(chosen_out.residuals[runs[i].id])
+        native.append(_residual(chosen.problem, common, own, i, simulate))
+    ids = [] if held else [run.id for run in runs if not run.wind_on]
+    if ids:
+        turns = turns_of(nominal, ids)
+        plain, caused = predict_stretches(nominal, turns), predict_stretches(chosen, turns)
+        for number in range(FOLDS):
+            out = [turn == number for turn in turns]
+            try:
+                point, _ = fit_seen(chosen, [~left for left in out])
+            except np.linalg.LinAlgError:
+                continue
+            for i, left in enumerate(out):
+                if left.any():
+                    seen = _residual(chosen.problem, point.common, point.release[i], i, simulate, seen=~left)
+                    before.append(plain[runs[i].id][left])
+                    fitted.append(caused[runs[i].id][left])
+                    native.append(seen[left])
     if not native:
         raise TunnelError("no run with the wind off could be held out", remedy="add runs with the wind off")
-    return NativeClosure(
-        _power(before), _power(fitted), _power(native), "on stretches of time held out of the fit"
+    nominal_power, fit_power, native_power = (
+        float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, native)
     )
-
-
-def _power(residuals: Sequence[Array]) -> float:
-    return float(np.mean(np.concatenate(residuals) ** 2))
+    return NativeClosure(nominal_power, fit_power, native_power, f"on {on} held out of the fit")
 
 
 def _residual(
@@ -100,7 +235,7 @@ def _residual(
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
     def left(release: Array) -> Array:
-        return _left(problem, common, release, index, simulate)
+        return engine_residual(problem, common, release, index, simulate)
 
     best = left(own)
     for _ in range(_RELEASE_STEPS):
@@ -116,25 +251,35 @@ def _residual(
     return best
 
 
-def _left(problem: Problem, common: Array, own: Array, index: int, simulate: Simulate) -> Array:
+def engine_residual(problem: Problem, common: Array, own: Array, index: int, simulate: Simulate) -> Array:
+    """Reading minus the engine's prediction of one run.
+
+    Args:
+        common: parameters of all runs, shape (common,).
+        own: parameters of the run, shape (own,).
+
+    Returns:
+        In noise standard deviations, shape (n,).
+    """
     run, change = problem.data.runs[index], problem.data.similarity
     chain = problem.chain(common, own, run)
     blocks = run.reading.size + blocks_beyond(chain.physics(), run) + 1
     measured = change.own(blocks * run.interval, "s")
-    motion = simulate(common, own, start_of(problem, own, index), measured)
+    motion = simulate(common, _start(problem, own, index), measured)
     scaled = Motion(
         motion.time_s * change.similar(1.0, "s"), motion.angle, motion.rate * change.similar(1.0, "rad/s")
     )
     return run.scaled(run.reading - sample_means(chain, scaled, run, problem.zero(common, own)))
 
 
-def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
-    """Refuse a model that no answer could be written into, before the work.
+def _start(problem: Problem, own: Array, index: int) -> Start:
+    """Where a run with these own parameters, shape (own,), starts, in the units of the measured campaign."""
+    run, change = problem.data.runs[index], problem.data.similarity
+    return Start(run.id, change.own(run.start, "s"), float(own[0]), change.own(float(own[1]), "rad/s"))
 
-    Args:
-        model: as given.
-        campaign: to be diagnosed with it.
-        path: where the patched model is to be written.
+
+def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> None:
+    """Refuse a model that no answer about a campaign could be written into, before the work.
 
     Raises:
         TunnelError: when every run has the wind on, or the engine cannot write or simulate the model as given.
@@ -153,13 +298,9 @@ def refuse_unpatchable(model: JointModel, campaign: Campaign, path: Path) -> Non
 
 
 def patched_model(study: Study, model: JointModel) -> PatchedModel:
-    """Write the answer of a study into the model, and simulate it against what was held out.
+    """Write the answer of a study into the model whose joint it is of, and simulate it against what was held out.
 
-    Args:
-        study: whose nominal model is the law of the model's joint.
-
-    Returns:
-        The patched model: with the causes, or with the free parameters alone where none is named.
+    Without causes only the free parameters are written.
 
     Raises:
         TunnelError: when the engine refuses the patched model, or its motion grows without bound.
@@ -177,15 +318,14 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     def compiled(common: bytes) -> mujoco.MjModel:
         return patched(model, law(np.frombuffer(common)).patch)[0].compile()
 
-    def simulate(common: Array, own: Array, start: Start, duration: float) -> Motion:
-        del own
+    def simulate(common: Array, start: Start, duration: float) -> Motion:
         return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration)
 
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate)
     found = law(chosen.point.common)
-    starts = [start_of(problem, own, i) for i, own in enumerate(chosen.point.release)]
+    starts = [_start(problem, own, i) for i, own in enumerate(chosen.point.release)]
     spec, written = patched(model, found.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest

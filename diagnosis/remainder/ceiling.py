@@ -1,4 +1,7 @@
-"""How much of what is left each kind of law could close, on readings held out of the fit."""
+"""How much of what is left each kind of law could close, on readings held out of the fit.
+
+A law is a sum of the columns of a basis, fitted by regularised least squares with the noise known.
+"""
 
 from __future__ import annotations
 
@@ -13,23 +16,174 @@ from numpy.typing import NDArray
 from diagnosis.answer.held_out import folds
 from diagnosis.closure import Ceiling
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.remainder import bases
-from diagnosis.remainder.paths import Path, paths
-from diagnosis.remainder.ridge import (
-    Normal,
-    Ridge,
-    Rows,
-    best_ridge,
-    common_precision,
-    held_out,
-    normal,
-    ratio,
-    total,
-)
+from diagnosis.remainder.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
 from tunnel_sim.vocabulary.record import Array
 
-RUNS = "runs"
-STRETCHES = "stretches of time"
+_WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, in that of a column of unit response
+_TINY = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations of some rows.
+
+    Args:
+        matrix: free columns first, shape (c + k, c + k).
+        gradient: shape (c + k,).
+        power: sum of the squared residuals, dimensionless.
+        free: number of columns without a prior.
+    """
+
+    matrix: Array
+    gradient: Array
+    power: float
+    free: int
+
+    def __sub__(self, other: Normal) -> Normal:
+        """Without the other rows."""
+        return Normal(
+            self.matrix - other.matrix, self.gradient - other.gradient, self.power - other.power, self.free
+        )
+
+    def cost(self, solution: Array) -> float:
+        """χ² with given coefficients, shape (c + k,)."""
+        return float(self.power - 2.0 * solution @ self.gradient + solution @ self.matrix @ solution)
+
+
+def normal(residual: Array, basis: Array, free: Array | None = None) -> Normal:
+    """The normal equations of one unit (a run), its own release taken out.
+
+    Args:
+        residual: shape (rows,).
+        basis: columns with a prior, shape (rows, k).
+        free: columns without a prior, shape (rows, c); None where there are none.
+    """
+    free = np.zeros((residual.size, 0)) if free is None else free
+    columns = np.column_stack([free, basis])
+    return Normal(columns.T @ columns, columns.T @ residual, float(residual @ residual), free.shape[1])
+
+
+def total(parts: Sequence[Normal]) -> Normal:
+    """The normal equations of several units."""
+    return Normal(
+        np.sum([p.matrix for p in parts], axis=0),
+        np.sum([p.gradient for p in parts], axis=0),
+        sum(p.power for p in parts),
+        parts[0].free,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Ridge:
+    """The solution for a prior of one width, coefficients independent and normal.
+
+    Args:
+        precision: of the prior, one over the variance of a coefficient, in the basis' units.
+    """
+
+    whole: Normal
+    precision: float
+
+    @cached_property
+    def _scaled(self) -> tuple[Array, Array]:
+        """Scale of the columns, and the penalised matrix in it."""
+        matrix = self.whole.matrix
+        penalty = np.full(len(matrix), self.precision)
+        penalty[: self.whole.free] = 0.0
+        size = np.sqrt(np.maximum(np.diag(matrix) + penalty, 1e-300))
+        scaled = (matrix + np.diag(penalty)) / np.outer(size, size)
+        scaled += _TINY * np.eye(len(matrix))
+        return size, scaled
+
+    @cached_property
+    def solution(self) -> Array:
+        """Coefficients, shape (c + k,)."""
+        size, scaled = self._scaled
+        return np.asarray(np.linalg.solve(scaled, self.whole.gradient / size) / size)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the coefficients, shape (c + k, c + k)."""
+        size, scaled = self._scaled
+        return np.asarray(np.linalg.inv(scaled) / np.outer(size, size))
+
+
+def _spectrum(whole: Normal) -> tuple[Array, Array]:
+    """Eigenvalues of the basis with the free columns taken out, and the gradient along their axes."""
+    c = whole.free
+    a, b, d = whole.matrix[:c, :c], whole.matrix[:c, c:], whole.matrix[c:, c:]
+    size = np.sqrt(np.maximum(np.diag(a), 1e-300))
+    inverse = np.linalg.pinv(a / np.outer(size, size), rcond=1e-11, hermitian=True) / np.outer(size, size)
+    left = d - b.T @ inverse @ b
+    along = whole.gradient[c:] - b.T @ inverse @ whole.gradient[:c]
+    values, axes = np.linalg.eigh(0.5 * (left + left.T))
+    keep = values > 1e-9 * max(float(values[-1]), 1e-300)
+    return values[keep], axes[:, keep].T @ along
+
+
+def _log_evidence(values: Array, along: Array, precision: float) -> float:
+    """Twice the logarithm of the evidence over that without the basis."""
+    return float(np.sum(along**2 / (values + precision)) - np.sum(np.log1p(values / precision)))
+
+
+def best_ridge(whole: Normal) -> Ridge:
+    """The width of the prior that the readings make most probable."""
+    values, along = _spectrum(whole)
+    if not values.size:
+        return Ridge(whole, 1e300)
+    scale = 1.0 / float(values[-1])
+    tried = [1.0 / (scale * float(width)) for width in _WIDTHS**2]
+    return Ridge(whole, max((_log_evidence(values, along, precision), precision) for precision in tried)[1])
+
+
+def common_precision(parts: Sequence[Normal]) -> float:
+    """One precision of the prior, as in `Ridge`, for units with coefficients of their own."""
+    spectra = [_spectrum(part) for part in parts]
+    greatest = max(max(values, default=0.0) for values, _ in spectra)
+    if greatest <= 0.0:
+        return 1e300
+    tried = [greatest / float(width) for width in _WIDTHS**2]
+    return max(tried, key=lambda precision: sum(_log_evidence(*each, precision) for each in spectra))
+
+
+def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:
+    """χ² of every unit predicted without its group, or of the fit to all where it is in none, shape (units,).
+
+    Args:
+        groups: indices of the units left out together.
+        precision: of the prior, as in `Ridge`, in the basis' units; None: the free columns alone.
+    """
+
+    def solved(whole: Normal) -> Array:
+        if precision is not None:
+            return Ridge(whole, precision).solution
+        c = whole.free
+        alone = Normal(whole.matrix[:c, :c], whole.gradient[:c], whole.power, c)
+        return np.pad(Ridge(alone, 0.0).solution, (0, whole.gradient.size - c))
+
+    whole = total(parts)
+    solution = solved(whole)
+    costs = np.array([part.cost(solution) for part in parts])
+    for group in groups:
+        solution = solved(whole - total([parts[i] for i in group]))
+        for i in group:
+            costs[i] = parts[i].cost(solution)
+    return costs
+
+
+def ratio(drop: Array, left: Array) -> tuple[float, float]:
+    """Share of what was left that is closed, and its standard deviation from the scatter of the units.
+
+    Args:
+        drop: of χ², by unit, shape (units,).
+        left: excess before, by unit, shape (units,).
+    """
+    whole = max(float(left.sum()), 1e-9)
+    closed = float(drop.sum()) / whole
+    scatter = float(np.sum((drop - closed * left) ** 2))
+    return closed, float(np.sqrt(scatter * drop.size / max(drop.size - 1, 1)) / whole)
+
+
 GAPS = "short gaps"
 _STRETCHES = 6  # in a run, where no run can be left out
 _GAP = 3  # rows: an eighth of a cycle
@@ -38,12 +192,7 @@ _TURNS = 3
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """What has a release of its own: a run, or a stretch of it.
-
-    Args:
-        path: of the run.
-        rows: which of its rows.
-    """
+    """What has a release of its own: a run, or a stretch of its rows."""
 
     path: Path
     rows: slice
@@ -67,7 +216,6 @@ class Evidence:
     """What the runs say of a kind.
 
     Args:
-        ceiling: how much it closes.
         drop: of χ² on what was held out, dimensionless.
         precision: one over the variance of a coefficient in its prior, in the basis' units.
         solution: the coefficients, where one set holds in all runs.
@@ -80,110 +228,88 @@ class Evidence:
 
 
 class Unexplained:
-    """What a fit leaves, and how much of it could be closed.
-
-    Args:
-        fit: of the answer.
-    """
+    """What the fit of an answer leaves, and how much of it could be closed."""
 
     def __init__(self, fit: Fit) -> None:
         self.fit = fit
         self.paths = paths(fit)
-        self.ranges = bases.ranges(self.paths)
+        self.ranges = ranges(self.paths)
         ids = [run.id for run in fit.problem.data.runs]
         self.groups: list[tuple[int, ...]] = [
             tuple(ids.index(run) for run in group) for group in folds(fit.problem.data, len(ids))
         ]
-        self.units = [Unit(path, slice(None)) for path in self.paths]
-        self.held_out = RUNS
+        self.runs = [Unit(path, slice(None)) for path in self.paths]
+        self.units, self.held_out = self.runs, "runs"
         if not self.groups:
-            self.units = [unit for path in self.paths for unit in _stretches(path)]
+            self.units, self.held_out = [], "stretches of time"
+            for path in self.paths:
+                size = path.residual.size
+                cycles = size * path.group * path.run.interval * path.omega / (2.0 * np.pi)
+                edges = np.linspace(0, size, max(2, min(_STRETCHES, int(cycles / 3.0))) + 1).astype(int)
+                self.units += [Unit(path, slice(int(a), int(b))) for a, b in pairwise(edges)]
             self.groups = [(i,) for i in range(len(self.units))]
-            self.held_out = STRETCHES
-        self.excess = fit.total - fit.count
         self.seen = np.zeros(len(self.units), bool)
         self.seen[[i for group in self.groups for i in group]] = True
-
-    @cached_property
-    def size(self) -> Array:
-        """Scale of the model's own columns, shape (common,)."""
         sizes = [np.max(np.abs(path.nominal), axis=0) for path in self.paths]
-        return np.asarray(np.maximum(np.max(sizes, axis=0), 1e-300))
-
-    @cached_property
-    def _free(self) -> list[Array]:
-        return [unit.left(unit.path.nominal / self.size) for unit in self.units]
+        #: scale of the model's own columns, shape (common,)
+        self.size = np.maximum(np.max(sizes, axis=0), 1e-300)
+        self._free = [unit.left(unit.path.nominal / self.size) for unit in self.units]
 
     def normals(self, columns: Sequence[Array]) -> list[Normal]:
-        """Normal equations by unit.
-
-        Args:
-            columns: by run, shape (rows, k).
-        """
-        of = {id(path): matrix for path, matrix in zip(self.paths, columns, strict=True)}
+        """Normal equations by unit; the columns are by run, shape (rows, k)."""
         return [
-            normal(Rows(free, unit.left(of[id(unit.path)]), unit.left(unit.path.residual)))
+            normal(unit.left(unit.path.residual), unit.left(columns[unit.path.index]), free)
             for unit, free in zip(self.units, self._free, strict=True)
         ]
 
     def columns(self, kind: str) -> list[Array]:
         """Responses to a kind's basis, by run, shape (rows, k)."""
-        basis = bases.COMMON[kind] if kind in bases.COMMON else bases.SINGLE[kind]
-        if kind in bases.OF_READING:
+        basis = {**COMMON, **SINGLE}[kind]
+        if kind in OF_READING:
             return [path.seen(basis(path, self.ranges) * self.ranges.angle) for path in self.paths]
         return [path.response(basis(path, self.ranges)) for path in self.paths]
-
-    def share(self, after: Array) -> tuple[float, float]:
-        """Share closed on what was held out, with its standard deviation from the scatter of the units.
-
-        Args:
-            after: χ² of every unit with the law, shape (units,).
-        """
-        drop = (self.before - after)[self.seen]
-        # averaged rows have less noise than the residuals but all of the misfit; a stretch's own release takes some
-        left = self._left_over + (self.before - self._power)
-        return ratio(drop, left[self.seen])
-
-    @cached_property
-    def _power(self) -> Array:
-        """χ² of every unit's rows in the fit, shape (units,)."""
-        rows = [unit.path.residual[unit.rows] for unit in self.units]
-        return np.array([float(own @ own) for own in rows])
-
-    @cached_property
-    def _alone(self) -> list[Normal]:
-        return self.normals([np.zeros((path.residual.size, 0)) for path in self.paths])
 
     @cached_property
     def before(self) -> Array:
         """χ² of every unit predicted without it by the model alone, shape (units,)."""
-        return held_out(self._alone, self.groups, None)
+        alone = self.normals([np.zeros((path.residual.size, 0)) for path in self.paths])
+        return held_out(alone, self.groups, None)
 
     @cached_property
-    def _left_over(self) -> Array:
-        """Excess of every unit's residuals in the fit."""
-        whole = [self.fit.residuals[unit.path.index] for unit in self.units]
-        return np.array([_excess_in(r, unit) for r, unit in zip(whole, self.units, strict=True)])
+    def _left(self) -> Array:
+        """Excess that could be closed in every unit, shape (units,).
+
+        Averaged rows have less noise than the residuals but all of the misfit; a stretch's own release takes some.
+        """
+        over, power = [], []
+        for unit in self.units:
+            rows, group = unit.path.residual[unit.rows], unit.path.group
+            first, last, _ = unit.rows.indices(unit.path.residual.size)
+            whole = unit.rows == slice(None)
+            own = self.fit.residuals[unit.path.index][first * group : None if whole else last * group]
+            over.append(float(own @ own) - own.size)
+            power.append(float(rows @ rows))
+        return np.asarray(np.array(over) + (self.before - np.array(power)), np.float64)
 
     def common(self, kind: str) -> Evidence:
-        """A kind whose law holds in every run."""
+        """A kind whose law holds in every run; the scatter of the units gives the standard deviation."""
         parts = self.normals(self.columns(kind))
         ridge = best_ridge(total(parts))
-        after = held_out(parts, self.groups, ridge.precision)
-        drop = float((self.before - after)[self.seen].sum())
-        return Evidence(Ceiling(kind, *self.share(after), self.held_out), drop, ridge.precision, ridge)
+        drop = (self.before - held_out(parts, self.groups, ridge.precision))[self.seen]
+        ceiling = Ceiling(kind, *ratio(drop, self._left[self.seen]), self.held_out)
+        return Evidence(ceiling, float(drop.sum()), ridge.precision, ridge)
 
     def single(self, kind: str) -> Evidence:
         """A kind that is different in every run: short gaps are predicted from what is around them."""
-        runs = [Unit(path, slice(None)) for path in self.paths]
-        columns = [unit.left(matrix) for unit, matrix in zip(runs, self.columns(kind), strict=True)]
-        residuals = [unit.left(unit.path.residual) for unit in runs]
-        parts = [_basis_only(c, r) for c, r in zip(columns, residuals, strict=True)]
-        precision = common_precision(parts)
+        columns = [unit.left(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)]
+        residuals = [unit.left(unit.path.residual) for unit in self.runs]
+        precision = common_precision([normal(r, c) for r, c in zip(residuals, columns, strict=True)])
         drops = []
         for matrix, residual in zip(columns, residuals, strict=True):
-            turn = gaps(residual.size)
-            after = sum(_gap_cost(matrix, residual, turn == t, precision) for t in range(_TURNS))
+            turn, after = gaps(residual.size), 0.0
+            for out in (turn == number for number in range(_TURNS)):
+                solution = Ridge(normal(residual[~out], matrix[~out]), precision).solution
+                after += float(np.sum((residual[out] - matrix[out] @ solution) ** 2))
             drops.append(float(residual @ residual) - after)
         left = [float(r @ r) - r.size for r in self.fit.residuals]
         closed, std = ratio(np.array(drops), np.array(left))
@@ -191,38 +317,5 @@ class Unexplained:
 
 
 def gaps(size: int, group: int = 1) -> NDArray[np.int_]:
-    """Which of the sets of short gaps left out in turn a sample belongs to.
-
-    Args:
-        size: number of samples.
-        group: samples for each row of a `Path`.
-
-    Returns:
-        Numbers of the sets, shape (size,).
-    """
+    """The set of short gaps left out in turn to which each of ``size`` samples, ``group`` in a row, belongs."""
     return np.arange(size) // (_GAP * group) % _TURNS
-
-
-def _excess_in(residual: Array, unit: Unit) -> float:
-    """Excess of the residuals of a unit: χ² less its number."""
-    group = unit.path.group
-    first, last, _ = unit.rows.indices(unit.path.residual.size)
-    own = residual[first * group : None if unit.rows == slice(None) else last * group]
-    return float(own @ own) - own.size
-
-
-def _basis_only(columns: Array, residual: Array) -> Normal:
-    return normal(Rows(np.zeros((residual.size, 0)), columns, residual))
-
-
-def _gap_cost(matrix: Array, residual: Array, out: NDArray[np.bool_], precision: float) -> float:
-    """χ² of the rows left out, predicted from the others."""
-    solution = Ridge(_basis_only(matrix[~out], residual[~out]), precision).solution
-    return float(np.sum((residual[out] - matrix[out] @ solution) ** 2))
-
-
-def _stretches(path: Path) -> list[Unit]:
-    """A run in stretches of some cycles."""
-    cycles = path.residual.size * path.group * path.run.interval * path.omega / (2.0 * np.pi)
-    edges = np.linspace(0, path.residual.size, max(2, min(_STRETCHES, int(cycles / 3.0))) + 1).astype(int)
-    return [Unit(path, slice(int(a), int(b))) for a, b in pairwise(edges)]

@@ -1,25 +1,39 @@
-"""What could be closed of what an answer leaves: by kind, as a curve, and as a formula."""
+"""What could be closed of what an answer leaves: by kind, with its curve, events, line or formula."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import chdtrc
 
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
-from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.policy import AS_MUCH, COMMON_SHARE, LEAST_CLOSABLE, PLACE_FALSE_ALARM_RATE
-from diagnosis.remainder import bases
-from diagnosis.remainder.ceiling import Evidence, Unexplained
-from diagnosis.remainder.curve import SteadyLine, curve, events, steady_line
-from diagnosis.remainder.formula import Proposal, choose, propose
-from diagnosis.remainder.ridge import ratio
+from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
+from diagnosis.policy import (
+    AS_MUCH,
+    COMMON_SHARE,
+    LEAST_CLOSABLE,
+    LINE_CONTRAST,
+    LINE_STEADY,
+    PLACE_FALSE_ALARM_RATE,
+)
+from diagnosis.remainder.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
+from diagnosis.remainder.formula import choose, propose
+from diagnosis.remainder.paths import COMMON, OF_READING, SINGLE, Path, Places
 from diagnosis.search.investigate import Study
+from diagnosis.where.excess import away_from_motion
 from identification.printing import unit_mark, with_std
+from tunnel_sim.vocabulary.record import Array
+
+Events = tuple[Mapping[str, Any], ...]
+"""By run, the largest part first: ``run``, its ``share`` of what is closed, and ``from_s`` and ``to_s`` since the
+start of the record."""
 
 _BESIDE = 2.0  # standard deviations
 
@@ -38,59 +52,52 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
     """
-    left = study.chosen if decided else study.nominal
+    left, similarity = study.chosen if decided else study.nominal, study.similarity
     if not study.causes or not significant or study.random_answer(study.fitted) is not None:
         return None
     if left.excess <= 0.0:
         return None
-    return explain(left, study.similarity, named=study.named and decided)
-
-
-def explain(left: Fit, similarity: Similarity, *, named: bool) -> Closable:
-    """Say how much of what a fit leaves could be closed, and by what.
-
-    Args:
-        left: the fit.
-        similarity: how its units were made.
-        named: whether causes are part of it.
-    """
     unexplained = Unexplained(left)
-    common = {kind: unexplained.common(kind) for kind in bases.COMMON}
+    common = {kind: unexplained.common(kind) for kind in COMMON}
     line = steady_line(unexplained)
     single = {} if line is None else {"line": line.evidence}
-    single |= {kind: unexplained.single(kind) for kind in bases.SINGLE}
+    single |= {kind: unexplained.single(kind) for kind in SINGLE}
     kind = chosen_kind(common, single)
-    ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     law, shape = None, None
-    where: tuple[Mapping[str, Any], ...] = ()
+    found: Events = ()
     if kind in common:
-        shape = _own_curve(curve(unexplained, common[kind]), similarity)
+        shape = curve(unexplained, common[kind], similarity)
         law = _law(unexplained, kind, common[kind].drop, similarity)
-        kind = _of_formula(kind, law)
+        # few runs may show angle and rate as a function of one of them: the formula corrects that
+        formula = "" if law is None else str(law.effect.get("moment", ""))
+        other = {"angle": "r", "rate": "b"}.get(kind)
+        kind = "state" if other and re.search(rf"\b{other}\b", formula) else kind
     elif line is not None and kind == "line":
-        where = tuple(_own_event(one, similarity) for one in line.events)
+        found = line.events
     elif kind in single:
-        where = tuple(
-            _own_event(one, similarity) for one in events(unexplained, kind, single[kind].precision)
+        found = events(unexplained, kind, single[kind].precision)
+    where = tuple(
+        {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in found
+    )
+    ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
+    words = _words(
+        kind, ceilings, law, where, "what the causes leave" if study.named and decided else "the gap"
+    )
+    if line is not None and kind == "line":
+        unit = similarity.reading
+        sizes = [similarity.own(value, "Hz") for value in (line.frequency, line.frequency_std)]
+        sizes += [1e3 * similarity.own(value, unit) for value in (line.amplitude, line.amplitude_std)]
+        words += (
+            f" The line is at {with_std(*sizes[:2])} Hz, with an amplitude of {with_std(*sizes[2:])} "
+            f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
+            f"{100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
         )
     excess = left.excess / left.problem.data.runs[0].block
-    shown = {one.kind: one for one in ceilings}
-    words = _words(kind, shown, law, () if kind == "line" else where, named=named)
-    if line is not None and kind == "line":
-        words = f"{words} {_line_words(line, similarity)}"
-    return Closable(excess, ceilings, kind, words, shape, law, where)
+    return Closable(excess, ceilings, kind, words, where, shape, law)
 
 
 def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str:
-    """The simplest kind that closes about as much as any.
-
-    Args:
-        common: kinds whose law holds in every run, the simpler first.
-        single: kinds that differ from run to run.
-
-    Returns:
-        One of `diagnosis.closure.KINDS`.
-    """
+    """The simplest kind of `KINDS` that closes about as much as any; of common laws the simpler come first."""
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )
@@ -101,46 +108,26 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
     return next(kind for kind, one in among.items() if one.ceiling.closed >= least)
 
 
-def _of_formula(kind: str, law: Law | None) -> str:
-    """The kind, corrected by the formula: few runs may show angle and rate as a function of one of them."""
-    formula = "" if law is None else str(law.effect.get("moment", ""))
-    other = {"angle": "r", "rate": "b"}.get(kind)
-    return "state" if other and re.search(rf"\b{other}\b", formula) else kind
-
-
 def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarity) -> Law | None:
-    """The formula of a kind, where one is supported."""
+    """The formula of a kind in the measured campaign's units, where one is supported on what is held out."""
     formula = choose(unexplained, kind, drop)
     proposal = None if formula is None else propose(unexplained, formula, kind)
     if proposal is None:
         return None
-    closed, std = _closed_by(proposal.fit, unexplained.fit)
-    if closed < LEAST_CLOSABLE:
-        return None
-    table, values = _own_table(proposal, similarity)
-    return Law(table, values, closed, std)
-
-
-def _closed_by(fitted: Fit, base: Fit) -> tuple[float, float]:
-    """Share of what the base leaves that a fit closes, on runs or stretches held out, with its deviation."""
-    before, after = (predict_held_out(one).residuals for one in (base, fitted))
+    base = unexplained.fit
+    before, after = (predict_held_out(one).residuals for one in (base, proposal.fit))
     if not before:
         turns = turns_of(base, {run.id for run in base.problem.data.runs})
-        before, after = (predict_stretches(one, turns) for one in (base, fitted))
+        before, after = (predict_stretches(one, turns) for one in (base, proposal.fit))
     both = [run for run in before if run in after]
     powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
     sizes = np.array([before[run].size for run in both], np.float64)
-    return ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-
-
-def _own_table(
-    proposal: Proposal, similarity: Similarity
-) -> tuple[dict[str, Any], dict[str, tuple[float, float]]]:
-    """The effect's table and its fitted parameters in the measured campaign's units."""
-    table: dict[str, Any] = {**proposal.table}
+    closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
+    if closed < LEAST_CLOSABLE:
+        return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):
-        full, unit = f"{table['name']}.{name}", str(given["unit"])
+        full, unit = f"{proposal.table['name']}.{name}", str(given["unit"])
         value = similarity.own(proposal.fit.value(full), unit)
         low, high = sorted(similarity.own(float(given[end]), unit) for end in ("lower", "upper"))
         own[name] = {
@@ -148,83 +135,261 @@ def _own_table(
             "upper": max(high, value), "default": value if place else 0.0,
         }  # fmt: skip
         values[name] = (value, similarity.own(proposal.fit.std(full), unit))
-    return table | {"parameters": own}, values
+    return Law({**proposal.table, "parameters": own}, values, closed, std)
 
 
-def _own_curve(found: Curve | None, similarity: Similarity) -> Curve | None:
-    if found is None:
-        return None
-    units = {"angle": "rad", "rate": "rad/s", "time": "s"}
-
-    def own(values: tuple[float, ...], unit: str) -> tuple[float, ...]:
-        return tuple(float(f"{similarity.own(value, unit):.6g}") for value in values)
-
-    places = tuple(own(axis, units[name]) for name, axis in zip(found.over, found.places, strict=True))
-    return Curve(found.over, places, own(found.values, found.unit), own(found.std, found.unit), found.unit)
-
-
-def _own_event(given: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
-    times = {name: similarity.own(given[name], "s") for name in ("from_s", "to_s")}
-    return {**given, **times}
-
-
-def _words(
-    kind: str,
-    ceilings: Mapping[str, Ceiling],
-    law: Law | None,
-    where: tuple[Mapping[str, Any], ...],
-    *,
-    named: bool,
-) -> str:
-    """What could be closed, in a few sentences."""
-    left = "what the causes leave" if named else "the gap"
+def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Events, left: str) -> str:
+    """What could be closed of what is left, in a few sentences."""
     if kind == "noise":
-        most = max(ceilings.values(), key=lambda one: one.closed)
+        most = max(ceilings, key=lambda one: one.closed)
         return (
             f"No more than {percent(max(most.closed, 0.0) + _BESIDE * most.std)} of {left} could be closed by any "
             "smooth moment or error of the reading: the rest is noise."
         )
-    best = ceilings[kind]
+    best = next(one for one in ceilings if one.kind == kind)
     said = [
         f"{percent(best.closed, best.std)} of {left} could be closed by {KINDS[kind]}, measured on {best.held_out} "
         "held out of the fit."
     ]
-    others = [
-        one for one in ceilings.values() if one.held_out == best.held_out and not _includes(one.kind, kind)
-    ]
+    # of others, those that the kind is not a case of
+    included = (kind, "state") if kind in ("angle", "rate") else (kind,)
+    others = [one for one in ceilings if one.held_out == best.held_out and one.kind not in included]
     alike = [one for one in others if one.closed >= best.closed - max(AS_MUCH, best.std)]
     if alike:
         said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")
     elif others:
         others_most = max(one.closed for one in others)
         said.append(f"No other kind would close more than {percent(max(others_most, 0.0))}.")
-    if where:
-        said.append(f"Most of it is in {_places(where)}.")
+    if where and kind != "line":
+        run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
+        largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
+        said.append(f"Most of it is in {largest}{run}.")
     if law is not None:
         formula = law.effect.get("moment") or law.effect["reading"]
         said.append(f"The formula {formula} closes {percent(law.closed, law.std)}.")
     return " ".join(said)
 
 
-def _line_words(line: SteadyLine, similarity: Similarity) -> str:
-    def own(values: tuple[float, float], unit: str, factor: float = 1.0) -> str:
-        return with_std(*(factor * similarity.own(value, unit) for value in values))
+_POINTS, _MAP = 41, 13
+_LISTED = 0.1  # of the largest run's part: from it on a run is among the events
+_INSIDE = 0.8  # of an event's energy lies within the times given
 
-    unit = similarity.reading
-    frequency = own((line.frequency, line.frequency_std), "Hz")
-    amplitude = own((line.amplitude, line.amplitude_std), unit, 1e3)
-    return (
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(unit)}, root mean square "
-        f"over the runs; chance alone shows one in less than {100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
+_OVER: Mapping[str, tuple[str, ...]] = {
+    "angle": ("angle",), "rate": ("rate",), "state": ("angle", "rate"), "wind": ("angle", "rate"),
+    "time": ("time",), "reading": ("angle",),
+}  # fmt: skip
+
+
+def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> Curve | None:
+    """The law of a kind without a formula, in the measured campaign's units; None where it has no common law.
+
+    It is for the median spring, and the greatest wind speed where it is of the wind; a moment in time is that at
+    the greatest angle, without rate. What the model's own coefficients and its zero absorb is taken out.
+    """
+    kind = found.ceiling.kind
+    if found.solution is None or kind not in _OVER:
+        return None
+    r = unexplained.ranges
+    count = _MAP if len(_OVER[kind]) > 1 else _POINTS
+    reach = {
+        "angle": np.linspace(-r.angle, r.angle, count),
+        "rate": np.linspace(-r.rate, r.rate, count),
+        "time": np.linspace(0.0, r.time, count),
+    }
+    axes = [reach[name] for name in _OVER[kind]]
+    grid = dict(zip(_OVER[kind], (g.ravel() for g in np.meshgrid(*axes, indexing="ij")), strict=True))
+    size = next(iter(grid.values())).size
+    still = {
+        "angle": np.full(size, r.angle if kind == "time" else 0.0),
+        "rate": np.zeros(size),
+        "time": np.zeros(size),
+    }
+    at = Places(**{**still, **grid}, stiffness=r.stiffness, speed=r.speed if kind == "wind" else 0.0)
+    basis, free = COMMON[kind](at, r), found.solution.whole.free
+    line = np.column_stack([np.ones(size), *(grid[name] for name in _OVER[kind] if name != "time")])
+    own = np.linalg.qr(line)[0]
+    rows = basis - own @ (own.T @ basis)
+    variance = np.einsum("ij,jk,ik->i", rows, found.solution.covariance[free:, free:], rows)
+    values, std = rows @ found.solution.solution[free:], np.sqrt(np.maximum(variance, 0.0))
+    unit = "rad/s2" if unexplained.fit.problem.data.normalised else "N m"
+    if kind in OF_READING:
+        values, std, unit = values * r.angle, std * r.angle, "rad"
+
+    def given(values: Array, unit: str) -> tuple[float, ...]:
+        return tuple(float(f"{similarity.own(value, unit):.6g}") for value in values.tolist())
+
+    units = {"angle": "rad", "rate": "rad/s", "time": "s"}
+    places = tuple(given(reach[name], units[name]) for name in _OVER[kind])
+    return Curve(_OVER[kind], places, given(values, unit), given(std, unit), unit)
+
+
+def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
+    """The runs that show what differs from run to run, and when, in the units of the fit.
+
+    Args:
+        unexplained: what is left.
+        kind: of `diagnosis.remainder.paths.SINGLE`.
+        precision: one over the variance of a coefficient in the prior, in the basis' units.
+
+    Returns:
+        The times are those between which four fifths of a run's part lie.
+    """
+    drops, spans = [], []
+    for unit, columns in zip(unexplained.runs, unexplained.columns(kind), strict=True):
+        path = unit.path
+        part = normal(unit.left(path.residual), unit.left(columns))
+        solution = Ridge(part, precision).solution
+        drops.append(max(part.power - part.cost(solution), 0.0))
+        # the shortest interval of time with most of the energy
+        energy = (SINGLE[kind](path, unexplained.ranges) @ solution) ** 2
+        sums = np.concatenate([[0.0], np.cumsum(energy)])
+        ends = np.minimum(np.searchsorted(sums, sums[:-1] + _INSIDE * sums[-1]), sums.size)
+        lengths = np.where(ends < sums.size, ends - np.arange(energy.size), energy.size + 1)
+        first = int(np.argmin(lengths))
+        time = path.time + path.run.start
+        spans.append((float(time[first]), float(time[min(int(ends[first]), energy.size) - 1])))
+    return _listed(unexplained, drops, max(sum(drops), 1e-300), spans)
+
+
+def _listed(
+    unexplained: Unexplained, drops: list[float], whole: float, spans: list[tuple[float, float]]
+) -> Events:
+    ranked = sorted(zip(unexplained.paths, drops, spans, strict=True), key=lambda one: -one[1])
+    return tuple(
+        {"run": path.run.id, "share": drop / whole, "from_s": first, "to_s": last}
+        for path, drop, (first, last) in ranked
+        if drop > _LISTED * max(drops)
     )
 
 
-def _includes(one: str, kind: str) -> bool:
-    """Whether a kind is the other or a more general one."""
-    return one == kind or (one == "state" and kind in ("angle", "rate"))
+_AROUND = 61  # frequencies whose median is the floor beside a line
+_MEDIAN = 2.0 * np.log(2.0)  # of χ² with two degrees of freedom
+_NYQUIST = 0.45  # of the sample rate: lines above may be images
 
 
-def _places(where: tuple[Mapping[str, Any], ...]) -> str:
-    first = where[0]
-    run = f"run {first['run']} ({first['from_s']:.2f} to {first['to_s']:.2f} s)"
-    return run if len(where) == 1 else f"{len(where)} runs, the largest part in {run}"
+@dataclass(frozen=True)
+class SteadyLine:
+    """A line that stands out of the residuals of all runs together, in the units of the fit.
+
+    Args:
+        frequency: Hz.
+        frequency_std: its standard deviation, Hz.
+        amplitude: in the unit of the reading, root mean square over the runs.
+        amplitude_std: its standard deviation, in the same unit.
+        events: the runs that show it, over their whole time.
+    """
+
+    frequency: float
+    frequency_std: float
+    amplitude: float
+    amplitude_std: float
+    evidence: Evidence
+    events: Events
+
+
+def steady_line(unexplained: Unexplained) -> SteadyLine | None:
+    """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
+
+    None where chance may explain it, at a rate of `PLACE_FALSE_ALARM_RATE` for all frequencies together, and where
+    it is the skirt of something broader or does not keep its phase in a run.
+    """
+    start, floor = _strongest(unexplained)
+    if start is None:
+        return None
+    runs = [path.run for path in unexplained.paths]
+    width = 1.0 / max(run.duration for run in runs)
+    found = minimize_scalar(
+        lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
+    )
+    frequency = float(found.x)
+    if _steadiness(unexplained, frequency, floor) < LINE_STEADY:
+        return None
+    drops = _drops(unexplained, frequency)
+    whole = float(drops.sum())
+    # Cramér–Rao bounds of sinusoids of unknown phase, in the noise beside the line
+    sharpness = float(drops @ np.array([run.duration**2 for run in runs]))
+    frequency_std = float(np.sqrt(12.0 * floor / sharpness) / (2.0 * np.pi))
+    noise = np.array([float(run.noise_at(frequency) / block_gain(frequency, run)) for run in runs])
+    sizes = np.array([run.reading.size for run in runs])
+    squares = 2.0 * np.maximum(drops - 2.0, 0.0) / sizes * noise**2  # two of the drop are chance
+    amplitude = float(np.sqrt(np.mean(squares)))
+    # short gaps are predicted from the line around them, as for every kind that differs from run to run
+    closed, left = [], []
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency)
+        turn, after = gaps(residual.size, path.group), 0.0
+        for out in (turn == t for t in np.unique(turn)):
+            size = np.linalg.lstsq(waves[~out], residual[~out], rcond=None)[0]
+            after += float(np.sum((residual[out] - waves[out] @ size) ** 2))
+        power = float(residual @ residual)
+        closed.append(power - after)
+        left.append(power - residual.size)
+    ceiling = Ceiling("line", *ratio(np.array(closed), np.array(left)), GAPS)
+    times = [path.time + path.run.start for path in unexplained.paths]
+    spans = [(float(time[0]), float(time[-1])) for time in times]
+    return SteadyLine(
+        frequency,
+        frequency_std,
+        amplitude,
+        amplitude * float(np.sqrt(floor / whole)),
+        Evidence(ceiling, sum(closed), 0.0),
+        _listed(unexplained, drops.tolist(), whole, spans),
+    )
+
+
+def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
+    """Frequency of the least likely line, Hz, and the power beside it over that of the noise."""
+    from scipy.ndimage import median_filter  # only here: slow to load
+
+    spectra = smooth_spectra(unexplained.fit)
+    longest = max(spectra, key=lambda one: one.duration)
+    top = _NYQUIST / max(path.run.interval for path in unexplained.paths)
+    grid = longest.frequency[(longest.frequency > 0.0) & (longest.frequency < top)]
+    power, count, floors = np.zeros(grid.size), np.zeros(grid.size), np.zeros(grid.size)
+    for index, spectrum in enumerate(spectra):
+        # the floor is the median power around each frequency over that of white noise, at least 1
+        step = max(1, round(1.0 / (spectrum.duration * spectrum.frequency[1])))  # the padding
+        frequency = spectrum.frequency[::step]
+        around = median_filter(spectrum.power(frequency), _AROUND, mode="nearest")
+        floor = np.interp(grid, frequency, np.maximum(around / _MEDIAN, 1.0))
+        seen = away_from_motion(grid / resonance(unexplained.fit, index))
+        power += np.where(seen, spectrum.power(grid) / floor, 0.0)
+        count += seen
+        floors += np.where(seen, floor, 0.0)
+    with np.errstate(divide="ignore"):
+        chance = np.where(count > 0, np.log(chdtrc(2.0 * np.maximum(count, 1.0), power)), 0.0)
+    best = int(np.argmin(chance))
+    clear = power[best] >= LINE_CONTRAST * 2.0 * count[best]
+    if not clear or chance[best] + np.log(grid.size) > np.log(PLACE_FALSE_ALARM_RATE):
+        return None, 1.0
+    return float(grid[best]), float(floors[best] / count[best])
+
+
+def _waves(path: Path, frequency: float) -> tuple[Array, Array]:
+    """Sine and cosine at the residuals' times, shape (n, 2), and the residuals, shape (n,)."""
+    phase = 2.0 * np.pi * frequency * path.time
+    return np.column_stack([np.sin(phase), np.cos(phase)]), path.fit.residuals[path.index]
+
+
+def _drops(unexplained: Unexplained, frequency: float) -> Array:
+    """Drop of χ² when the line is removed, by run, shape (runs,)."""
+    found = []
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency)
+        seen = waves.T @ residual
+        found.append(float(seen @ np.linalg.solve(waves.T @ waves, seen)))
+    return np.array(found)
+
+
+def _steadiness(unexplained: Unexplained, frequency: float, floor: float) -> float:
+    """Share of the line in a half of a run that the other half predicts; 1 where phase and amplitude are kept."""
+    predicted, fitted = 0.0, 0.0
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency)
+        first = np.arange(residual.size) < residual.size // 2
+        ways = [np.linalg.lstsq(waves[own], residual[own], rcond=None)[0] for own in (first, ~first)]
+        for own, mine, other in ((first, *ways), (~first, *ways[::-1])):
+            before = float(residual[own] @ residual[own])
+            predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
+            fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
+    return predicted / max(fitted, 1e-300)  # chance lowers the one by 2 in every half, and raises the other

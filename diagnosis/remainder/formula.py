@@ -18,9 +18,8 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.problem import Point
 from diagnosis.policy import LAW_FALSE_RATE, LAW_REACHES, LAW_TERM_SHARE
-from diagnosis.remainder.bases import Ranges
-from diagnosis.remainder.ceiling import Unexplained
-from diagnosis.remainder.ridge import Normal, Ridge, held_out, total
+from diagnosis.remainder.ceiling import Normal, Ridge, Unexplained, held_out, total
+from diagnosis.remainder.paths import Ranges
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
@@ -56,20 +55,8 @@ class Term:
         """Powers of kg, m and s."""
         return self.formula.dimension({name: dimension(unit) for name, unit in (_NAMES | _INNER).items()})
 
-    @property
-    def units(self) -> dict[str, str]:
-        """Unit of each of its own numbers."""
-        return {name: _INNER[name] for name in self.inner}
-
     def value(self, places: Mapping[str, float | Array]) -> Array:
-        """The term along a motion, in its own unit.
-
-        Args:
-            places: by name, numbers or arrays of shape (n,).
-
-        Returns:
-            Shape (n,) or ().
-        """
+        """The term in its own unit, where numbers or arrays of shape (n,) are given by name; shape (n,) or ()."""
         return self.formula.value({**places, **self.inner})
 
 
@@ -93,14 +80,10 @@ _READING_PLACE = ("max(abs(y)-c,0)*sign(y)", "max(y-c,0)", "max(-y-c,0)")
 
 
 def terms(kind: str, r: Ranges) -> list[Term]:
-    """The terms that may explain a kind.
+    """The terms that may explain a kind of `KINDS`, without a factor for spring or wind.
 
-    Args:
-        kind: of `diagnosis.closure.KINDS`.
-        r: what the runs visit.
-
-    Returns:
-        Without a factor for spring or wind; none for kinds that no formula explains.
+    Their own numbers are near enough to each other for a fit to find the one between. There are no terms for kinds
+    that no formula explains.
     """
     makers = {
         "angle": (_of_angle,),
@@ -127,16 +110,11 @@ def _places(r: Ranges) -> Array:
     return np.linspace(0.08, 0.92, 15) * r.angle
 
 
-def _numbers(r: Ranges) -> Array:
-    """Waves over the range: from one to ten, near enough to each other for a fit to find the one between."""
-    return np.arange(1.0, 10.1, 0.35) * np.pi / r.angle
-
-
 def _of_angle(r: Ranges) -> Iterator[Term]:
     yield from map(Term, _ANGLE)
     yield from _grid(_ANGLE_WIDE, w=_widths(r, 9))
     yield from _grid(_ANGLE_PLACE, c=_places(r))
-    yield from _grid(("sin(n*b)",), n=_numbers(r))
+    yield from _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
     yield from _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
     yield from _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
 
@@ -176,7 +154,6 @@ _MOST_TERMS = 3
 _TRIED = 10  # terms of the greatest drop of χ² that are tried on held-out runs
 _FAR = 1e3  # bounds of a coefficient, in its first value
 _NEAR = 4.0  # bounds of a width or place, likewise
-_READING_KINDS = ("reading",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +161,7 @@ class Formula:
     """A sum of terms with coefficients.
 
     Args:
-        terms: in the order in which they were found.
         coefficients: of each, in N m, or rad for a reading, over the term's own unit.
-        of_reading: whether it is an error of the reading.
         delta: steps of the fit's common parameters that go with it, in their units, shape (common,).
         gained: drop of χ² on held-out runs, dimensionless.
     """
@@ -203,22 +178,17 @@ class Proposal:
     """A formula as an effect, fitted.
 
     Args:
-        kind: the effect's class.
-        table: the same as the table of an effects file, in the units of the fit.
-        fit: of the answer with the effect added.
+        table: of an effects file, in the units of the fit.
     """
 
-    kind: type[Effect]
     table: dict[str, Any]
     fit: Fit
 
 
 def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | None:
-    """Find the terms, one after another.
+    """Find the terms of a kind, one after another.
 
     Args:
-        unexplained: what is left.
-        kind: of `diagnosis.closure.KINDS`.
         closable: drop of χ² on held-out runs that the kind's own basis reaches.
 
     Returns:
@@ -233,15 +203,29 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
 
 
 def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | None:
-    candidates = _with_factors(unexplained, kind)
-    if not candidates:
-        return None
-    of_reading = kind in _READING_KINDS
+    of_reading = kind == "reading"
     if of_reading and unexplained.paths[0].run.derivative:
         return None  # an effect's reading is an angle
-    columns = [
-        _columns(unexplained, candidates, index, of_reading) for index in range(len(unexplained.paths))
-    ]
+    candidates = terms(kind, unexplained.ranges)
+    if kind == "wind":
+        fast = [Term("V*" + term.text, term.inner) for term in candidates if "r" in term.formula.names]
+        candidates = [Term("V^2*" + term.text, term.inner) for term in candidates] + fast
+    elif not of_reading and len({path.stiffness for path in unexplained.paths}) > 1:
+        candidates += [
+            Term("Kr*" + term.text, term.inner) for term in candidates if "b" in term.formula.names
+        ]
+    if not candidates:
+        return None
+    columns = []
+    for path in unexplained.paths:
+        places: dict[str, float | Array] = {
+            "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
+            "Kr": path.stiffness, "omega": path.still_omega,
+        }  # fmt: skip
+        values = np.column_stack(
+            [np.broadcast_to(term.value(places), path.angle.shape) for term in candidates]
+        )
+        columns.append(path.seen(values) if of_reading else path.response(values))
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = unexplained.normals([c / size for c in columns])
     chosen, gained = _greedy(unexplained, parts, len(candidates), closable)
@@ -249,8 +233,7 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         chosen.pop()
     if not chosen:
         return None
-    whole = _of(total(parts), chosen)
-    solution = Ridge(whole, 0.0).solution
+    solution = Ridge(_of(total(parts), chosen), 0.0).solution
     common = unexplained.size.size
     return Formula(
         tuple(candidates[i] for i in chosen),
@@ -259,29 +242,6 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         solution[:common] / unexplained.size,
         gained,
     )
-
-
-def _with_factors(unexplained: Unexplained, kind: str) -> list[Term]:
-    """The terms of a kind: with the wind, or as they are and, those of the angle, in proportion to the spring."""
-    found = terms(kind, unexplained.ranges)
-    if kind == "wind":
-        fast = [Term("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
-        return [Term("V^2*" + term.text, term.inner) for term in found] + fast
-    if kind in _READING_KINDS or len({path.stiffness for path in unexplained.paths}) == 1:
-        return found
-    return found + [Term("Kr*" + term.text, term.inner) for term in found if "b" in term.formula.names]
-
-
-def _columns(unexplained: Unexplained, candidates: Sequence[Term], index: int, of_reading: bool) -> Array:
-    """Responses to every term in one run, shape (rows, terms)."""
-    path = unexplained.paths[index]
-    places: dict[str, float | Array] = {
-        "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
-        "Kr": path.stiffness, "omega": path.still_omega,
-    }  # fmt: skip
-    shape = path.angle.shape
-    values = np.column_stack([np.broadcast_to(term.value(places), shape) for term in candidates])
-    return path.seen(values) if of_reading else path.response(values)
 
 
 def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
@@ -331,17 +291,10 @@ def _drops(whole: Normal, chosen: Sequence[int]) -> Array:
 
 
 def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal | None:
-    """Fit a formula like any other effect.
-
-    Args:
-        unexplained: what is left, whose fit the effect is added to.
-        formula: from `choose`.
-        kind: of `diagnosis.closure.KINDS`; names the effect.
-
-    Returns:
-        The effect and its fit; None where the fit fails.
-    """
-    table = effect_table(formula, _free_name(f"proposed_{kind}"))
+    """Fit a formula from `choose` like any other effect, named after the kind; None where the fit fails."""
+    taken = {known.name for known in known_effects()}
+    numbered = (f"proposed_{kind}_{number}" for number in range(2, len(taken) + 3))
+    table = effect_table(formula, next(n for n in chain((f"proposed_{kind}",), numbered) if n not in taken))
     try:
         effect = effect_of(table)
     except TunnelError:
@@ -358,48 +311,42 @@ def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal |
             if found[-1].excess < (1.0 - LAW_REACHES) * base.excess:
                 break
     best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
-    return None if best is None or best.total >= base.total else Proposal(effect, table, best)
-
-
-def _free_name(name: str) -> str:
-    """The name, or with a number where it is an effect's already."""
-    taken = {kind.name for kind in known_effects()}
-    numbered = (f"{name}_{number}" for number in range(2, len(taken) + 3))
-    return next(free for free in chain((name,), numbered) if free not in taken)
+    return None if best is None or best.total >= base.total else Proposal(table, best)
 
 
 def effect_table(formula: Formula, name: str) -> dict[str, Any]:
-    """A formula as the table of an effects file.
+    """A formula of the fit's units as the table of an effects file, its values those of the formula."""
 
-    Args:
-        formula: of the fit's units.
+    def coefficient(value: float, of: Dimension, over: Dimension, default: float) -> dict[str, object]:
+        unit, bound = dimension_text(product(of, over, -1.0)), _FAR * abs(value)
+        return {"unit": unit, "scale": value, "lower": -bound, "upper": bound, "default": default}
 
-    Returns:
-        The table, its values those of the formula.
-    """
+    first, severity = formula.terms[0].dimension, formula.coefficients[0]
     aim = dimension("rad" if formula.of_reading else "N m")
-    first, severity = formula.terms[0], formula.coefficients[0]
-    parameters: dict[str, dict[str, object]] = {
-        "k": _coefficient(severity, dimension_text(product(aim, first.dimension, -1.0)), severity=True)
-    }
+    parameters = {"k": coefficient(severity, aim, first, default=0.0)}
     texts = []
     for number, (term, value) in enumerate(zip(formula.terms, formula.coefficients, strict=True), 1):
         text = term.text
         for own, inner in term.inner.items():
             text = re.sub(rf"\b{own}\b", f"{own}{number}", text)
-            parameters[f"{own}{number}"] = _inner(inner, term.units[own])
+            ends = sorted((inner / _NEAR, inner * _NEAR)) if inner else [-1.0, 1.0]
+            parameters[f"{own}{number}"] = {
+                "unit": _INNER[own], "scale": inner or ends[1], "lower": ends[0], "upper": ends[1],
+                "default": inner,
+            }  # fmt: skip
         if number > 1:
-            ratio = product(first.dimension, term.dimension, -1.0)
-            parameters[f"a{number}"] = _coefficient(value / severity, dimension_text(ratio))
+            parameters[f"a{number}"] = coefficient(
+                value / severity, first, term.dimension, default=value / severity
+            )
             text = f"a{number}*{text}"
         texts.append(text)
-    whole = " + ".join(texts)
-    whole = f"k*({whole})" if len(texts) > 1 else f"k*{whole}"
+    whole = f"k*({' + '.join(texts)})" if len(texts) > 1 else f"k*{texts[0]}"
     windy = all(term.text.startswith("V") for term in formula.terms)
     names = set().union(*(term.formula.names for term in formula.terms))
+    channel = "damping" if "r" in names else "stiffness" if "b" in names else "forcing"
     return {
         "name": name,
-        "channel": "sensor" if formula.of_reading else _channel(names),
+        "channel": "sensor" if formula.of_reading else channel,
         "condition": "wind_on" if windy else "always",
         **({"reading": f"y + {whole}"} if formula.of_reading else {"moment": whole}),
         "summary": "A formula that tunnel diagnose proposed for what no effect explains.",
@@ -407,32 +354,8 @@ def effect_table(formula: Formula, name: str) -> dict[str, Any]:
     }
 
 
-def _channel(names: set[str]) -> str:
-    if "r" in names:
-        return "damping"
-    return "stiffness" if "b" in names else "forcing"
-
-
-def _coefficient(value: float, unit: str, *, severity: bool = False) -> dict[str, object]:
-    bound = _FAR * abs(value)
-    return {
-        "unit": unit, "scale": value, "lower": -bound, "upper": bound, "default": 0.0 if severity else value,
-    }  # fmt: skip
-
-
-def _inner(value: float, unit: str) -> dict[str, object]:
-    ends = sorted((value / _NEAR, value * _NEAR)) if value else [-1.0, 1.0]
-    return {"unit": unit, "scale": value or ends[1], "lower": ends[0], "upper": ends[1], "default": value}
-
-
 def effect_of(table: dict[str, Any]) -> type[Effect]:
-    """The class of an effect that a table of an effects file states.
-
-    Args:
-        table: from `effect_table`.
-
-    Returns:
-        The class, not registered.
+    """The class of an effect that a table from `effect_table` states, not registered.
 
     Raises:
         TunnelError: when the effect cannot be stated.

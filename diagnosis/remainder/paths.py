@@ -1,4 +1,4 @@
-"""The measured path of every run, and the reading that a further moment along it would cause.
+"""The measured path of every run, the reading that a further moment along it would cause, and bases of moments.
 
 The nominal model is linear, so that a missing moment m changes the reading by the response of the linear rig to
 m(t), however large the gap is, provided that m is evaluated along the true motion. The measured motion is close to
@@ -7,10 +7,12 @@ it: the fitted motion and the smoothed residual together.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
@@ -25,11 +27,7 @@ _ROWS = 24  # per cycle, to which white residuals are averaged: the motion has n
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """One run as a law sees it.
-
-    Args:
-        fit: whose residuals are to be explained.
-    """
+    """One run as a law sees it; the fit's residuals are to be explained."""
 
     fit: Fit
     index: int
@@ -56,9 +54,8 @@ class Path:
         fitted = run.reading - residual - self.fit.zero(self.index)
         slope = np.gradient(fitted, run.interval)
         omega = self.omega
-        if (
-            run.derivative
-        ):  # each derivative of an oscillation leads by a quarter cycle and is ω times as large
+        if run.derivative:
+            # each derivative of an oscillation leads by a quarter cycle and is ω times as large
             angle, rate = ((-slope, fitted * omega**2), (-fitted, -slope))[run.derivative - 1]
             return angle / omega**2, rate / omega**2
         large = float(np.mean(self.fit.residuals[self.index] ** 2)) > _LARGE
@@ -111,25 +108,14 @@ class Path:
         return np.ravel(found[0]), found[1]
 
     def response(self, moment: Array) -> Array:
-        """What a moment adds to the reading of the rig that was at rest.
-
-        Args:
-            moment: N m, shape (n, k).
-
-        Returns:
-            White residuals averaged in groups, shape (rows, k), in noise standard deviations.
-        """
+        """What a moment, N m, shape (n, k), adds to the reading of the rig that was at rest, as `rows`."""
         from scipy.signal import lfilter  # only here: slow to load
 
         run = self.run
-        if self._white:
+        if run.samples is None and run.taps.size == 1:  # white noise: the rows are filtered
             rows = self.rows(moment) / np.sqrt(run.noise_variance)
             return np.asarray(lfilter(*self._filter(self.group * run.interval), rows, axis=0))
         return self.seen(lfilter(*self._filter(run.interval), moment, axis=0))
-
-    @property
-    def _white(self) -> bool:
-        return self.run.samples is None and self.run.taps.size == 1
 
     @cached_property
     def group(self) -> int:
@@ -137,14 +123,7 @@ class Path:
         return max(1, round(2.0 * np.pi / (self.omega * self.run.interval * _ROWS)))
 
     def seen(self, reading: Array) -> Array:
-        """A change of the reading as rows.
-
-        Args:
-            reading: unit of the reading, shape (n, k).
-
-        Returns:
-            Shape (rows, k), in noise standard deviations.
-        """
+        """A change of the reading, in its unit, shape (n, k), as `rows`."""
         run = self.run
         if run.samples is None:
             return self.rows(run.white(reading) / np.sqrt(run.noise_variance))
@@ -153,14 +132,7 @@ class Path:
         return self.rows(white * np.sqrt(count / (run.block * run.noise_variance)))
 
     def rows(self, white: Array) -> Array:
-        """Residuals averaged in groups.
-
-        Args:
-            white: in noise standard deviations, shape (n, k) or (n,).
-
-        Returns:
-            Of the same noise, shape (rows, k) or (rows,); an incomplete last group is left out.
-        """
+        """White residuals, shape (n, k) or (n,), averaged in whole groups to rows of the same noise."""
         count = white.shape[0] // self.group
         grouped = white[: count * self.group].reshape(count, self.group, *white.shape[1:])
         return np.asarray(grouped.sum(axis=1) / np.sqrt(self.group))
@@ -179,8 +151,8 @@ class Path:
         free = np.column_stack([waves.sum(axis=1).real, (waves[:, 0] - waves[:, 1]).imag])
         if abs(roots[0].imag) < 1e-9:
             free = waves.real
-        own = [self.fit.jacobian[self.index][1][:, 2:]]
-        return np.linalg.qr(np.column_stack([self.seen(free), *map(self.rows, own)]))[0]
+        own = self.rows(self.fit.jacobian[self.index][1][:, 2:])
+        return np.linalg.qr(np.column_stack([self.seen(free), own]))[0]
 
     @cached_property
     def nominal(self) -> Array:
@@ -197,19 +169,191 @@ class Path:
         moments = [-self.angle if data.normalised else swing, -self.rate]
         if data.wind_on:
             moments += [pressure * self.angle, lag * self.rate]
-        columns = [self.response(np.column_stack(moments))]
-        known = len(moments)
-        columns.append(self.rows(self.fit.jacobian[self.index][0][:, known:]))
-        return np.column_stack(columns)
+        others = self.rows(self.fit.jacobian[self.index][0][:, len(moments) :])
+        return np.column_stack([self.response(np.column_stack(moments)), others])
 
 
 def paths(fit: Fit) -> list[Path]:
-    """The paths of all runs.
+    """The paths of all runs of the fit whose residuals are to be explained."""
+    return [Path(fit, index) for index in range(len(fit.problem.data.runs))]
+
+
+_FINE, _MEDIUM, _COARSE = 33, 15, 7  # splines over the range of the motion
+_SLOW = 16  # splines over the time of a run
+_PER_CYCLE = 6.0  # splines in time that follow a blow
+_SETTLED = 0.02  # of the greatest rate: within it, dry friction may be any moment
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Some places at which a basis is evaluated, instead of along a `Path`.
 
     Args:
-        fit: whose residuals are to be explained.
-
-    Returns:
-        One per run, in order.
+        angle: rad, shape (n,).
+        rate: rad/s, shape (n,).
+        time: s, shape (n,).
+        stiffness: of the spring, N m/rad.
+        speed: of the wind, m/s.
     """
-    return [Path(fit, index) for index in range(len(fit.problem.data.runs))]
+
+    angle: Array
+    rate: Array
+    time: Array
+    stiffness: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What the runs visit.
+
+    Args:
+        angle: greatest, rad.
+        rate: greatest, rad/s.
+        time: latest, s.
+        cycle: of the motion, s.
+        stiffness: median over the runs, N m/rad.
+        speed: greatest wind speed, m/s; 1 where there is no wind.
+    """
+
+    angle: float
+    rate: float
+    time: float
+    cycle: float
+    stiffness: float
+    speed: float
+
+
+def ranges(runs: Sequence[Path]) -> Ranges:
+    """The ranges of some runs."""
+    return Ranges(
+        angle=max(float(np.max(np.abs(path.angle))) for path in runs),
+        rate=max(float(np.max(np.abs(path.rate))) for path in runs),
+        time=max(float(path.time[-1]) for path in runs),
+        cycle=float(np.median([2.0 * np.pi / path.omega for path in runs])),
+        stiffness=float(np.median([path.stiffness for path in runs])),
+        speed=max(max(path.speed for path in runs), 1.0),
+    )
+
+
+def _splines(values: Array, low: float, high: float, count: int) -> Array:
+    """Cubic B-splines on even knots, shape (n, count); values outside the range are taken at its end."""
+    inner = np.linspace(low, high, count - 2)
+    knots = np.concatenate([[low] * 3, inner, [high] * 3])
+    return np.asarray(BSpline.design_matrix(np.clip(values, low, high), knots, 3).toarray())
+
+
+def _times(one: Array, other: Array) -> Array:
+    """All products of two sets of columns."""
+    return np.asarray((one[:, :, None] * other[:, None, :]).reshape(one.shape[0], -1))
+
+
+Motion = Path | Places
+Basis = Callable[[Motion, Ranges], Array]
+
+
+def _spring(at: Motion, r: Ranges) -> float:
+    """How far the run's spring is from the median, a share."""
+    return at.stiffness / r.stiffness - 1.0
+
+
+def _of_angle(at: Motion, r: Ranges, count: int) -> Array:
+    return _splines(at.angle, -r.angle, r.angle, count)
+
+
+def _of_rate(at: Motion, r: Ranges, count: int) -> Array:
+    return _splines(at.rate, -r.rate, r.rate, count)
+
+
+def _of_both(at: Motion, r: Ranges) -> Array:
+    return _times(_of_angle(at, r, _COARSE), _of_rate(at, r, _COARSE))
+
+
+def _wide(values: Array, reach: float) -> Array:
+    """Wide splines, which a law uses before narrow ones: without them the prior would prefer a rough law."""
+    found = [_splines(values, -reach, reach, count) * (_FINE / count) for count in (_MEDIUM, _COARSE)]
+    return np.column_stack(found)
+
+
+def _rate_shapes(at: Motion, r: Ranges) -> Array:
+    u = at.rate / r.rate
+    return np.column_stack([u, np.tanh(u / _SETTLED), np.abs(u)])
+
+
+def angle(at: Motion, r: Ranges) -> Array:
+    """Moments of the angle alone, the same for all springs or in proportion to the spring."""
+    wide = _wide(at.angle, r.angle)
+    return np.column_stack([_of_angle(at, r, _FINE), wide, _spring(at, r) * wide])
+
+
+def rate(at: Motion, r: Ranges) -> Array:
+    """Moments of the rate alone."""
+    wide = _wide(at.rate, r.rate)
+    return np.column_stack([_of_rate(at, r, _FINE), _rate_shapes(at, r), wide, _spring(at, r) * wide])
+
+
+def state(at: Motion, r: Ranges) -> Array:
+    """Moments of angle and rate."""
+    shaped = _times(_of_angle(at, r, 21), _rate_shapes(at, r))
+    return np.column_stack([angle(at, r), rate(at, r), shaped, _of_both(at, r)])
+
+
+def wind(at: Motion, r: Ranges) -> Array:
+    """Moments of angle and rate in proportion to the dynamic pressure, or to the wind speed if of the rate."""
+    share = at.speed / r.speed
+    still = [
+        share * _of_angle(at, r, _FINE),
+        _of_both(at, r) * share,
+        _times(_of_angle(at, r, _COARSE), _rate_shapes(at, r)[:, :1]),
+    ]
+    return np.column_stack(still) * share
+
+
+def time(at: Motion, r: Ranges) -> Array:
+    """Moments that change in time, alike in all runs: alone, as a stiffness, damping or friction."""
+    slow = _splines(at.time, 0.0, r.time, _SLOW)
+    fine = _splines(at.time, 0.0, r.time, max(4, round(_PER_CYCLE * r.time / r.cycle)))
+    stiffness = at.angle / r.angle * np.array([[1.0], [_spring(at, r)], [(at.speed / r.speed) ** 2]])
+    share = np.column_stack([*stiffness, at.rate / r.rate, _rate_shapes(at, r)[:, 1]])
+    return np.column_stack([fine, _times(slow, share)])
+
+
+def reading(at: Motion, r: Ranges) -> Array:
+    """Errors of the reading, as shares of the greatest angle: of angle, rate and time, alike in all runs."""
+    columns = [
+        _of_angle(at, r, 2 * _FINE),
+        _of_rate(at, r, _MEDIUM),
+        _of_both(at, r),
+        _splines(at.time, 0.0, r.time, 4 * _SLOW),
+        _splines(at.time, 0.0, r.time, _SLOW) * (at.angle / r.angle)[:, None],
+    ]
+    return np.column_stack(columns)
+
+
+def event(at: Motion, r: Ranges) -> Array:
+    """Moments that change in time, different in every run."""
+    first, last = float(at.time[0]), float(at.time[-1])
+    return _splines(at.time, first, last, max(4, round(_PER_CYCLE * (last - first) / r.cycle)))
+
+
+def between(at: Motion, r: Ranges) -> Array:
+    """A steady moment, stiffness and damping of its own in every run."""
+    return np.column_stack([np.ones(at.angle.size), at.angle / r.angle, at.rate / r.rate])
+
+
+def wander(at: Motion, r: Ranges) -> Array:
+    """A zero of the reading that wanders or jumps, different in every run: steps, whose sum is a random walk."""
+    knots = np.linspace(at.time[0], at.time[-1], max(4, round(_PER_CYCLE * r.time / r.cycle)))[1:-1]
+    return np.asarray((at.time[:, None] > knots[None, :]).astype(np.float64))
+
+
+#: Kinds whose law holds in every run, so that it predicts a run left out; the simpler first.
+COMMON: Mapping[str, Basis] = {
+    "angle": angle, "rate": rate, "wind": wind, "state": state, "time": time, "reading": reading,
+}  # fmt: skip
+
+#: Kinds that are different in every run, so that only short gaps in it can be predicted.
+SINGLE: Mapping[str, Basis] = {"between": between, "wander": wander, "event": event}
+
+#: Kinds that are errors of the reading; the others are moments.
+OF_READING = frozenset({"reading", "wander"})

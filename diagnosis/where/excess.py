@@ -39,7 +39,6 @@ class RunExcess:
     """One run's squared residual by frequency.
 
     Args:
-        id: of the run.
         frequency: of the coefficients, shape (n,), Hz.
         power: squared coefficients, shape (n,), in noise variances: one each under white noise.
         resonance: frequency of the run's free motion, Hz.
@@ -69,6 +68,10 @@ class RunExcess:
         """Index into `BANDS` of every coefficient, shape (n,)."""
         return np.searchsorted([edge for _, edge in BANDS], self.frequency / self.resonance, side="right")
 
+    def inside(self, bands: tuple[str, ...]) -> NDArray[np.bool_]:
+        """Which coefficients lie in some bands, shape (n,)."""
+        return np.isin(self.band, [index for index, (name, _) in enumerate(BANDS) if name in bands])
+
     def p_value(self) -> float:
         """Probability of as much power without a gap: the least of the tests, times their number."""
         tests = [chance(float(self.power.sum()), self.power.size - self.absorbed, self.relative)]
@@ -81,14 +84,7 @@ class RunExcess:
 
 
 def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
-    """Every run's squared residual by frequency.
-
-    Args:
-        campaign: the records, which give the uncertainty of the noise.
-
-    Returns:
-        One per run, in order.
-    """
+    """Every run's squared residual by frequency; the campaign's records give the uncertainty of the noise."""
     data = fit.problem.data
     records = {run.id: run.record for run in campaign.runs}
     relative = [estimate_variance(records[run.id])[1] for run in data.runs]
@@ -116,7 +112,6 @@ class BandExcess:
     """One band of the residual, all runs together.
 
     Args:
-        band: its name in `BANDS`.
         excess: sum of power beyond that of white noise, in units of the noise variance.
         mean: the same by coefficient, a ratio.
         p_value: probability of as much without a gap.
@@ -129,14 +124,7 @@ class BandExcess:
 
 
 def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
-    """The bands of a campaign's residual.
-
-    Args:
-        runs: by run.
-
-    Returns:
-        One per band that holds coefficients.
-    """
+    """The bands of a campaign's residual that hold coefficients."""
     result = []
     for index, (name, _) in enumerate(BANDS):
         power = np.concatenate([run.power[run.band == index] for run in runs])
@@ -145,23 +133,13 @@ def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
         absorbed = sum(run.absorbed for run in runs) if name == "f0" else 0.0
         relative = float(np.mean([run.relative for run in runs]))
         excess = float(power.sum()) - power.size
-        result.append(
-            BandExcess(
-                name,
-                excess,
-                excess / power.size,
-                chance(excess + power.size, power.size - absorbed, relative),
-            )
-        )
+        p_value = chance(excess + power.size, power.size - absorbed, relative)
+        result.append(BandExcess(name, excess, excess / power.size, p_value))
     return tuple(result)
 
 
 def bands_beyond_chance(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
-    """The bands whose power is beyond chance; all of them where none is.
-
-    Args:
-        bands: of a campaign.
-    """
+    """The bands whose power is beyond chance; all of them where none is."""
     level = PLACE_FALSE_ALARM_RATE / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
     return found or tuple(band.band for band in bands)
@@ -172,14 +150,11 @@ def within_bands(residual: Array, run: RunExcess, bands: tuple[str, ...]) -> tup
 
     Args:
         residual: scaled, shape (n,).
-        run: its power.
-        bands: names.
 
     Returns:
         The filtered residual, shape (n,), and the share of white noise's power that passes.
     """
-    index = [i for i, (name, _) in enumerate(BANDS) if name in bands]
-    keep = np.isin(run.band, index)
+    keep = run.inside(bands)
     filtered = idct(np.where(keep, dct(residual, norm="ortho"), 0.0), norm="ortho")
     return np.asarray(filtered, dtype=np.float64), float(keep.mean())
 
@@ -192,7 +167,7 @@ class Profile:
         edges: of the bins, shape (n + 1,), in the quantity's unit.
         energy: sum over a bin of power beyond that of white noise, shape (n,), in noise variances.
         mean: the same by residual, shape (n,); NaN where a bin is empty.
-        std: of the mean where there is no gap, shape (n,); likewise.
+        std: of the mean where there is no gap, shape (n,).
     """
 
     edges: Array
@@ -200,9 +175,9 @@ class Profile:
     mean: Array
     std: Array
 
-    def interval(self, share: float = INTERVAL_SHARE) -> tuple[float, float] | None:
-        """The shortest interval that holds a share of the excess; None where there is no excess."""
-        return shortest_interval(self.edges, self.energy, share)
+    def interval(self) -> tuple[float, float] | None:
+        """The shortest interval that holds `INTERVAL_SHARE` of the excess; None where there is no excess."""
+        return shortest_interval(self.edges, self.energy, INTERVAL_SHARE)
 
 
 def profile(
@@ -266,7 +241,6 @@ class ResidualLine:
     """A line in one run.
 
     Args:
-        run: id.
         frequency: Hz.
         share: of the run's excess squared residual, a fraction.
         amplitude: of the reading, rad.
@@ -279,35 +253,34 @@ class ResidualLine:
 
 
 def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[ResidualLine, ...]:
-    """The lines that stand out of the residual of single runs.
-
-    Args:
-        runs: squared residuals by frequency.
-        data: the runs they belong to.
-
-    Returns:
-        At most two per run, strongest first in each, in the order of the runs.
-    """
-    return tuple(line for run, own in zip(runs, data, strict=True) for line in _lines(run, own, len(runs)))
-
-
-def _lines(run: RunExcess, own: RunData, runs: int) -> list[ResidualLine]:
-    local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
-    open_to = away_from_motion(run.frequency / run.resonance)
-    found: list[ResidualLine] = []
-    for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
-        excess = float(local[index]) - _WIDTH
-        unlikely = runs * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
-        if unlikely > PLACE_FALSE_ALARM_RATE or len(found) == _PER_RUN:
-            break
-        near = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
-        if not open_to[index] or near or local[index] < LINE_CONTRAST * _around(local, index):
-            continue
-        whole = max(float(run.power.sum()) - run.power.size, excess)
-        frequency = float(np.average(run.frequency[_near(index, run)], weights=run.power[_near(index, run)]))
-        amplitude = float(own.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
-        found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
-    return found
+    """The lines that stand out of the residual of single runs: at most two in each, the stronger first."""
+    lines: list[ResidualLine] = []
+    for run, own in zip(runs, data, strict=True):
+        local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
+        open_to = away_from_motion(run.frequency / run.resonance)
+        found: list[ResidualLine] = []
+        for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
+            excess = float(local[index]) - _WIDTH
+            unlikely = len(runs) * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
+            if unlikely > PLACE_FALSE_ALARM_RATE or len(found) == _PER_RUN:
+                break
+            close = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
+            beside = np.concatenate(
+                [
+                    local[max(index - _AROUND, 0) : max(index - _WIDTH, 0)],
+                    local[index + _WIDTH : index + _AROUND],
+                ]
+            )
+            around = float(np.median(beside)) if beside.size else 0.0
+            if not open_to[index] or close or local[index] < LINE_CONTRAST * around:
+                continue
+            near = slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
+            whole = max(float(run.power.sum()) - run.power.size, excess)
+            frequency = float(np.average(run.frequency[near], weights=run.power[near]))
+            amplitude = float(own.noise_at(frequency)) * float(np.sqrt(2.0 * excess / run.power.size))
+            found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
+        lines += found
+    return tuple(lines)
 
 
 def away_from_motion(order: Array) -> NDArray[np.bool_]:
@@ -319,15 +292,3 @@ def away_from_motion(order: Array) -> NDArray[np.bool_]:
     harmonic = (np.abs(order - np.round(order)) < _HARMONIC) & (order < 3.5)
     harmonic |= np.abs(order - 1.0) < _MOTION
     return (order > _LOWEST) & ~harmonic
-
-
-def _near(index: int, run: RunExcess) -> slice:
-    return slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
-
-
-def _around(local: Array, index: int) -> float:
-    """Median of the smoothed power on either side."""
-    beside = np.concatenate(
-        [local[max(index - _AROUND, 0) : max(index - _WIDTH, 0)], local[index + _WIDTH : index + _AROUND]]
-    )
-    return float(np.median(beside)) if beside.size else 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -24,11 +23,10 @@ from diagnosis.policy import (
     SECOND_HARMONIC_SHARE,
     SINGLE_RUN_SHARE,
 )
-from diagnosis.where.backbone import Backbone, drift
+from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval
 from diagnosis.where.survey import Survey, survey
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True)
@@ -37,55 +35,88 @@ class Finding:
 
     Args:
         value: the conclusion; None where the runs do not allow one.
-        reason: why, a clause.
     """
 
     value: str | None
     reason: str
 
 
-def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
-    """Whether the gap needs wind.
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a gap is.
 
     Args:
-        nominal: fit of the nominal model to all runs.
-
-    Returns:
-        ``wind_on`` where the wind-off runs, fitted alone, show no gap.
+        runs: ids of the runs beyond chance.
     """
-    runs = nominal.problem.data.runs
+
+    survey: Survey
+    runs: tuple[str, ...]
+    channel: Finding
+    condition: Finding
+
+
+def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise_ratio: float = 1.0) -> Place:
+    """Find where the nominal model departs from the runs.
+
+    Args:
+        campaign: as measured, of the units of the fit.
+        nominal: fit of the nominal model.
+        hum_removed: whether a hum was removed before the fit. It is part of the gap: the residuals get it back.
+        noise_ratio: of the noise variance of the fit to the one that counts: where the readings' step is coarser
+            than stated, it raises the noise found in the records, and the stated noise is the measure.
+    """
+    data, residuals = nominal.problem.data, nominal.residuals
+    if hum_removed:
+        given = prepare(campaign, {run.id: run.noise_variance for run in data.runs}, data.similarity)
+        readings = {run.id: run.reading for run in given.runs}
+        # the fit may leave a record's start out; both end together
+        residuals = [
+            r + run.scaled(readings[run.id][-run.reading.size :] - run.reading)
+            for r, run in zip(residuals, data.runs, strict=True)
+        ]
+    scaled = replace(nominal, residuals=[r * np.sqrt(noise_ratio) for r in residuals])
+    excesses = run_excesses(campaign, scaled)
+    runs = runs_beyond_chance(excesses)
+    found = survey(nominal, scaled, excesses, runs)
+    condition = infer_condition(campaign, nominal, found)
+    return Place(found, runs, infer_channel(nominal, found, condition.value), condition)
+
+
+def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
+    """The runs beyond chance (1 % over all) that have a tenth or more of the largest excess among them."""
+    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < PLACE_FALSE_ALARM_RATE}
+    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
+    return tuple(name for name, excess in clear.items() if excess > least)
+
+
+def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
+    """Whether the gap needs wind: ``wind_on`` where the wind-off runs, fitted alone, show no gap."""
+    runs, shown = nominal.problem.data.runs, found.maps.runs
     off = tuple(run.id for run in runs if not run.wind_on)
     if len(off) == len(runs):
         return Finding("always", "it is there with the wind off")
+    undetermined = "whether it needs wind cannot be determined"
     if not off:
-        return Finding(None, "whether it needs wind cannot be determined, since the wind is on in every run")
-    if min(run.p_value for run in found.maps.runs) * len(runs) > PLACE_FALSE_ALARM_RATE:
-        return Finding(None, "whether it needs wind cannot be determined, since no single run shows it")
-    lone = _lone_run(found)
-    if lone is not None and lone not in off:
-        return Finding(None, f"whether it needs wind cannot be determined from one run alone ({lone})")
+        return Finding(None, f"{undetermined}, since the wind is on in every run")
+    if min(run.p_value for run in shown) * len(runs) > PLACE_FALSE_ALARM_RATE:
+        return Finding(None, f"{undetermined}, since no single run shows it")
+    most = max(shown, key=lambda run: run.share)
+    if len(shown) >= 3 and most.share > SINGLE_RUN_SHARE and most.id not in off:
+        return Finding(None, f"{undetermined} from one run alone ({most.id})")
     # without coefficients and a gain that these runs lack
     data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
-        return Finding(
-            None,
-            "whether it needs wind cannot be determined, since the wind-off runs could not be fitted alone",
-        )
+        return Finding(None, f"{undetermined}, since the wind-off runs could not be fitted alone")
     excesses = run_excesses(campaign, alone)
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
     count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
+    show = f"{count}, fitted alone, show{'s' * (len(off) == 1)}"
     if min(tests) * len(tests) < PLACE_FALSE_ALARM_RATE:
-        return Finding("always", f"{count}, fitted alone, show{'s' * (len(off) == 1)} it too")
-    return Finding("wind_on", f"{count}, fitted alone, show{'s' * (len(off) == 1)} no gap")
-
-
-def _lone_run(found: Survey) -> str | None:
-    runs = found.maps.runs
-    top = max(runs, key=lambda run: run.share)
-    return top.id if len(runs) >= 3 and top.share > SINGLE_RUN_SHARE else None
+        return Finding("always", f"{show} it too")
+    return Finding("wind_on", f"{show} no gap")
 
 
 def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | None:
@@ -108,27 +139,27 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
 
 
 def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding:
-    """What the gap acts on, from features of the residual.
-
-    Args:
-        nominal: fit of the nominal model.
-        condition: as inferred.
-
-    Returns:
-        The channel; None where no feature decides.
-    """
+    """What the gap acts on, from features of the residual; the condition is the one inferred."""
     blow = blow_interval(found)
     if blow is not None:
         return Finding(
             "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
         )
     decided = _by_band(nominal, found, condition) or _between_runs(nominal, found)
-    if decided is None and all(run.drive is not None for run in nominal.problem.data.runs):
+    if decided is not None:
+        return decided
+    if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, "every run is driven, so that no decay shows it")
-    return decided or _by_drift(found)
+    frequency, damping = drift(list(found.maps.backbones))
+    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
+        return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
+    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
+        return Finding("damping", "the damping shifts along the decay more than the frequency does")
+    return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
 
 
 def _by_band(nominal: Fit, found: Survey, condition: str | None) -> Finding | None:
+    """The channel where most of the excess is a line or lies beside the frequency of the motion."""
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
     lines = [line for line in found.maps.lines if line.share > 0.5 * DOMINANT_SHARE]
@@ -154,17 +185,18 @@ def _by_band(nominal: Fit, found: Survey, condition: str | None) -> Finding | No
 
 def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
     """The channel where every run alone is linear, but the runs do not agree on the coefficients."""
-    curves = found.maps.backbones
     sizes = [run.reading.size for run in nominal.problem.data.runs]
-    alone = [curve.alone_excess for curve in curves]
-    if len(curves) < 2 or any(value is None for value in alone):
-        return None
-    left = sum(max(v or 0.0, 0.0) * n for v, n in zip(alone, sizes, strict=True))
+    left, shifts = 0.0, []
+    for curve, size in zip(found.maps.backbones, sizes, strict=True):
+        if curve.alone_excess is None or curve.alone_frequency is None or curve.alone_zeta is None:
+            return None
+        left += max(curve.alone_excess, 0.0) * size
+        frequency = curve.alone_frequency / curve.nominal_frequency - 1.0
+        shifts.append((frequency, curve.alone_zeta - curve.nominal_zeta))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
-    if left > BETWEEN_RUNS_SHARE * whole:
+    if len(sizes) < 2 or left > BETWEEN_RUNS_SHARE * whole:
         return None
-    shifts = np.array([_shift(curve) for curve in curves])
-    frequency, damping = np.sum(shifts**2, axis=0)
+    frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
         return Finding(
             None,
@@ -172,82 +204,3 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
             "wrong, or a stiffness is missing",
         )
     return Finding("damping", "each run alone is linear, but the runs' damping does not agree with one model")
-
-
-def _shift(curve: Backbone) -> tuple[float, float]:
-    """Departure of a run's own frequency (relative) and damping ratio from those of the nominal model."""
-    assert curve.alone_frequency is not None
-    assert curve.alone_zeta is not None
-    return curve.alone_frequency / curve.nominal_frequency - 1.0, curve.alone_zeta - curve.nominal_zeta
-
-
-def _by_drift(found: Survey) -> Finding:
-    frequency, damping = drift(list(found.maps.backbones))
-    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
-        return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
-        return Finding("damping", "the damping shifts along the decay more than the frequency does")
-    return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """Where a gap is.
-
-    Args:
-        survey: maps of the residuals.
-        runs: ids of the runs beyond chance.
-        channel: what it acts on.
-        condition: when it acts.
-    """
-
-    survey: Survey
-    runs: tuple[str, ...]
-    channel: Finding
-    condition: Finding
-
-
-def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise_ratio: float = 1.0) -> Place:
-    """Find where the nominal model departs from the runs.
-
-    Args:
-        campaign: as measured, of the units of the fit.
-        nominal: fit of the nominal model.
-        hum_removed: whether a hum was removed before the fit. It is part of the gap: the residuals get it back.
-        noise_ratio: of the noise variance of the fit to the one that counts: where the readings' step is coarser
-            than stated, it raises the noise found in the records, and the stated noise is the measure.
-    """
-    residuals = _with_hum(campaign, nominal) if hum_removed else nominal.residuals
-    scaled = dataclasses.replace(nominal, residuals=[r * np.sqrt(noise_ratio) for r in residuals])
-    excesses = run_excesses(campaign, scaled)
-    runs = runs_beyond_chance(excesses)
-    found = survey(nominal, scaled, excesses, runs)
-    condition = infer_condition(campaign, nominal, found)
-    return Place(found, runs, infer_channel(nominal, found, condition.value), condition)
-
-
-def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
-    """The runs that show the gap.
-
-    Args:
-        excesses: of all runs, from the nominal model.
-
-    Returns:
-        Ids of the runs beyond chance (false-alarm rate 1 % over all of them) that have a tenth or more of the
-        largest excess among them, in the campaign's order.
-    """
-    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < PLACE_FALSE_ALARM_RATE}
-    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
-    return tuple(name for name, excess in clear.items() if excess > least)
-
-
-def _with_hum(campaign: Campaign, nominal: Fit) -> list[Array]:
-    """The nominal fit's scaled residuals by run, with the hum that was removed before it."""
-    data = nominal.problem.data
-    given = prepare(campaign, {run.id: run.noise_variance for run in data.runs}, data.similarity)
-    readings = {run.id: run.reading for run in given.runs}
-    # the fit may leave a record's start out; both end together
-    return [
-        r + run.scaled(readings[run.id][-run.reading.size :] - run.reading)
-        for r, run in zip(nominal.residuals, data.runs, strict=True)
-    ]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.where.backbone import backbones
+from diagnosis.likelihood.run_data import RunData
+from diagnosis.where.along_motion import apparent_moment, backbones, motion, phase_plane
 from diagnosis.where.excess import (
     Profile,
     RunExcess,
@@ -20,8 +21,7 @@ from diagnosis.where.excess import (
     run_excesses,
     within_bands,
 )
-from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace, maps_in_own_units, trace_in_own_units
-from diagnosis.where.phase_plane import apparent_moment, motion, phase_plane
+from diagnosis.where.maps import Grid, GroupExcess, Maps, RunMap, Trace
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -41,8 +41,6 @@ class Survey:
     """Maps, and what else the text about them needs.
 
     Args:
-        maps: the maps.
-        excesses: by run.
         frequency_interval: shortest interval of frequency that holds most of the excess, Hz.
         moment_energy: energy of the apparent moment beyond that of noise, by bin of time, shape (n,), in variances.
         moment_z: the sum of that over its standard deviation under white noise, a ratio.
@@ -55,105 +53,124 @@ class Survey:
     moment_z: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Squared residuals by run, and where they lie.
+
+    The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
+    size. Powers are therefore shares of the variance of one sample.
+    """
+
+    time: list[Array]  # since the start of the record, s
+    amplitude: list[Array]  # rad
+    power: list[Array]
+    expected: list[float]  # of the power under noise
+    variance: list[float]  # likewise
+
+    def over(self, edges: Array, place: list[Array]) -> Profile:
+        return profile(edges, place, self.power, self.expected, self.variance)
+
+
 def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[str, ...]) -> Survey:
     """Draw up all maps of the nominal model's residuals.
 
     Args:
-        nominal: fit of the nominal model.
-        scaled: the same with residuals in units of the noise that counts.
+        scaled: the nominal fit with residuals in units of the noise that counts.
         excesses: its squared residuals, by run.
         chosen: ids of the runs the phase plane is taken over; all where empty.
+
+    Returns:
+        Maps and interval in the measured rig's units.
     """
-    similarity = nominal.problem.data.similarity
+    runs, similarity = nominal.problem.data.runs, nominal.problem.data.similarity
     bands = band_excesses(excesses)
-    inside = [
-        within_bands(r, run, bands_beyond_chance(bands))
-        for r, run in zip(scaled.residuals, excesses, strict=True)
-    ]
-    times = _times(nominal)
-    time = _time_profile(scaled, inside, times)
-    energy, z = _moment_energy(nominal, times, time.edges)
+    beyond = bands_beyond_chance(bands)
+    inside = [within_bands(r, run, beyond) for r, run in zip(scaled.residuals, excesses, strict=True)]
+    samples = _Samples(
+        [_times(nominal, i) for i in range(len(runs))],
+        [np.hypot(*motion(scaled, i)) for i in range(len(runs))],
+        [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
+        [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
+        # squares of filtered noise are correlated: as many are independent as coefficients pass
+        [2.0 * share / run.block**2 for (_, share), run in zip(inside, runs, strict=True)],
+    )
+    longest = max(float(time[-1] + 0.5 * (time[1] - time[0])) for time in samples.time)
+    instants = np.linspace(0.0, longest, _TIME_BINS + 1)
+    widest = 1.0001 * max(float(a.max()) for a in samples.amplitude)
+    energy, z = _moment_energy(nominal, samples.time, instants)
     edges = _log_edges(excesses)
     resonances = [run.resonance for run in excesses]
+    by_run = [
+        profile(instants, [time], [left**2 / run.block], [1.0 / run.block], [2.0 / run.block**2]).mean
+        for run, time, left in zip(runs, samples.time, scaled.residuals, strict=True)
+    ]
+    starts = [float(amplitude[0]) for amplitude in samples.amplitude]
+    seconds, hertz = similarity.own(1.0, "s"), similarity.own(1.0, "Hz")
+    over_time, spectrum = samples.over(instants, samples.time), _spectrum(excesses, edges)
     maps = Maps(
-        runs=_run_maps(scaled, excesses),
-        groups=_groups(scaled, excesses, similarity),
-        time=time,
-        time_by_run=_time_by_run(scaled, times, time.edges),
+        runs=_run_maps(scaled, excesses, starts),
+        groups=_groups(scaled, excesses, starts),
+        time=replace(over_time, edges=instants * seconds),
+        time_by_run=np.stack(by_run),
         moment_time=np.maximum(energy, 0.0) / max(float(np.maximum(energy, 0.0).sum()), 1e-300),
-        amplitude=_amplitude_profile(scaled, inside),
-        frequency=_spectrum(excesses, edges),
+        amplitude=samples.over(np.linspace(0.0, widest, _AMPLITUDE_BINS + 1), samples.amplitude),
+        frequency=replace(spectrum, edges=edges * hertz),
         frequency_by_run=np.stack([_spectrum([run], edges).mean for run in excesses]),
         frequency_after=None,
-        resonance=(min(resonances), max(resonances)),
+        resonance=(similarity.own(min(resonances), "Hz"), similarity.own(max(resonances), "Hz")),
         bands=bands,
-        lines=residual_lines(excesses, nominal.problem.data.runs),
-        backbones=tuple(backbones(nominal, [run.start for run in nominal.problem.data.runs])),
+        lines=tuple(
+            replace(line, frequency=similarity.own(line.frequency, "Hz"))
+            for line in residual_lines(excesses, runs)
+        ),
+        backbones=tuple(backbones(nominal)),
         phase_plane=phase_plane(nominal, chosen),
         traces=_traces(nominal, None, excesses),
-        grid=_grid(scaled, inside, times),
+        grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), seconds),
         unit=similarity.reading,
     )
-    interval = _frequency_interval(excesses)
+    # the shortest interval that holds most of the excess of the bands that show the gap
+    kept = [replace(run, power=np.where(run.inside(beyond), run.power, 1.0)) for run in excesses]
+    high = max(float(run.frequency[-1]) for run in excesses)
+    # no bin is narrower than the shortest record resolves
+    resolved = max(float(run.frequency[1]) for run in excesses)
+    fine = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
+    interval = _spectrum(kept, fine).interval()
     if interval is not None:
         interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
-    return Survey(maps_in_own_units(maps, similarity), excesses, interval, energy, z)
+    return Survey(maps, excesses, interval, energy, z)
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
-    """The maps with what the answer leaves beside the nominal model's residuals.
-
-    Args:
-        campaign: as measured, of the units of the fits.
-        nominal: fit of the nominal model, from which the maps were drawn up.
-        answer: fit with the causes.
-    """
+    """The maps with what a fit with the causes leaves beside the nominal model's residuals."""
     after = _spectrum(run_excesses(campaign, answer), _log_edges(found.excesses)).mean
-    traces = _traces(nominal, answer, found.excesses)
-    own = tuple(trace_in_own_units(trace, nominal.problem.data.similarity) for trace in traces)
-    return replace(found.maps, frequency_after=after, traces=own)
+    return replace(found.maps, frequency_after=after, traces=_traces(nominal, answer, found.excesses))
 
 
-def _shares(excesses: list[RunExcess]) -> list[float]:
+def _run_maps(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[RunMap, ...]:
+    own = fit.problem.data.similarity.own
     energy = [max(float(run.power.sum()) - run.power.size, 0.0) for run in excesses]
     whole = max(sum(energy), 1e-300)
-    return [value / whole for value in energy]
-
-
-def amplitudes(fit: Fit, index: int) -> Array:
-    """Amplitude of the fitted motion of one run.
-
-    Returns:
-        At every residual, shape (n,), rad.
-    """
-    angle, rate = motion(fit, index)
-    return np.hypot(angle, rate)
-
-
-def _run_maps(fit: Fit, excesses: list[RunExcess]) -> tuple[RunMap, ...]:
     return tuple(
         RunMap(
             id=run.id,
-            spring_stiffness=run.spring_stiffness,
+            spring_stiffness=None if run.spring_stiffness is None else own(run.spring_stiffness, "N m/rad"),
             wind_speed=run.wind_speed,
-            amplitude=float(amplitudes(fit, i)[0]),
-            frequency=excess.resonance,
+            amplitude=start,
+            frequency=own(excess.resonance, "Hz"),
             excess=excess.excess / run.block,
             std=excess.std / run.block,
             p_value=excess.p_value(),
-            share=share,
+            share=part / whole,
         )
-        for i, (run, excess, share) in enumerate(
-            zip(fit.problem.data.runs, excesses, _shares(excesses), strict=True)
-        )
+        for run, excess, start, part in zip(fit.problem.data.runs, excesses, starts, energy, strict=True)
     )
 
 
-def _groups(fit: Fit, excesses: list[RunExcess], similarity: Similarity) -> tuple[GroupExcess, ...]:
+def _groups(fit: Fit, excesses: list[RunExcess], starts: list[float]) -> tuple[GroupExcess, ...]:
     """Mean excess of the runs that share a condition; conditions that do not vary are left out."""
-    runs = fit.problem.data.runs
+    runs, similarity = fit.problem.data.runs, fit.problem.data.similarity
     levels = [(e.excess / run.block, e.std / run.block) for e, run in zip(excesses, runs, strict=True)]
-    start = [float(amplitudes(fit, i)[0]) for i in range(len(runs))]
     keys = {
         "wind": ["on" if run.wind_on else "off" for run in runs],
         "spring": [
@@ -163,11 +180,16 @@ def _groups(fit: Fit, excesses: list[RunExcess], similarity: Similarity) -> tupl
             for run in runs
         ],
         "speed": [f"{run.wind_speed:g} m/s" for run in runs],
-        "amplitude": [f"{0.05 * round(value / 0.05):.2f} rad" for value in start],
+        "amplitude": [f"{0.05 * round(start / 0.05):.2f} rad" for start in starts],
     }
+
+    def first_number(label: str) -> tuple[float, str]:
+        head = label.split(" ")[0]
+        return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
+
     result = []
     for by, labels in keys.items():
-        distinct = sorted(set(labels), key=_first_number)
+        distinct = sorted(set(labels), key=first_number)
         if len(distinct) < 2:
             continue
         for label in distinct:
@@ -178,87 +200,35 @@ def _groups(fit: Fit, excesses: list[RunExcess], similarity: Similarity) -> tupl
     return tuple(result)
 
 
-def _first_number(label: str) -> tuple[float, str]:
-    head = label.split(" ")[0]
-    return (float(head) if head.replace(".", "", 1).isdigit() else 0.0, label)
+def _times(fit: Fit, index: int) -> Array:
+    """Times of a run's residuals since the start of its record, s."""
+    run = fit.problem.data.runs[index]
+    return run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
 
 
-def _times(fit: Fit) -> list[Array]:
-    """Times of the residuals since the start of every record, s."""
-    return [
-        run.start + (np.arange(run.reading.size, dtype=np.float64) + 0.5) * run.interval
-        for run in fit.problem.data.runs
-    ]
-
-
-def _time_profile(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Profile:
-    longest = max(float(time[-1] + 0.5 * (time[1] - time[0])) for time in times)
-    edges = np.linspace(0.0, longest, _TIME_BINS + 1)
-    return profile(edges, times, *_by_sample(fit, inside))
-
-
-def _by_sample(fit: Fit, inside: list[tuple[Array, float]]) -> tuple[list[Array], list[float], list[float]]:
-    """Squared residuals, their mean and variance under noise, as shares of the variance of one sample.
-
-    The misfit of a model is the same in a block mean as in its samples; the noise variance is less by the block's
-    size.
-    """
-    blocks = [run.block for run in fit.problem.data.runs]
-    return (
-        [r**2 / block for (r, _), block in zip(inside, blocks, strict=True)],
-        [share / block for (_, share), block in zip(inside, blocks, strict=True)],
-        # squares of filtered noise are correlated: as many are independent as coefficients pass
-        [2.0 * share / block**2 for (_, share), block in zip(inside, blocks, strict=True)],
-    )
-
-
-def _amplitude_profile(fit: Fit, inside: list[tuple[Array, float]]) -> Profile:
-    place = [amplitudes(fit, i) for i in range(len(inside))]
-    edges = np.linspace(0.0, 1.0001 * max(float(p.max()) for p in place), _AMPLITUDE_BINS + 1)
-    return profile(edges, place, *_by_sample(fit, inside))
-
-
-def _grid(fit: Fit, inside: list[tuple[Array, float]], times: list[Array]) -> Grid:
+def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: float) -> Grid:
     """Excess by amplitude and wind speed; by amplitude and time where the runs have one speed."""
-    amplitude = [amplitudes(fit, i) for i in range(len(inside))]
-    rows = np.linspace(0.0, 1.0001 * max(float(a.max()) for a in amplitude), _GRID_ROWS + 1)
-    power, expected, variance = _by_sample(fit, inside)
-    speeds = sorted({run.wind_speed for run in fit.problem.data.runs})
+    speeds = sorted({run.wind_speed for run in runs})
     shared = len(speeds) == 1
-    longest = max(float(time[-1]) for time in times)
+    longest = max(float(time[-1]) for time in samples.time)
     edges = np.linspace(0.0, 1.0001 * longest, _GRID_COLUMNS + 1)
     places = [
         np.digitize(time, edges) - 1 if shared else np.full(time.size, speeds.index(run.wind_speed))
-        for run, time in zip(fit.problem.data.runs, times, strict=True)
+        for run, time in zip(runs, samples.time, strict=True)
     ]
     columns = []
     for column in range(_GRID_COLUMNS if shared else len(speeds)):
-        inside_column = [place == column for place in places]
-        columns.append(
-            profile(
-                rows,
-                [a[keep] for a, keep in zip(amplitude, inside_column, strict=True)],
-                [p[keep] for p, keep in zip(power, inside_column, strict=True)],
-                expected,
-                variance,
-            )
-        )
+        kept = [place == column for place in places]
+        amplitude = [a[keep] for a, keep in zip(samples.amplitude, kept, strict=True)]
+        power = [p[keep] for p, keep in zip(samples.power, kept, strict=True)]
+        columns.append(replace(samples, power=power).over(rows, amplitude))
     return Grid(
         rows,
         None if shared else np.array(speeds),
-        edges if shared else None,
+        edges * seconds if shared else None,
         np.stack([column.mean for column in columns], axis=1),
         np.stack([column.std for column in columns], axis=1),
     )
-
-
-def _time_by_run(fit: Fit, times: list[Array], edges: Array) -> Array:
-    rows = []
-    for run, time, residual in zip(fit.problem.data.runs, times, fit.residuals, strict=True):
-        rows.append(
-            profile(edges, [time], [residual**2 / run.block], [1.0 / run.block], [2.0 / run.block**2]).mean
-        )
-    return np.stack(rows)
 
 
 def _moment_energy(fit: Fit, times: list[Array], edges: Array) -> tuple[Array, float]:
@@ -289,63 +259,49 @@ def _spectrum(excesses: list[RunExcess], edges: Array) -> Profile:
     return profile(edges, places, powers, ones, [2.0] * len(excesses))
 
 
-def _frequency_interval(excesses: list[RunExcess]) -> tuple[float, float] | None:
-    """Shortest interval in Hz that holds most of the excess of the bands that show the gap."""
-    names = bands_beyond_chance(band_excesses(excesses))
-    index = [i for i, name in enumerate(("0", "f0", "2f0", "3f0", "above")) if name in names]
-    kept = [np.where(np.isin(run.band, index), run.power, 1.0) for run in excesses]
-    high = max(float(run.frequency[-1]) for run in excesses)
-    # no bin is narrower than the shortest record resolves
-    resolved = max(float(run.frequency[1]) for run in excesses)
-    edges = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
-    places, ones = [run.frequency for run in excesses], [1.0] * len(kept)
-    return profile(edges, places, kept, ones, [2.0] * len(kept)).interval()
-
-
 def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[Trace, ...]:
-    times = _times(nominal)
+    """Every run against time, the largest excess first."""
     order = sorted(range(len(excesses)), key=lambda i: -excesses[i].excess)
     most = max(_LEAST_POINTS, _TRACE_POINTS // len(order))
-    return tuple(_trace(nominal, best, i, times[i], most) for i in order)
+    similarity = nominal.problem.data.similarity
+    factor = similarity.own(1.0, similarity.reading)
+    traces = []
+    for index in order:
+        run, frequency = nominal.problem.data.runs[index], resonance(nominal, index)
+        # more points show no more of a cycle
+        enough = int(1.0 / (_CYCLE_POINTS * frequency * run.interval))
+        group = max(1, min(enough, run.reading.size // _LEAST_POINTS), -(-run.reading.size // most))
+        seen = [_times(nominal, index), run.reading, run.unscaled(nominal.residuals[index])]
+        if best is not None:
+            seen.append(run.unscaled(best.residuals[index]))
+        if run.samples is None:
+            time, reading, before, *after = (_means(values, group) for values in seen)
+        else:
+            filled = _means(run.samples.count.astype(np.float64), group) > 0.0
+            time, reading, before, *after = (_means(values, group)[filled] for values in seen)
+        # the few cycles that hold the most of the difference's energy; the whole where that is shorter
+        first, last, length = float(time[0]), float(time[-1]), _SHOWN_CYCLES / frequency
+        if last - first > length:
+            difference = before - after[0] if after else before
+            energy = np.concatenate([[0.0], np.cumsum(difference**2)])
+            ends = np.searchsorted(time, time + length, side="right")
+            whole = time <= last - length
+            first = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
+            last = first + length
+        trace = Trace(
+            run.id,
+            time * similarity.own(1.0, "s"),
+            reading * factor + similarity.rest,
+            before * factor,
+            after[0] * factor if after else None,
+            run.noise_std / float(np.sqrt(group)) * factor,
+            (similarity.own(first, "s"), similarity.own(last, "s")),
+        )
+        traces.append(trace)
+    return tuple(traces)
 
 
-def _trace(nominal: Fit, best: Fit | None, index: int, times: Array, most: int) -> Trace:
-    run = nominal.problem.data.runs[index]
-    frequency = resonance(nominal, index)
-    enough = int(1.0 / (_CYCLE_POINTS * frequency * run.interval))  # more points show no more of a cycle
-    group = max(1, min(enough, run.reading.size // _LEAST_POINTS), -(-run.reading.size // most))
-    count = run.reading.size // group
-    std = run.noise_std
-
-    def means(values: Array) -> Array:
-        grouped: Array = values[: count * group].reshape(count, group).mean(axis=1)
-        return grouped
-
-    filled = (
-        np.full(count, True) if run.samples is None else means(run.samples.count.astype(np.float64)) > 0.0
-    )
-    time, reading, before = (
-        means(values)[filled] for values in (times, run.reading, run.unscaled(nominal.residuals[index]))
-    )
-    after = None if best is None else means(run.unscaled(best.residuals[index]))[filled]
-    return Trace(
-        run.id,
-        time,
-        reading,
-        before,
-        after,
-        std / float(np.sqrt(group)),
-        _most_energy(time, before if after is None else before - after, _SHOWN_CYCLES / frequency),
-    )
-
-
-def _most_energy(time: Array, difference: Array, length: float) -> tuple[float, float]:
-    """The stretch of a length, s, that holds the most of a difference's energy; the whole where that is shorter."""
-    first, last = float(time[0]), float(time[-1])
-    if last - first <= length:
-        return first, last
-    energy = np.concatenate([[0.0], np.cumsum(difference**2)])
-    ends = np.searchsorted(time, time + length, side="right")
-    whole = time <= last - length
-    start = float(time[int(np.argmax(np.where(whole, energy[ends] - energy[:-1], -1.0)))])
-    return start, start + length
+def _means(values: Array, group: int) -> Array:
+    """Means of groups of neighbouring values; an incomplete last group is left out."""
+    count = values.size // group
+    return np.asarray(values[: count * group].reshape(count, group).mean(axis=1), np.float64)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
-from diagnosis.decision import plain
 from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
+from diagnosis.printing import plain
 from diagnosis.result import Where
 from diagnosis.where.place import Finding
 from diagnosis.where.survey import Survey
@@ -50,40 +50,42 @@ def nowhere(found: Survey, *, within_step: bool) -> str:
 def describe(
     where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
 ) -> str:
-    """Where the gap is, in sentences.
-
-    Args:
-        where: the same in fields.
-        bands: names of the bands that show the gap.
-        channel: what it acts on, with the reason.
-        condition: when it acts, with the reason.
-    """
-    parts = [_runs(where, found), _extent(where, found), _bands(found, bands)]
+    """Where the gap is, in sentences; the bands are those that show it."""
+    parts, places = [_runs(where, found)], []
+    length, greatest = float(found.maps.time.edges[-1]), float(found.maps.amplitude.edges[-1])
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
+        places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
+    amplitude = where.amplitude_rad
+    if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
+        places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
+    if where.frequency_hz is not None:
+        places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
+    if places:
+        parts.append(f"Four fifths of it lie {', '.join(places)}.")
+    whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > LISTED_BAND_SHARE * whole]
+    if shown and whole > 0.0:
+        shown.sort(key=lambda band: -band.excess)
+        listed = (f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)
+        parts.append(f"By frequency: {', '.join(listed)}.")
+    # without runs of both winds the condition goes unsaid
     both = any(group.by == "wind" for group in found.maps.groups)
-    parts.append(_nature(channel, condition, both))
-    return " ".join(part for part in parts if part)
-
-
-def agreement(where: Where, kinds: Sequence[type[Effect]]) -> str:
-    """Whether causes act where the residuals say that the gap is.
-
-    Args:
-        where: from the residuals.
-        kinds: the causes that are compared; none where none is named.
-
-    Returns:
-        A sentence; empty where there is nothing to compare.
-    """
-    if not kinds or where.channel is None:
-        return ""
-    names = plain(*(kind.name for kind in kinds))
-    if where.channel in {kind.channel for kind in kinds}:
-        return f"That agrees with {names}."
-    acts = " and ".join(dict.fromkeys(_CHANNEL_WORDS[kind.channel] for kind in kinds))
-    return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."
+    words = _CHANNEL_WORDS.get(channel.value or "")
+    acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
+    if condition.value is None:
+        parts.append(f"{acts}: {channel.reason}; {condition.reason}.")
+    elif channel.reason == condition.reason:
+        when = f", {_CONDITION_WORDS[condition.value]}" if both else ""
+        parts.append(f"{acts}{when}, {channel.reason}.")
+    else:
+        parts.append(f"{acts}: {channel.reason}.")
+        if both:
+            parts.append(f"It is there {_CONDITION_WORDS[condition.value]}: {condition.reason}.")
+    return " ".join(parts)
 
 
 def _runs(where: Where, found: Survey) -> str:
+    """Which runs show the gap, and how much more of it is with the wind on or off."""
     count = len(found.maps.runs)
     if not where.runs:
         rate = 100.0 * PLACE_FALSE_ALARM_RATE
@@ -99,54 +101,22 @@ def _runs(where: Where, found: Survey) -> str:
         text = f"{100.0 * share:.0f} % of the gap is in one run of {count}{named}"
     else:
         text = f"{100.0 * share:.0f} % of the gap is in {len(where.runs)} of {count} runs{named}"
-    return f"{text}{_wind_contrast(found)}."
-
-
-def _wind_contrast(found: Survey) -> str:
-    groups = {group.label: group for group in found.maps.groups if group.by == "wind"}
+    groups = {group.label: group.excess for group in found.maps.groups if group.by == "wind"}
     if len(groups) < 2:
+        return f"{text}."
+    more, less = sorted(("on", "off"), key=lambda wind: -groups[wind])
+    if groups[less] < _NEARLY_NOTHING * groups[more]:
+        return f"{text}; nearly all of it with the wind {more}."
+    ratio = groups[more] / groups[less]
+    return f"{text}; {ratio:.2g} times as much power with the wind {more} as with it {less}."
+
+
+def agreement(where: Where, kinds: Sequence[type[Effect]]) -> str:
+    """Whether causes act where the residuals say that the gap is; empty where there is nothing to compare."""
+    if not kinds or where.channel is None:
         return ""
-    more, less = sorted(("on", "off"), key=lambda wind: -groups[wind].excess)
-    most, least = groups[more].excess, groups[less].excess
-    if least < _NEARLY_NOTHING * most:
-        return f"; nearly all of it with the wind {more}"
-    return f"; {most / least:.2g} times as much power with the wind {more} as with it {less}"
-
-
-def _extent(where: Where, found: Survey) -> str:
-    """Time, amplitude and frequency."""
-    places = []
-    length = float(found.maps.time.edges[-1])
-    if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
-        places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
-    greatest = float(found.maps.amplitude.edges[-1])
-    amplitude = where.amplitude_rad
-    if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
-        places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
-    if where.frequency_hz is not None:
-        places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
-    return f"Four fifths of it lie {', '.join(places)}." if places else ""
-
-
-def _bands(found: Survey, bands: tuple[str, ...]) -> str:
-    whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
-    shown = [b for b in found.maps.bands if b.band in bands and b.excess > LISTED_BAND_SHARE * whole]
-    if not shown or whole <= 0.0:
-        return ""
-    shown.sort(key=lambda band: -band.excess)
-    listed = ", ".join(f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)
-    return f"By frequency: {listed}."
-
-
-def _nature(channel: Finding, condition: Finding, both: bool) -> str:
-    """Channel and condition; without runs of both kinds the latter goes unsaid."""
-    words = _CHANNEL_WORDS.get(channel.value or "")
-    acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
-    if condition.value is None:
-        return f"{acts}: {channel.reason}; {condition.reason}."
-    when = _CONDITION_WORDS[condition.value]
-    if channel.reason == condition.reason:
-        return f"{acts}{f', {when}' if both else ''}, {channel.reason}."
-    if not both:
-        return f"{acts}: {channel.reason}."
-    return f"{acts}: {channel.reason}. It is there {when}: {condition.reason}."
+    names = plain(*(kind.name for kind in kinds))
+    if where.channel in {kind.channel for kind in kinds}:
+        return f"That agrees with {names}."
+    acts = " and ".join(dict.fromkeys(_CHANNEL_WORDS[kind.channel] for kind in kinds))
+    return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 from nicegui import ui
 
-from diagnosis.decision import plain
+from diagnosis.printing import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import (
     Fault,

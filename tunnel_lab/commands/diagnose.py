@@ -205,7 +205,7 @@ def diagnose_with_progress(
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
     """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when it has none."""
-    from diagnosis.patched import UNPATCHED
+    from diagnosis.closure import UNPATCHED
 
     if answer.model is None:
         reason = next(
@@ -218,8 +218,7 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
 def show(document: dict[str, Any]) -> None:
     """Print an answer: the verdict in words, then the figures behind it."""
     from diagnosis import printing as parts
-    from diagnosis.closure import closable_table, closable_words
-    from diagnosis.patched import patch_lines, patch_table
+    from diagnosis.closure import closable_table, closable_words, patch_lines, patch_table
 
     say(document["verdict"])
     for line in (parts.where_line(document), *parts.rival_lines(document)):
@@ -278,8 +277,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         names: of the documents, each different.
         documents: of diagnoses, the reference first.
     """
-    from diagnosis.decision import probability
-    from diagnosis.printing import excess_std, share
+    from diagnosis.printing import excess_std, probability, share
 
     def excess(document: Document, key: str) -> str:
         """With its standard deviation by chance, where the document has the noise of its runs."""

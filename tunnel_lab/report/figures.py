@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.decision import plain, probability
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import excess_std
+from diagnosis.printing import excess_std, plain, probability
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,

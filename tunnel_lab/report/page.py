@@ -15,10 +15,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.closure import closable_table, closable_words
-from diagnosis.decision import plain
-from diagnosis.patched import patch_lines, patch_table
-from diagnosis.printing import inclusion_line
+from diagnosis.closure import closable_table, closable_words, patch_lines, patch_table
+from diagnosis.printing import inclusion_line, plain
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text

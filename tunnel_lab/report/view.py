@@ -9,9 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.decision import plain, probability
 from diagnosis.policy import LISTED_PROBABILITY
-from diagnosis.printing import misfit_text, noise_powers, run_words, share
+from diagnosis.printing import misfit_text, noise_powers, plain, probability, run_words, share
 from identification.printing import (
     UNDETERMINED,
     at_bound,

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.patched import UNPATCHED
+from diagnosis.closure import UNPATCHED
 from tests.reference.free_decays import Setting, campaign
 from tunnel_lab.commands import diagnose as commands
 from tunnel_sim.files.campaign_folder import write_campaign

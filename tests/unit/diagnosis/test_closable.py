@@ -15,12 +15,10 @@ from diagnosis.closure import KINDS, Ceiling, closable_table, closable_words
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.remainder.ceiling import Evidence, Unexplained
-from diagnosis.remainder.curve import steady_line
-from diagnosis.remainder.explain import chosen_kind, closable
+from diagnosis.remainder.ceiling import Evidence, Unexplained, best_ridge, held_out, normal, ratio, total
+from diagnosis.remainder.explain import chosen_kind, closable, steady_line
 from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
-from diagnosis.remainder.paths import paths
-from diagnosis.remainder.ridge import Rows, best_ridge, held_out, normal, ratio, total
+from diagnosis.remainder.paths import paths, ranges
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed
@@ -34,6 +32,7 @@ from tunnel_reference.outside_laws import LAW_FORMS
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import effect_class
 from tunnel_sim.effects.expression_effect import read_effects
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.units import dimension, dimension_text
 
 RUNS = rig(
@@ -87,7 +86,7 @@ def test_its_curve_is_the_missing_moment(detent):
 def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp_path):
     study, found = detent
     assert found.law.closed > 0.97
-    document = {"closable": found.to_json_dict()}
+    document = {"closable": as_json(found)}
     path = write_proposal(tmp_path / "law.toml", document)
     (kind,) = read_effects(path)
     assert kind.name == "proposed_angle"
@@ -227,7 +226,7 @@ def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
 
 def test_the_table_names_every_kind(detent):
     _, found = detent
-    document = {"closable": found.to_json_dict()}
+    document = {"closable": as_json(found)}
     assert {row[0] for row in closable_table(document).rows} == {
         text for kind, text in KINDS.items() if kind not in ("noise", "line")
     }
@@ -252,11 +251,10 @@ def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):
 
 def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
     rng = np.random.default_rng(3)
-    rows = []
+    parts = []
     for _ in range(8):
         free, basis = rng.standard_normal((200, 2)), rng.standard_normal((200, 30))
-        rows.append(Rows(free, basis, 5.0 * free[:, 0] + basis[:, 4] + rng.standard_normal(200)))
-    parts = [normal(one) for one in rows]
+        parts.append(normal(5.0 * free[:, 0] + basis[:, 4] + rng.standard_normal(200), basis, free))
     ridge = best_ridge(total(parts))
     assert ridge.solution[0] == pytest.approx(5.0, abs=0.2)
     assert ridge.solution[2 + 4] == pytest.approx(1.0, abs=0.15)
@@ -347,8 +345,6 @@ def test_the_simplest_kind_that_closes_as_much_is_chosen(common, single, kind):
 
 @pytest.mark.parametrize("kind", ["angle", "rate", "state", "wind", "time", "reading"])
 def test_every_term_has_a_unit_and_a_value(kind, detent):
-    from diagnosis.remainder.bases import ranges
-
     r = ranges(paths(detent[0].nominal))
     places = {"b": 0.1, "y": 0.1, "r": 1.0, "t": 2.0, "V": 20.0, "Kr": 21.0, "omega": 14.0}
     for term in terms(kind, r):
@@ -371,5 +367,5 @@ def test_the_formula_for_an_undecided_answer_starts_from_the_nominal_model(deten
     likely = replace(study, hypotheses=(hypothesis,), weighed=(Weighed((name,), 0.5, 0.4),))
     assert likely.chosen is hypothesis.fit
     undecided = closable(likely, significant=True, decided=False)
-    assert undecided.to_json_dict() == found.to_json_dict()
+    assert as_json(undecided) == as_json(found)
     assert closable(likely, significant=True).excess < found.excess

@@ -13,8 +13,7 @@ from diagnosis.likelihood.least_squares import scaled_residuals
 from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem
-from diagnosis.patch.joint_law import found_law
-from diagnosis.patch.patched_model import _left
+from diagnosis.patch.patched_model import engine_residual, found_law
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.engine.joint_patch import Start, patched, simulate_joint
@@ -89,12 +88,12 @@ def test_the_patched_model_moves_as_the_fit_does(
     assert said or not any("plugin" in note or "misses" in note for note in patch.notes)
     compiled = patched(model, patch.patch)[0].compile()
 
-    def simulate(common: Array, own: Array, start: Start, duration: float) -> Motion:
-        del common, own
+    def simulate(common: Array, start: Start, duration: float) -> Motion:
+        del common
         return simulate_joint(compiled, model.law.rest, start, duration)
 
     forward = scaled_residuals(problem, Point(common, own[None]))[0]
-    native = _left(problem, common, own, 0, simulate)
+    native = engine_residual(problem, common, own, 0, simulate)
     assert (
         np.max(np.abs(forward)) > 10.0
     )  # the motion is not the record, so that the comparison means something

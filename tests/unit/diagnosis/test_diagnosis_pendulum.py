@@ -13,8 +13,7 @@ from diagnosis.likelihood.prepare import prepare, without_long_rest, without_res
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import misses_motion, starting_points
-from diagnosis.remainder.bases import COMMON, SINGLE, ranges
-from diagnosis.remainder.paths import paths
+from diagnosis.remainder.paths import COMMON, SINGLE, paths, ranges
 from diagnosis.search.grow import _of_each, grow_in_stretches
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import fit_nominal, investigate

@@ -14,8 +14,7 @@ from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.run_data import hermite_basis
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.noise.mains import refine_frequency, remove_hum
-from diagnosis.noise.scattered_and_driven import scattered_variance
-from diagnosis.noise.sensor_noise import campaign_noise
+from diagnosis.noise.sensor_noise import campaign_noise, scattered_variance
 from tests.reference.free_decays import AREA, LENGTH, Setting, Truth, angle_of
 from tunnel_sim.effects.sensor import DroppedSamples
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

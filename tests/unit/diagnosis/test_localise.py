@@ -16,10 +16,16 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import nominal_start, starting_points
 from diagnosis.search.weigh import Weighed
-from diagnosis.where.backbone import backbones, drift
+from diagnosis.where.along_motion import apparent_moment, backbones, drift
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
-from diagnosis.where.phase_plane import apparent_moment
-from diagnosis.where.place import _between_runs, _by_band, _by_drift, _lone_run, runs_beyond_chance
+from diagnosis.where.place import (
+    _between_runs,
+    _by_band,
+    infer_channel,
+    infer_condition,
+    locate,
+    runs_beyond_chance,
+)
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
@@ -293,7 +299,17 @@ def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
     monkeypatch, frequency, damping, channel
 ):
     monkeypatch.setattr("diagnosis.where.place.drift", lambda _: (frequency, damping))
-    assert _by_drift(SimpleNamespace(maps=SimpleNamespace(backbones=()))).value == channel
+    runs = [SimpleNamespace(reading=np.zeros(100), drive=None)]
+    decays = SimpleNamespace(problem=SimpleNamespace(data=SimpleNamespace(runs=runs)))
+    maps = SimpleNamespace(
+        time=SimpleNamespace(edges=np.arange(3.0)),
+        bands=(),
+        lines=(),
+        runs=(),
+        backbones=[_curve(0.0, 0.0, None)],
+    )
+    found = SimpleNamespace(maps=maps, moment_energy=np.zeros(2))  # no blow, and nothing between the runs
+    assert infer_channel(decays, found, "always").value == channel
 
 
 def _curve(frequency, damping, alone):
@@ -343,8 +359,17 @@ def test_runs_have_their_amplitude_frequency_and_share_of_the_gap():
 
 
 @pytest.mark.parametrize(
-    ("shares", "lone"), [((0.9, 0.05, 0.05), "r1"), ((0.8, 0.1, 0.1), None), ((0.9, 0.1), None)]
+    ("shares", "lone"),
+    [((0.05, 0.9, 0.05), True), ((0.1, 0.8, 0.1), False), ((0.1, 0.9), False), ((0.9, 0.05, 0.05), False)],
 )
-def test_one_run_of_three_or_more_that_has_nearly_all_of_the_gap_is_lone(shares, lone):
-    runs = [SimpleNamespace(id=f"r{number}", share=share) for number, share in enumerate(shares, 1)]
-    assert _lone_run(SimpleNamespace(maps=SimpleNamespace(runs=runs))) == lone
+def test_one_windy_run_of_three_or_more_with_nearly_all_of_the_gap_says_nothing_of_the_wind(shares, lone):
+    data = campaign()
+    data = dataclasses.replace(data, runs=data.runs[: len(shares)])
+    base = nominal(data)
+    found = locate(data, base).survey
+    runs = [
+        dataclasses.replace(run, share=share, p_value=0.0)
+        for run, share in zip(found.maps.runs, shares, strict=True)
+    ]
+    found = dataclasses.replace(found, maps=dataclasses.replace(found.maps, runs=tuple(runs)))
+    assert ("from one run alone (r2)" in infer_condition(data, base, found).reason) == lone

@@ -9,8 +9,7 @@ import pytest
 from diagnosis.answer.reported import held_out_totals
 from diagnosis.answer.verdict import verdict
 from diagnosis.closure import Misfit, Remainder, Step, Waterfall
-from diagnosis.decision import decision
-from diagnosis.printing import gap_table, parameters_table
+from diagnosis.printing import decision, gap_table, parameters_table
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tests.unit.diagnosis_document import campaign, document
 from tunnel_lab.report import view

@@ -12,7 +12,7 @@ from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.starting_points import nominal_start
-from diagnosis.noise.scattered_and_driven import LEAST_SAMPLES, driven_variance
+from diagnosis.noise.sensor_noise import LEAST_SAMPLES, driven_variance
 from identification.signal.driven import driven_rows
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -32,7 +32,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 CAUSE = "quadratic_damping"
 CLOSABLE = Closable(
     0.37, (Ceiling("angle", 0.417, 0.023, "runs"), Ceiling("time", -3.0, 7.0, "runs")), "angle", "A moment.",
-    Curve(("angle",), ((-0.1, 0.0, 0.1),), (-0.002, 0.0, 0.003), (0.001, 0.001, 0.001), "N m"),
+    curve=Curve(("angle",), ((-0.1, 0.0, 0.1),), (-0.002, 0.0, 0.003), (0.001, 0.001, 0.001), "N m"),
 )  # fmt: skip
 
 

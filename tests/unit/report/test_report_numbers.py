@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 from diagnosis import printing
-from diagnosis.decision import decision, undecided_words
-from diagnosis.printing import run_words
+from diagnosis.printing import decision, run_words, undecided_words
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import page as report_page

@@ -88,7 +88,7 @@ def test_designs_with_few_winds_can_be_held_out(data, keep):
 def test_a_patched_model_that_is_right_closes_the_gap_of_swings_of_a_milliradian():
     """The start is fitted again with steps in proportion to the swing, whose frequency depends on its size here."""
 
-    def swing(_common, _own, start, duration):
+    def swing(_common, start, duration):
         time = np.arange(0.0, duration, 2e-3)
         size = np.hypot(start.angle, start.rate / 12.0)
         omega = 12.0 * (1.0 + 0.02 * (size / 1e-3) ** 2)
@@ -96,7 +96,7 @@ def test_a_patched_model_that_is_right_closes_the_gap_of_swings_of_a_milliradian
         return Motion(time, state.real, ((1j * omega - 0.1) * state).real)
 
     noise, truth = 1e-7, Start("a", 0.0, 1e-3, 1e-3)
-    motion = swing(None, None, truth, 5.0)
+    motion = swing(None, truth, 5.0)
     reading = motion.angle + noise * np.random.default_rng(1).standard_normal(motion.angle.size)
     run = Run("a", Record(motion.time_s, reading), 0.0, 16.0)
     fitted = nominal(Campaign("small", RigProperties(), SensorProperties(500.0, None, noise), (run,)))
