@@ -66,7 +66,10 @@ def scaled_solve(matrix: Array, right: Array) -> Array:
 
 
 def inverse(information: Array) -> Array:
-    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit, shape (m, m).
+    """The inverse of an information matrix that `determined` has passed, symmetric to the last bit.
+
+    Args:
+        information: shape (m, m).
 
     Raises:
         numpy.linalg.LinAlgError: when the matrix is singular.
@@ -76,10 +79,13 @@ def inverse(information: Array) -> Array:
 
 
 def determined(matrix: Array) -> bool:
-    """Whether a symmetric matrix, shape (m, m), is positive definite to working precision, whatever its units.
+    """Whether a symmetric matrix is positive definite to working precision, whatever its units.
 
     An information matrix is checked before it is inverted, and a covariance before it is used. With a condition
     number above 1e13, after scaling to a unit diagonal, the inverse holds less than three correct digits.
+
+    Args:
+        matrix: shape (m, m).
     """
     diagonal = matrix.diagonal()
     if not (np.isfinite(matrix).all() and diagonal.min() > _SMALLEST and diagonal.max() < 1.0 / _SMALLEST):

@@ -2,4 +2,5 @@
 
 The first, 100-5-5-1, gives the damping ratio from three cycles of a free decay. The second, 2-2-5-1, gives the
 natural frequency from that ratio and the duration t3 of the three cycles. Training needs torch, use only NumPy.
+The network of `neural_posterior` weighs rival linear models (`rivals`) of demodulated runs (`demodulated`).
 """

@@ -40,10 +40,14 @@ class Shape:
 
 
 def normalise(points: Array) -> Shape:
-    """Remove the mean of 100 points, shape (100,), and scale the largest value of the first half cycle to 1.
+    """Remove the mean, and scale the largest value of the first half cycle to 1.
 
-    That is the value of a quartic through the points of the half cycle, which is less sensitive to noise. The
-    scale is 0 or less where the half cycle does not rise above the mean.
+    It is the value of a quartic through the points of the half cycle, which is less sensitive to noise. The scale
+    is 0 or less where the half cycle does not rise above the mean.
+
+    Args:
+        points: means over the hundredths of three cycles from a zero crossing on, the first half cycle positive,
+            shape (100,).
     """
     centred = points - points.mean()
     place = int(np.argmax(_FINE @ centred[:_FIRST_HALF]))
