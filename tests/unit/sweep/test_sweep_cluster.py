@@ -14,7 +14,6 @@ import pytest
 
 from tests.unit.sweep.small_sweep import contents
 from tunnel_lab.cli import main
-from tunnel_lab.experiments import runner
 from tunnel_lab.experiments.runner import on_cluster
 from tunnel_lab.experiments.sweep import run_sweep
 from tunnel_lab.experiments.sweep_cases import Sweep
@@ -84,16 +83,18 @@ def test_workers_missing_and_lost_are_survived(
 def test_a_scheduler_that_goes_away_is_one_line(
     small: Path, tmp_path: Path, address: str, processes: list[subprocess.Popen[bytes]], capsys
 ) -> None:
+    from distributed import Future
+
     processes.append(worker(address))
 
     with pytest.MonkeyPatch.context() as patch:
-        original = runner._Crew._result
+        original = Future.result
 
-        def result(crew, future, index):
+        def result(future, *given, **named):
             processes[0].kill()
-            return original(crew, future, index)
+            return original(future, *given, **named)
 
-        patch.setattr(runner._Crew, "_result", result)
+        patch.setattr(Future, "result", result)
         status = main(["sweep", str(small), "--out", str(tmp_path / "out"), "--scheduler", address])
     said = capsys.readouterr().err.splitlines()
     assert status == 2

@@ -17,8 +17,7 @@ import pytest
 
 from tests.unit.killed import names_of_the_dead
 from tests.unit.sweep.small_sweep import SMALL, contents
-from tunnel_lab.experiments import sweep as shard_module
-from tunnel_lab.experiments import sweep as store_module
+from tunnel_lab.experiments import sweep as engine
 from tunnel_lab.experiments.runner import lasting_processes
 from tunnel_lab.experiments.sweep import begin, open_store, run_sweep
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
@@ -126,7 +125,7 @@ def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
 
     with monkeypatch.context() as patch:
         for name in ("output_folder", "write_json"):
-            patch.setattr(store_module, name, failing(getattr(store_module, name)))
+            patch.setattr(engine, name, failing(getattr(engine, name)))
         with pytest.raises(TunnelError, match="no space left"):
             begin(sweep, tmp_path / "out")
     store = begin(sweep, tmp_path / "out")
@@ -176,7 +175,7 @@ def test_other_versions_are_refused(
     sweep: Sweep, here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(shard_module, "made_with", lambda: {"numpy": "1.0"})
+        patch.setattr(engine, "made_with", lambda: {"numpy": "1.0"})
         run_sweep(sweep, tmp_path / "old", lambda *_: iter(()))
     with pytest.raises(TunnelError, match=r"begun with numpy 1\.0"):
         run_sweep(sweep, tmp_path / "old", here)
@@ -212,7 +211,7 @@ def test_an_estimator_that_crashes_is_a_status(
         def estimate(self, _campaign):
             raise ZeroDivisionError("planted")
 
-    monkeypatch.setattr(shard_module, "_estimator", lambda _: Broken())
+    monkeypatch.setattr(engine, "_estimator", lambda _: Broken())
     outcome = run_sweep(sweep, tmp_path / "out", here)
     assert outcome.crashes == 12
     rows = outcome.store.scan().collect()
