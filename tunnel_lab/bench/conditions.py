@@ -58,14 +58,18 @@ _SHORT = (
 
 
 def stated(session: Session) -> Cells:
-    """The conditions in ``campaign.toml``."""
+    """The conditions in ``campaign.toml``.
+
+    Raises:
+        TunnelError: when it cannot be read.
+    """
     document = _document(session)
     rows = {run["id"]: _texts(run, RUN_KEYS) for run in document["runs"]}
     return {RIG: _texts(document.get("rig", {}), RIG_KEYS), **rows}
 
 
 def typed(session: Session) -> Cells:
-    """The conditions as they were typed last, saved in the campaign or not."""
+    """The conditions as they were typed last, saved in the campaign or not; errors as of `stated`."""
     saved = stated(session)
     if not session.draft.is_file():
         return saved
@@ -102,7 +106,11 @@ def faults(cells: Cells, *, plausible: bool) -> Words:
 
 
 def number(text: str, where: str) -> float | None:
-    """The number that a cell holds, with a decimal point or comma; None where it is empty."""
+    """The number that a cell holds, with a decimal point or comma; None where it is empty.
+
+    Raises:
+        TunnelError: when it is not a number.
+    """
     if not text.strip():
         return None
     try:
@@ -158,7 +166,7 @@ def _write(session: Session, document: dict[str, Any]) -> None:
 
 
 def restore(session: Session, before: Cells) -> None:
-    """State again what was stated before a campaign was written anew, for the runs that it still has."""
+    """State again what was stated before a campaign was written anew; errors as of `save`."""
     kept = {
         row: {key: before.get(row, {}).get(key) or text for key, text in cells.items()}
         for row, cells in stated(session).items()

@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from math import degrees
 from typing import TYPE_CHECKING, Any
 
@@ -224,23 +225,16 @@ class ByHandPart:
                 ui.html("Causes", sanitize=False, tag="span")
             for kind in known:
                 box = ui.checkbox(kind.name.replace("_", " "), value=kind.name in document["causes"])
-                self._boxes[kind.name] = box.on_value_change(self._switch)
+                self._boxes[kind.name] = box.on_value_change(partial(self._fit_chosen, False))
         self._fault = Fault()
         self._place = ui.element("div").props("role=status aria-live=polite").classes("by-hand")
         with ui.element("p").classes("buttons"):
-            button(_CONVERGE, self._converge)
-        ui.timer(0.0, self._fit_chosen, once=True)
+            button(_CONVERGE, partial(self._fit_chosen, True))
+        ui.timer(0.0, partial(self._fit_chosen, False), once=True)
 
-    async def _switch(self) -> None:
-        self._converged = False
-        await self._fit_chosen()
-
-    async def _converge(self) -> None:
-        self._converged = True
-        await self._fit_chosen()
-
-    async def _fit_chosen(self) -> None:
+    async def _fit_chosen(self, converged: bool) -> None:
         """Fit what is chosen; changes made meanwhile are fitted together afterwards."""
+        self._converged = converged
         if self._waiting:
             return
         self._waiting, shown = True, None
@@ -444,7 +438,11 @@ class ReportPage:
 
 
 def write_session_report(session: Session, author: str, notes: str) -> None:
-    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does."""
+    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does.
+
+    Raises:
+        TunnelError: when it cannot be written.
+    """
     from diagnosis.diagnosable import diagnosable
     from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_folder import read_campaign

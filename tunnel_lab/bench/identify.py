@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,17 +64,14 @@ class IdentifyPage:
         with ui.expansion("Uncertainty budget"):
             words = "Standard uncertainties of what is stated, in per cent; an empty field is exact."
             ui.label(words).classes("soft")
-            self._stated: dict[str, float] = {}
+            self._percents: dict[str, float | None] = {}
             if session.uncertainties.is_file():
                 common = load_toml(session.uncertainties, missing="").get("common", {})
-                self._stated = {key: 100.0 * float(value) for key, value in common.items()}
+                self._percents = {key: 100.0 * float(value) for key, value in common.items()}
             with ui.element("div").classes("fields"):
-                self._percents = {
-                    key: ui.number(f"{name} [%]", value=self._stated.get(key), min=0.0)
-                    for key, name in _INPUTS.items()
-                }
-                for field in self._percents.values():
-                    field.props("dense step=any")
+                for key, name in _INPUTS.items():
+                    field = ui.number(f"{name} [%]", value=self._percents.get(key), min=0.0)
+                    field.props("dense step=any").on("change", partial(self._state, key, field))
             self._budget_fault = Fault()
             with ui.element("p").classes("buttons"):
                 button("Make the budget", self._make_budget)
@@ -89,10 +87,12 @@ class IdentifyPage:
             results = {name: str(self._session.estimate(name)) for name in names}
             self._run([(name, ("--estimator", name, "--json", file)) for name, file in results.items()])
 
+    def _state(self, key: str, field: ui.number) -> None:
+        self._percents[key] = field.value
+
     def _make_budget(self) -> None:
         with self._budget_fault.around():
-            percents = self._stated | {key: field.value for key, field in self._percents.items()}
-            kept = {key: value / 100.0 for key, value in percents.items() if value}
+            kept = {key: value / 100.0 for key, value in self._percents.items() if value}
             document = {"schema_version": 1, "common": kept}
             write_whole(self._session.uncertainties, tomli_w.dumps(document).encode())
             models = [word for name in _FIRST if name != ESTIMATOR for word in ("--model", name)]

@@ -208,10 +208,9 @@ class RecordsPage:
             with ui.expansion("Resting angles as numbers"), ui.element("div").classes("fields"):
                 self._rests = []
                 for mark in marks:
-                    field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]").props(
-                        "dense step=any"
-                    )
-                    self._rests.append(field.on("change", partial(self._rest_typed, mark, field)))
+                    field = ui.number(f"Rest of {mark.run}, to be subtracted [{unit}]")
+                    field.props("dense step=any").on("change", partial(self._rest_typed, mark, field))
+                    self._rests.append(field)
         for chart, record in zip(self._charts, records, strict=True):
             chart.show_marks(
                 [
@@ -256,7 +255,11 @@ class RecordsPage:
 
 
 def write(session: Session, imported: Imported) -> None:
-    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept."""
+    """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
+
+    Raises:
+        TunnelError: when the folder cannot be written.
+    """
     from tunnel_lab.bench import conditions
     from tunnel_lab.plotting.runs import import_picture
     from tunnel_sim.files.importing.records import write_imported
