@@ -68,24 +68,21 @@ def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
 
 
 def _covers(data: Data, left_out: list[RunData]) -> bool:
-    """Whether the other runs have every spring, and wind on and off, as all runs have."""
+    """Whether the other runs have every spring, wind on and off, and an input of unknown gain, as all runs have."""
     gone = {run.id for run in left_out}
-    kept = [run for run in data.runs if run.id not in gone]
-    if {run.gain_free for run in data.runs} != {run.gain_free for run in kept}:
-        return False
-    springs = {run.spring_stiffness for run in data.runs} == {run.spring_stiffness for run in kept}
-    return springs and {run.wind_on for run in data.runs} == {run.wind_on for run in kept}
+
+    def kinds(runs: Sequence[RunData]) -> tuple[set[object], ...]:
+        return (
+            {run.gain_free for run in runs},
+            {run.spring_stiffness for run in runs},
+            {run.wind_on for run in runs},
+        )
+
+    return kinds(data.runs) == kinds([run for run in data.runs if run.id not in gone])
 
 
 def predict_held_out(whole: Fit) -> HeldOut:
-    """Refit without each group of runs, and predict it.
-
-    Args:
-        whole: the fit of all runs, from which the smaller fits start.
-
-    Returns:
-        The excess of every run that could be left out.
-    """
+    """Refit without each group of runs, starting from the fit of all, and predict it."""
     data = whole.problem.data
     residuals: dict[str, Array] = {}
     points: dict[str, tuple[Array, Array]] = {}
@@ -96,7 +93,7 @@ def predict_held_out(whole: Fit) -> HeldOut:
         try:
             common = fit_seen(whole, seen)[0].common
             released, left = refit_releases(
-                _restricted(whole.problem, [ids[i] for i in out]),
+                replace(whole.problem, data=data.subset(tuple(ids[i] for i in out))),
                 Point(common, whole.point.release[out]),
                 [whole.jacobian[i][1] for i in out],
             )
@@ -134,15 +131,10 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
     return best, residuals
 
 
-def _restricted(problem: Problem, ids: list[str]) -> Problem:
-    return replace(problem, data=problem.data.subset(tuple(ids)))
-
-
 def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list[Array]]:
     """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
 
     Args:
-        whole: the fit of all blocks, from which this one starts.
         seen: by run the blocks to fit, shape (n,).
 
     Returns:
@@ -184,10 +176,6 @@ def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
 
     See docs/decisions/0016-held-out-cause-by-cause.md.
 
-    Args:
-        nominal: gives the runs and their cycles.
-        ids: of the runs to divide into stretches.
-
     Returns:
         By run, shape (n,): the turn, or −1 in the other runs. Every third stretch is left out in the same turn.
     """
@@ -203,10 +191,6 @@ def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
 
 def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
     """Refit without each turn's stretches, and predict them. No parameter sees the readings left out.
-
-    Args:
-        whole: the fit of all blocks, from which the smaller fits start.
-        turns: from `turns_of`.
 
     Returns:
         By id of the runs that are divided: reading minus prediction in noise standard deviations, every block

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
-from functools import partial
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from diagnosis.answer.held_out import HeldOut, Turns, predict_held_out, predict_stretches, turns_of
 from diagnosis.answer.reported import Base
 from diagnosis.closure import Step, Waterfall
-from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search.hypothesis import restricted
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study
@@ -36,9 +34,6 @@ class Subsets:
     def __call__(self, names: Collection[str]) -> Fit:
         """The best fit found with these causes.
 
-        Args:
-            names: some of the causes.
-
         Returns:
             The study's own fit, or else one started from the fit of all causes. Where a fit of fewer of them is
             better, the missing cause is added to that; a cause that gains nothing leaves the fit as it was.
@@ -46,58 +41,40 @@ class Subsets:
         key = frozenset(names)
         if key not in self._fits:
             fewer = min((known for known in self._fits if known < key), key=lambda k: self._fits[k].total)
-            own = self._study.hypothesis(sorted(key))
-            found = self._from_all(key) if own is None else own.fit
-            if found is None or found.total > _NO_GAIN * self._fits[fewer].total:
-                found = self._from_fewer(fewer, key) or found
-            known = self._fits[fewer]
+            known, own = self._fits[fewer], self._study.hypothesis(sorted(key))
+            if own is None:
+                start = restricted(self._study.chosen, key)
+                found = _finite(
+                    try_fit(
+                        start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS
+                    )
+                )
+            else:
+                found = own.fit
+            if found is None or found.total > _NO_GAIN * known.total:
+                added: Fit | None = known
+                for kind in self._study.chosen.problem.effects:
+                    if kind.name in key - fewer and added is not None:
+                        added = one_more(added, kind)
+                found = added or found
             self._fits[key] = known if found is None or found.total > known.total else found
         return self._fits[key]
 
-    def _from_all(self, names: Names) -> Fit | None:
-        """A fit started from that of all causes, with its sensitivities."""
-        start = restricted(self._study.chosen, names)
-        return _fitted(
-            lambda: fit(start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS)
-        )
-
-    def _from_fewer(self, fewer: Names, names: Names) -> Fit | None:
-        """A fit in which the missing causes are added to a fit of fewer, one after another."""
-        kinds = [kind for kind in self._study.chosen.problem.effects if kind.name in names - fewer]
-        found: Fit | None = self._fits[fewer]
-        for kind in kinds:
-            found = None if found is None else one_more(found, kind)
-        return found
-
 
 def one_more(base: Fit, kind: type[Effect]) -> Fit | None:
-    """A fit with one more effect.
-
-    Args:
-        base: the fit without it.
-        kind: the effect to add.
-
-    Returns:
-        The better of the fits from its first two starting points; None where none succeeds.
-    """
-    starts = starting_points(base, kind)[:2]
-    tried = [_fitted(partial(fit, start.problem, start.point)) for start in starts]
+    """A fit with one more effect, the better from its first two starting points; None where none succeeds."""
+    tried = (_finite(try_fit(start.problem, start.point)) for start in starting_points(base, kind)[:2])
     return min((found for found in tried if found), key=lambda found: found.total, default=None)
 
 
-def _fitted(attempt: Callable[[], Fit]) -> Fit | None:
-    """The result of a fit; None where it fails."""
-    with suppress(FitError, np.linalg.LinAlgError):
-        found = attempt()
-        return found if np.isfinite(found.total) else None
-    return None
+def _finite(found: Fit | None) -> Fit | None:
+    return found if found is not None and np.isfinite(found.total) else None
 
 
 def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
     """Add the causes one after another in their best order, and take each alone out of the whole.
 
     Args:
-        base: what an excess is measured against.
         known: runs held out of fits, where that is done already.
 
     Returns:
@@ -128,8 +105,6 @@ def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     """The first and the last step only: the nominal model, and all causes together.
 
     Args:
-        study: what was found, without a random moment.
-        base: what an excess is measured against.
         known: runs held out of fits, where that is done already.
     """
     models = _Models(study, base, known)

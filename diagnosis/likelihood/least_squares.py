@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -290,6 +292,13 @@ def fit(
         if base is not None and iterations >= _HOPELESS and state.cost > base.total:
             break  # more parameters, and still worse than without them
     return state.result(converged)
+
+
+def try_fit(problem: Problem, start: Point, **options: Any) -> Fit | None:
+    """The fit, its arguments as in `fit`; None where it fails."""
+    with suppress(FitError, np.linalg.LinAlgError):
+        return fit(problem, start, **options)
+    return None
 
 
 def fit_at(problem: Problem, point: Point) -> Fit:
