@@ -144,7 +144,8 @@ def turned_back(fitted: Fit) -> Fit:
         Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else the
         fit that was given.
     """
-    problem, (least, greatest) = fitted.problem, fitted.problem.data.extremes
+    problem, readings = fitted.problem, [run.reading for run in fitted.problem.data.runs]
+    least, greatest = min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
     signs = [f"{kind.name}.{kind.turns}" for kind in problem.effects if kind.turns]
     if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
         return fitted
