@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from diagnosis.blind import Score
-    from diagnosis.blind.calibration import CalibrationBin, SmoothCalibration
+    from diagnosis.blind.score import CalibrationBin, SmoothCalibration
     from identification.statistics import Proportion
 
 
