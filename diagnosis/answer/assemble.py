@@ -11,13 +11,12 @@ import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
-from diagnosis.answer.held_out import predict_held_out
+from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.linear_theory import coefficient_move, coefficient_names
 from diagnosis.answer.next_run import separating_run
-from diagnosis.answer.reported import excess_base, gap_summary, held_out_totals, report_fits
+from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
-from diagnosis.answer.verdict import blind_spots, cautions, cnr_note, remainder, verdict
-from diagnosis.answer.waterfall import waterfall
+from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
 from diagnosis.decision import decision
 from diagnosis.patched import PatchedModel
 from diagnosis.policy import INTERVAL_SHARE, RIVAL_PROBABILITY
@@ -153,14 +152,7 @@ def assemble(
             noise.source,
             noise.reason,
         ),
-        blind_spots=blind_spots(
-            springs=len(data.springs),
-            speeds=len({run.wind_speed for run in data.runs if run.wind_on}),
-            wind_off=any(not run.wind_on for run in data.runs),
-            wind_on=data.wind_on,
-            normalised=data.normalised,
-            driven=data.driven,
-        ),
+        blind_spots=blind_spots(data),
         seconds=seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},
         cautions=(
@@ -180,7 +172,7 @@ def _coefficients(study: Study, kinds: Sequence[type[Effect]]) -> Coefficients:
     after = coefficients(possible_answers(study, kinds), study.campaign)
     before = before_the_causes(study.nominal, after) if study.causes else after
     windy, rig = "cn_beta" in before, study.campaign.rig
+    caveats = [effect_class(name).caveat for name in study.causes if name != "unknown"]
     identified = _AS_IDENTIFIED if windy and not study.causes else ""
-    notes = (cnr_note(study.causes), identified, size_note(rig, windy=windy))
-    note = " ".join(filter(None, notes))
+    note = " ".join(filter(None, (*caveats, identified, size_note(rig, windy=windy))))
     return Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), note)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.answer.reported import Base
+from diagnosis.answer.held_out import Base
 from diagnosis.answer.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Point
@@ -44,7 +44,6 @@ def meant_coefficient(found: ParameterEstimate, fit: Fit, name: str) -> Paramete
     """A coefficient, without its standard deviation where that says nothing.
 
     Args:
-        fit: that it comes from.
         name: ``cn_beta``, ``cn_r``, ``omega_n``, ``zeta`` or a parameter of a joint's law.
 
     Returns:

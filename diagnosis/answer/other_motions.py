@@ -25,20 +25,13 @@ _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix penc
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
-    """Decaying oscillations whose sum is fitted to a reading.
+class _Modes:
+    """Decaying oscillations whose sum is fitted to a reading."""
 
-    Args:
-        frequency: shape (m,), Hz.
-        rate: decay rates, shape (m,), 1/s.
-        amplitude: at the first reading, shape (m,), rad.
-        left: sum of squared residuals, rad².
-    """
-
-    frequency: Array
-    rate: Array
-    amplitude: Array
-    left: float
+    frequency: Array  # Hz, shape (m,)
+    rate: Array  # of decay, 1/s, shape (m,)
+    amplitude: Array  # at the first reading, rad, shape (m,)
+    left: float  # sum of squared residuals, rad²
 
 
 def second_modes(campaign: Campaign) -> tuple[str, ...]:
@@ -61,18 +54,8 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
     return tuple(filter(None, found))
 
 
-def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Modes | None:
-    """Fit a sum of decaying oscillations by the poles of a Hankel matrix.
-
-    Args:
-        values: evenly spaced readings, shape (n,), rad.
-        interval: between them, s.
-        count: number of oscillations.
-        vectors: left singular vectors of the matrix, the leading ones first, shape (rows, rows).
-
-    Returns:
-        The modes; None where the poles are not those of so many oscillations.
-    """
+def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:
+    """A sum of ``count`` decaying oscillations by the poles of a Hankel matrix with these left singular vectors."""
     left = vectors[:, : 2 * count]
     poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
     exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)
@@ -84,13 +67,13 @@ def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Mod
     weights = np.linalg.lstsq(columns, values, rcond=None)[0]
     residual = values - columns @ weights
     amplitude = np.hypot(weights[:count], weights[count : 2 * count])
-    return Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
+    return _Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
 
 
 def _two_modes(name: str, values: Array, interval: float) -> str:
     hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
     vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
-    one, two = (fit_modes(values, interval, count, vectors) for count in (1, 2))
+    one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
     if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
         return ""
     order = np.argsort(np.abs(two.frequency - one.frequency[0]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from diagnosis.answer.held_out import HeldOut
+from diagnosis.answer.held_out import Base, HeldOut
 from diagnosis.closure import Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Point, Problem, blocks_beyond, campaign_rig, condensed, sample_means
@@ -182,40 +182,6 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
         held_out=frozenset(chosen_out.residuals),
         confirmation=confirm(comparisons),
     )
-
-
-@dataclass(frozen=True)
-class Base:
-    """The noise that an excess is measured against.
-
-    Args:
-        variance: of one sample, rad²: noise and stated resolution.
-        extra: share that a coarse step adds to it.
-        hum: share that a hum adds to it.
-    """
-
-    variance: float
-    extra: float
-    hum: float
-
-
-def excess_base(study: Study) -> Base:
-    """The noise that would remain with a perfect model.
-
-    Returns:
-        The stated noise, where it is stated and contradicted by the records or by the readings' step; else the
-        noise estimated from the records.
-    """
-    estimated = float(np.mean(list(study.noise.variance.values())))
-    stated = study.noise.stated_variance
-    hum = 0.0 if study.hum is None else study.hum.excess
-    if stated is not None and (study.coarse or study.test.noisy):
-        return Base(stated, max(estimated / stated - 1.0, 0.0), hum * estimated / stated)
-    if study.coarse:
-        fine = (study.campaign.sensor.resolution or 0.0) ** 2 / 12.0
-        alone = max(estimated - study.step**2 / 12.0, 0.05 * estimated) + fine
-        return Base(alone, estimated / alone - 1.0, hum * estimated / alone)
-    return Base(estimated, 0.0, hum)
 
 
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:

@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 
 from diagnosis.closure import Move, Remainder, of_swing, rms_shown
 from diagnosis.decision import Decision, plain, probability, undecided_words
+from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test
 from diagnosis.noise.rounding import rounding_errors
 from diagnosis.noise.sensor_noise import Noise
@@ -140,13 +141,6 @@ def verdict(
     )
 
 
-def cnr_note(causes: Sequence[str]) -> str:
-    """How to read the coefficients with the causes added, where a cause changes their meaning."""
-    return " ".join(
-        effect_class(name).caveat for name in causes if name != "unknown" and effect_class(name).caveat
-    )
-
-
 BLIND_SPOTS = (
     "a constant sensor lag or filter: it only shifts the release",
     "an error of the clock",
@@ -158,16 +152,11 @@ BLIND_SPOTS = (
 _OF_INPUT = "a common scale on the inertia and the moment of the input"
 
 
-def blind_spots(
-    *, springs: int, speeds: int, wind_off: bool, wind_on: bool, normalised: bool, driven: bool = False
-) -> tuple[str, ...]:
-    """What these runs cannot show, with so many distinct stiffnesses (0: nothing holds the body) and wind speeds.
-
-    Returns:
-        Clauses; those that apply to every campaign come last.
-    """
+def blind_spots(data: Data) -> tuple[str, ...]:
+    """What these runs cannot show: clauses, those that apply to every campaign last."""
+    springs, speeds = len(data.springs), {run.wind_speed for run in data.runs if run.wind_on}
     found = []
-    if normalised:
+    if data.normalised:
         found.append("an error of a single spring: the runs state no stiffness")
     elif springs == 0:
         found.append(
@@ -177,17 +166,22 @@ def blind_spots(
         found.append(
             "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
         )
-    if not wind_on:
+    if not data.wind_on:
         found.append("any effect of the air: there is no run with the wind on")
-    elif speeds < 2:
+    elif len(speeds) < 2:
         found.append(
             "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
         )
-    if wind_on and not wind_off:
+    if data.wind_on and all(run.wind_on for run in data.runs):
         found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
-    if driven:
+    if data.driven:
         found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
-        return *found, BLIND_SPOTS[1], BLIND_SPOTS[2] if springs or normalised else _OF_INPUT, BLIND_SPOTS[3]
+        return (
+            *found,
+            BLIND_SPOTS[1],
+            BLIND_SPOTS[2] if springs or data.normalised else _OF_INPUT,
+            BLIND_SPOTS[3],
+        )
     return (*found, *BLIND_SPOTS)
 
 

@@ -8,25 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.prepare import Stretches, fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
-from diagnosis.policy import (
-    ALWAYS_FITTED,
-    FREED_FROM,
-    FREED_HYPOTHESES,
-    GROWN_BY,
-    GROWN_FROM,
-    GROWTH_LOSS,
-    LENGTHENED,
-    MODEL_ERROR,
-    MOST_CAUSES,
-    NEEDLESS_CHI2,
-    PREDICTED_SHARE,
-    SAME_CHANGE,
-)
 from diagnosis.search.hypothesis import (
     Hypothesis,
     Scale,
@@ -66,23 +53,19 @@ def grow(
         children = sets_with_one_more(level, kinds, progress)
         scale = Scale.of(children, gap)
         if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
-            count = FREED_HYPOTHESES if not level[0].effects else 1
-            children = with_forms(children, gap, FREED_FROM * level[0].fit.excess, count)
+            count = policy.FREED_HYPOTHESES if not level[0].effects else 1
+            children = with_forms(children, gap, policy.FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
         going, level = going_on(children, level, gap), []
         for hypothesis in going:  # those that change the readings alike would grow alike
             if not any(_same_change(hypothesis.fit, other.fit, nominal) for other in level):
                 level.append(hypothesis)
-        level = level[:GROWN_FROM]
+        level = level[: policy.GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
 
 def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
     """The second mode, where the nominal model misses the motion because it has one mode only.
-
-    Args:
-        nominal: a fit that misses the motion.
-        kinds: effects that may be tried.
 
     Returns:
         The fit with the mode added; None where it misses the motion too, or may not be tried.
@@ -95,20 +78,16 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
 def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     """Whether two fits differ by less than `SAME_CHANGE` of the power by which they change the nominal one."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
-    return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
+    return apart < policy.SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
 def going_on(
     children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: ChannelMisfit
 ) -> list[Hypothesis]:
-    """The sets to grow further.
+    """The sets to grow further from their parents, best first; none where the best of all could gain nothing.
 
     Args:
-        parents: those that they grew from.
         gap: what the nominal model leaves.
-
-    Returns:
-        Best first; none where the best of all could gain nothing.
     """
     scale = Scale.of((*children, *parents), gap)
     ranked = sorted(children, key=lambda h: -scale.weight(h))
@@ -120,7 +99,7 @@ def going_on(
     ) in ranked:  # may still lead on from the best it grew from: one of two equal causes closes only half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
-        if first or scale.weight(child) > max(map(scale.weight, smaller)) - GROWTH_LOSS:
+        if first or scale.weight(child) > max(map(scale.weight, smaller)) - policy.GROWTH_LOSS:
             going.append(child)
     return going
 
@@ -129,7 +108,9 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
     """Whether the weight could rise if one more effect left nothing."""
     if not hypothesis.effects:
         return True
-    return len(hypothesis.effects) < MOST_CAUSES and scale.greatest(hypothesis) > scale.weight(hypothesis)
+    return len(hypothesis.effects) < policy.MOST_CAUSES and scale.greatest(hypothesis) > scale.weight(
+        hypothesis
+    )
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -230,13 +211,15 @@ def _worth_fitting(
     scored.sort(key=lambda item: min(log_misfit(start.predicted, scale) for start in item[1]))
     if parent.effects:
         needed, own = [], own_gain(parent.fit.problem, parent.fit.point)
-        for kind, starts in scored[:GROWN_BY]:
+        for kind, starts in scored[: policy.GROWN_BY]:
             by_chance = own_gain(starts[0].problem, starts[0].point) - own
-            if starts[0].predicted_drop > NEEDLESS_CHI2 + by_chance:
+            if starts[0].predicted_drop > policy.NEEDLESS_CHI2 + by_chance:
                 needed.append((kind, starts))
         return needed
-    limit = PREDICTED_SHARE * parent.fit.total
-    return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
+    limit = policy.PREDICTED_SHARE * parent.fit.total
+    return [
+        item for i, item in enumerate(scored) if i < policy.ALWAYS_FITTED or item[1][0].predicted_drop > limit
+    ]
 
 
 def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
@@ -301,12 +284,14 @@ def grow_in_stretches(
     able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
     while level:
         grown = _longer_sets(level, short, data, able, progress)
-        least = min(FREED_FROM * level[0].long.fit.excess, MODEL_ERROR**2 * gap.motion / nominal.count)
+        least = min(
+            policy.FREED_FROM * level[0].long.fit.excess, policy.MODEL_ERROR**2 * gap.motion / nominal.count
+        )
         children = with_forms([child.long for child in grown.values()], gap, least)
         found += children
         parents = [g.long for g in level]
         going = _of_each(parents, going_on(children, parents, gap))
-        level = [replace(grown[h.names], long=h) for h in going[:GROWN_FROM]]
+        level = [replace(grown[h.names], long=h) for h in going[: policy.GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 
 
@@ -329,7 +314,7 @@ def _longer_sets(
     """The sets with one effect more, by their names, from the better of two starts where there are two."""
     tried = sets_with_one_more([g.short for g in level if g.short is not None], kinds, progress)
     grown = {}
-    for h in sorted(tried, key=lambda h: h.fit.total)[:LENGTHENED]:
+    for h in sorted(tried, key=lambda h: h.fit.total)[: policy.LENGTHENED]:
         with suppress(FitError, np.linalg.LinAlgError):
             longer, _ = fit_longer(h.fit, short, data, long_stretch(short))
             grown[h.names] = _Grown(replace(h, fit=longer), h)

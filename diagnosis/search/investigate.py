@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from diagnosis import policy
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
@@ -28,14 +29,6 @@ from diagnosis.noise.sensor_noise import (
     reading_levels,
     reading_step,
     typical_step,
-)
-from diagnosis.policy import (
-    COARSER_STEP,
-    HUM_LEFT,
-    MOMENT_LEFT,
-    NOISE_EXPLAINS_UP_TO,
-    NOISE_LEAVES,
-    RIVAL_PROBABILITY,
 )
 from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
@@ -228,7 +221,7 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.COARSER_STEP * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum, line = campaign, None, None
@@ -313,7 +306,7 @@ def _weigh_by_moment(
         base = fit(Problem(by_moment(best.fit)), found.nominal.point)
     except (FitError, np.linalg.LinAlgError):
         return None
-    if not explained and MOMENT_LEFT * (1.0 + base.excess) < 1.0:
+    if not explained and policy.MOMENT_LEFT * (1.0 + base.excess) < 1.0:
         return None
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
@@ -354,7 +347,7 @@ def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
         found = replace(found, hypotheses=(*known, *exchange(best, known, base)))
     with clock.step("forms"):  # of rival sets, free where that pays: growth frees those of few sets
         weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
-        near = [w.effects for w in weighed if w.probability > RIVAL_PROBABILITY]
+        near = [w.effects for w in weighed if w.probability > policy.RIVAL_PROBABILITY]
         if len(near) < 2:
             return found
         rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
@@ -389,7 +382,7 @@ def _of_read_off(found: Study, base: Fit) -> Array:
     """
     left = np.zeros(len(CHANNELS))
     if found.hum is not None:
-        left += HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
+        left += policy.HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
     errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
@@ -421,8 +414,8 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     Effects of a few numbers close little of any noise, however it misbehaves.
     """
     block = found.nominal.problem.data.runs[0].block
-    small = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < NOISE_LEAVES for w in weighed)
+    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
+    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)
 
 

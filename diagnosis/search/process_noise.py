@@ -84,7 +84,7 @@ class _Channel:
     reduced: float  # V/width, Hz
 
 
-def random_moments(fit: Fit, spectra: Collection[str] = ("broad_band", "narrow_band")) -> list[ProcessNoise]:
+def random_moments(fit: Fit, spectra: Collection[str]) -> list[ProcessNoise]:
     """The random moments that may explain the residuals of a fit.
 
     Args:

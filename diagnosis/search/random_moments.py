@@ -36,8 +36,6 @@ class RandomAnswer:
     """A random moment, alone or beside other effects.
 
     Args:
-        kind: of the random moment.
-        process: its fit.
         beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
         left: what remains. The share is that of the innovations' and the wind-off runs' excess in the nominal
             one's, and the same in every channel.
@@ -65,9 +63,6 @@ def weigh_random_moments(
     kinds: Sequence[type[Effect]],
 ) -> list[RandomAnswer]:
     """Try turbulence, and vortices with a wandering phase, under all sets of effects.
-
-    Args:
-        hypotheses: sets of effects fitted likewise.
 
     Returns:
         The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more

@@ -12,21 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis import policy
 from diagnosis.likelihood.residuals import ChannelMisfit
-from diagnosis.policy import (
-    CHANCE_STDS,
-    EVEN_SHARE,
-    FORM_PRICE,
-    LEAK,
-    MODEL_ERROR,
-    NEEDLESS_CHI2,
-    SET_PRICE,
-    STEEPNESS,
-    UNKNOWN_AT,
-    UNKNOWN_CLOSED,
-    UNKNOWN_GAP,
-    UNKNOWN_LEFT,
-)
 from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN = ("unknown",)
@@ -85,21 +72,21 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
     logs = np.array([log_weight(s.excess - least, scale, len(key), s.numbers) for key, s in best.items()])
     weights = np.exp(logs - logs.max(initial=-np.inf))
     # odds of each set against an unknown cause
-    by_chance = misfit_scale(nominal, CHANCE_STDS * np.sqrt(2.0 * nominal.count))
+    by_chance = misfit_scale(nominal, policy.CHANCE_STDS * np.sqrt(2.0 * nominal.count))
     gap, against = log_misfit(nominal.excess, by_chance), []
     for given in best.values():
         left = log_misfit(given.excess, by_chance)
         closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
-        doubt = UNKNOWN_LEFT * np.log1p(left) - UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
-        against.append(float(UNKNOWN_AT + UNKNOWN_GAP * gap - doubt))
+        doubt = policy.UNKNOWN_LEFT * np.log1p(left) - policy.UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
+        against.append(float(policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - doubt))
     odds = float(weights @ np.exp(against) / weights.sum()) if best else 0.0
-    known = (1.0 - EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
-    even = EVEN_SHARE / (len(best) + 1)
+    known = (1.0 - policy.EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
+    even = policy.EVEN_SHARE / (len(best) + 1)
     found = [
         Weighed(key, max(given.share, 0.0), float(probability) + even)
         for (key, given), probability in zip(best.items(), known, strict=True)
     ]
-    unknown = Weighed(UNKNOWN, 1.0, (1.0 - EVEN_SHARE) / (1.0 + odds) + even)
+    unknown = Weighed(UNKNOWN, 1.0, (1.0 - policy.EVEN_SHARE) / (1.0 + odds) + even)
     if unknown.probability < 0.5:
         first = max(found, key=lambda w: w.probability)
         rest = [unknown, *(w for w in found if w is not first)]
@@ -119,14 +106,14 @@ def least_excess(excesses: Sequence[Array]) -> Array:
     return np.asarray(np.min([np.zeros(6), *excesses], axis=0), np.float64)
 
 
-def misfit_scale(nominal: ChannelMisfit, chance: float | Array = NEEDLESS_CHI2) -> Array:
+def misfit_scale(nominal: ChannelMisfit, chance: float | Array = policy.NEEDLESS_CHI2) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
     Args:
         nominal: gives the motion.
         chance: χ² that chance explains, by channel or common to all.
     """
-    return np.asarray(np.broadcast_to(chance, 6) + MODEL_ERROR**2 * nominal.motion, np.float64)
+    return np.asarray(np.broadcast_to(chance, 6) + policy.MODEL_ERROR**2 * nominal.motion, np.float64)
 
 
 def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
@@ -138,8 +125,8 @@ def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
         effects: how many it has.
         numbers: how many it has beside their own.
     """
-    price = SET_PRICE * effects + FORM_PRICE * numbers
-    return -STEEPNESS * log_misfit(left, scale) - price
+    price = policy.SET_PRICE * effects + policy.FORM_PRICE * numbers
+    return -policy.STEEPNESS * log_misfit(left, scale) - price
 
 
 def log_misfit(left: Array, scale: Array) -> float:
@@ -150,7 +137,7 @@ def log_misfit(left: Array, scale: Array) -> float:
         scale: from `misfit_scale`, shape (6,).
     """
     above = np.maximum(left, 0.0)
-    return float(np.sum(np.log1p((above + LEAK * (above.sum() - above)) / scale)))
+    return float(np.sum(np.log1p((above + policy.LEAK * (above.sum() - above)) / scale)))
 
 
 def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:
