@@ -350,9 +350,9 @@ def ringing(fit: Fit) -> PerRunParameters | None:
     grid = np.arange(step, 0.4 / max(run.interval for run in runs), step)
     apart = []  # by run, where the grid is neither the run's own frequency nor a multiple of it
     for run in runs:
-        size = _RINGING_PADDING * run.reading.size
+        padded = _RINGING_PADDING * run.reading.size
         swing = (run.reading - run.reading.mean()) * np.hanning(run.reading.size)
-        own = float(np.argmax(np.abs(np.fft.rfft(swing, size)))) / (size * run.interval)
+        own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
         apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
     beside = np.array(apart)
     free = np.mean(beside, axis=0) >= IN_RUNS

@@ -94,9 +94,7 @@ def going_on(
     if not ranked or not _may_gain(ranked[0], scale):
         return []
     going = []
-    for (
-        child
-    ) in ranked:  # may still lead on from the best it grew from: one of two equal causes closes only half
+    for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
         if first or scale.weight(child) > max(map(scale.weight, smaller)) - policy.GROWTH_LOSS:
@@ -108,9 +106,8 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
     """Whether the weight could rise if one more effect left nothing."""
     if not hypothesis.effects:
         return True
-    return len(hypothesis.effects) < policy.MOST_CAUSES and scale.greatest(hypothesis) > scale.weight(
-        hypothesis
-    )
+    rises = scale.greatest(hypothesis) > scale.weight(hypothesis)
+    return rises and len(hypothesis.effects) < policy.MOST_CAUSES
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
