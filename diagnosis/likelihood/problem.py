@@ -219,8 +219,8 @@ class Problem:
             if not np.all(np.isfinite(point.common)):
                 continue
             effects = self.effects_at(point.common)
-            values = zip(self.names, point.common.tolist(), strict=True)
-            law = tuple(value for name, value in values if name != "zero")
+            named = zip(self.names, point.common.tolist(), strict=True)
+            law = tuple(value for name, value in named if name != "zero")
             for r, run in enumerate(self.data.runs):
                 if np.all(np.isfinite(point.release[r])):
                     like = first.get((law, run.conditions)) if autonomous else None

@@ -153,14 +153,18 @@ def _fit(
     corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
     if start.size == 3 and ends[2, 1] < 0.5:  # a Strouhal number
         corners[3, 2] = start[2] + 2e-3
-    options = {
-        "maxfev": _EVALUATIONS * len(start) // 2,
-        "xatol": 0.02,
-        "fatol": 0.5,
-        "initial_simplex": np.clip(corners, ends[:, 0], ends[:, 1]),
-    }
-    limits = [(np.log(low), np.log(high)) for low, high in bounds]
-    found = minimize(cost, start, method="Nelder-Mead", bounds=limits, options=options)
+    found = minimize(
+        cost,
+        start,
+        method="Nelder-Mead",
+        bounds=[(np.log(low), np.log(high)) for low, high in bounds],
+        options={
+            "maxfev": _EVALUATIONS * len(start) // 2,
+            "xatol": 0.02,
+            "fatol": 0.5,
+            "initial_simplex": np.clip(corners, ends[:, 0], ends[:, 1]),
+        },
+    )
     best = spectrum(np.exp(found.x).tolist())
     costs, innovations = zip(*_filtered(channels, best), strict=True)
     kept = [c.residual[_skip(c) :] / np.sqrt(c.variance) for c in channels]
