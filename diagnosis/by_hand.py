@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 
 from diagnosis.answer.candidates import candidates
-from diagnosis.answer.held_out import HeldOut, predict_held_out
+from diagnosis.answer.held_out import HeldOut, both_ends, excess_base, one_more, predict_held_out
 from diagnosis.answer.next_run import separating_run
-from diagnosis.answer.reported import excess_base
 from diagnosis.answer.units import own_next_run
-from diagnosis.answer.waterfall import both_ends, one_more
 from diagnosis.closure import share_closed
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.likelihood.least_squares import Fit, FitError, fit

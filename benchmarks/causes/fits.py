@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from diagnosis.answer.waterfall import one_more
+from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.search.investigate import nominal_study
 from tunnel_sim.effects import known_effects

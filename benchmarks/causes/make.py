@@ -20,7 +20,8 @@ import numpy as np
 import polars as pl
 
 from benchmarks.causes.tracks import REAL, SEED, TRACKS, VERSION, draw_all
-from diagnosis.blind.sets import file_hash, read_document, write_document
+from diagnosis.blind.sets import file_hash, write_document
+from tunnel_sim.files.reading import read_json
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -65,7 +66,7 @@ def make(
         print(f"campaigns {first + 1} to {first + number} of {len(drawn)}", flush=True)
     truths: dict[str, Any] = {}
     for first, *_ in todo:
-        truths |= read_document(out / ".making" / f"{first}.json", "make the set again")
+        truths |= read_json(out / ".making" / f"{first}.json", remedy="make the set again")
     if real:
         truths |= _copy_records(out / CAMPAIGNS)
     salt = hashlib.sha256(f"causes v{VERSION} {seed}".encode()).hexdigest() if salt is None else salt
@@ -147,15 +148,15 @@ def check(folder: Path, published: Path | None = None) -> dict[str, Any]:
     Raises:
         TunnelError: when a campaign or the key is not the one that was sealed.
     """
-    seal = read_document(folder / SEAL, "make the set first: python -m benchmarks.causes make")
-    if published is not None and read_document(published, "restore it") != seal:
+    seal = read_json(folder / SEAL, remedy="make the set first: python -m benchmarks.causes make")
+    if published is not None and read_json(published, remedy="restore it") != seal:
         raise TunnelError("is not the published set", where=str(folder), remedy=differs(seal, published))
     for name, known in seal["campaigns_sha256"].items():
         if data_hash(folder / CAMPAIGNS / name) != known:
             raise TunnelError("is not the campaign that was sealed", where=name, remedy="make the set again")
     if file_hash(folder / KEY) != seal["key_sha256"]:
         raise TunnelError("is not the key that was sealed", where=str(folder / KEY), remedy="restore it")
-    return read_document(folder / KEY, "restore it")
+    return read_json(folder / KEY, remedy="restore it")
 
 
 def differs(seal: Mapping[str, Any], published: Path) -> str:

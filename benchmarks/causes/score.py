@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
 from benchmarks.causes.tracks import VERSION
-from diagnosis.blind.calibration import calibration, smooth_calibration
 from diagnosis.blind.cases import NAMES as COEFFICIENTS
 from diagnosis.blind.cases import Case, case, found_by_group, inclusions
+from diagnosis.blind.score import calibration, smooth_calibration
 from identification.statistics import Proportion
 from tunnel_sim.files.reading import as_described
 from tunnel_sim.files.writing import as_json

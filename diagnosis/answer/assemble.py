@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
-from diagnosis.answer.held_out import predict_held_out
+from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
+from diagnosis.answer.linear_theory import coefficient_move, coefficient_names
 from diagnosis.answer.next_run import separating_run
-from diagnosis.answer.reported import excess_base, gap_summary, held_out_totals, report_fits
-from diagnosis.answer.small_swings import coefficient_move, coefficient_names
+from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
-from diagnosis.answer.verdict import blind_spots, cautions, cnr_note, verdict
-from diagnosis.answer.waterfall import waterfall
-from diagnosis.answer.what_remains import remainder
+from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
 from diagnosis.closure import PatchedModel
-from diagnosis.likelihood.least_squares import Fit
 from diagnosis.policy import INTERVAL_SHARE, RIVAL_PROBABILITY
 from diagnosis.printing import decision
-from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, ParameterEstimate, Where
+from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
 from diagnosis.search.investigate import Study, located
-from diagnosis.search.weigh import UNKNOWN, Weighed, main_effect
+from diagnosis.search.weigh import UNKNOWN, main_effect
 from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
@@ -39,9 +35,6 @@ def localise(study: Study) -> tuple[Where, Maps]:
     """Say where the nominal model departs from the runs.
 
     The place is that of the residuals alone. The causes only have to agree with it.
-
-    Returns:
-        The answer in fields and in words, and the maps it is read from.
     """
     place = located(study)
     found = place.survey
@@ -49,6 +42,10 @@ def localise(study: Study) -> tuple[Where, Maps]:
     maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
     if not study.causes:
         return Where(None, None, words=nowhere(found, within_step=study.test.within_step)), maps
+    compared = list(study.read_off) if study.named else []  # what has to agree with the place
+    if study.named and study.fitted:
+        shares = {answer.effects: answer.share for answer in study.weighed}
+        compared.insert(0, main_effect(study.fitted, shares))
     where = Where(
         channel=place.channel.value,
         condition=place.condition.value,
@@ -59,16 +56,8 @@ def localise(study: Study) -> tuple[Where, Maps]:
     )
     bands = bands_beyond_chance(found.maps.bands)
     words = describe(where, found, bands, place.channel, place.condition)
-    return replace(where, words=f"{words} {agreement(where, _compared(study))}".rstrip()), maps
-
-
-def _compared(study: Study) -> list[type[Effect]]:
-    """The causes that have to agree with the place: the main one, and those read off the records."""
-    if not study.named:
-        return []
-    shares = {answer.effects: answer.share for answer in study.weighed}
-    main = [main_effect(study.fitted, shares)] if study.fitted else []
-    return [effect_class(name) for name in (*main, *study.read_off)]
+    agreed = agreement(where, [effect_class(name) for name in compared])
+    return replace(where, words=f"{words} {agreed}".rstrip()), maps
 
 
 _CUT_RECORDS = (
@@ -98,8 +87,6 @@ def assemble(
     """Compose the answer.
 
     Args:
-        where: where the gap is.
-        maps: data of the figures.
         left_out: sentences on runs that were left out.
         patched: the model given with the causes written into it; the share closed is then its own.
         kinds: the effects that may act unnamed beside those of an answer.
@@ -124,7 +111,23 @@ def assemble(
     begun = time.perf_counter()
     found = _coefficients(study, kinds)
     seconds["coefficients"] = time.perf_counter() - begun
-    left = remainder(study, *_in_own_units(study, found.after, chosen), steps.steps[-1].excess)
+    similarity, names = study.similarity, coefficient_names(chosen.problem)
+    stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
+    moved = {
+        name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
+        for (name, given), coefficient in zip(found.after.items(), names, strict=False)
+    }
+    left = remainder(study, stated, moved, steps.steps[-1].excess)
+    rivals = [
+        answer.effects
+        for answer in study.weighed[1:]
+        if study.named
+        and answer.probability >= RIVAL_PROBABILITY
+        and answer.effects != UNKNOWN
+        and not set(study.fitted) <= set(answer.effects)
+    ]
+    fitted = [hypothesis.fit for effects in rivals if (hypothesis := study.hypothesis(effects)) is not None]
+    noise = study.noise
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
@@ -139,30 +142,22 @@ def assemble(
         where=where,
         maps=maps.to_json_dict(),
         candidates=weighed,
-        ambiguous_with=_rival_names(study),
-        next_run=_next_run(study, chosen),
+        ambiguous_with=tuple(sorted({name for effects in rivals for name in effects} - set(study.causes))),
+        next_run=separating_run(chosen, fitted[0]) if fitted and chosen is not study.nominal else None,
         coefficients=found,
         confirmation=shown.confirmation,
-        noise=_noise(study),
-        blind_spots=blind_spots(
-            springs=len(data.springs),
-            speeds=len({run.wind_speed for run in data.runs if run.wind_on}),
-            wind_off=any(not run.wind_on for run in data.runs),
-            wind_on=data.wind_on,
-            normalised=data.normalised,
-            driven=data.driven,
+        noise=NoiseSummary(
+            noise.std,
+            None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance)),
+            noise.source,
+            noise.reason,
         ),
+        blind_spots=blind_spots(data),
         seconds=seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},
         cautions=(
             *left_out,
-            *cautions(
-                study.campaign,
-                study.noise,
-                gap.runs,
-                shown.confirmation,
-                named=study.named,
-            ),
+            *cautions(study.campaign, noise, gap.runs, shown.confirmation, named=study.named),
             *((_CUT_RECORDS,) if study.cut else ()),
             *((_RESTED.format(", ".join(study.rested)),) if study.rested else ()),
         ),
@@ -173,60 +168,11 @@ def assemble(
     )
 
 
-def _in_own_units(
-    study: Study, stated: Mapping[str, ParameterEstimate], chosen: Fit
-) -> tuple[dict[str, ParameterEstimate], dict[str, float]]:
-    """The coefficients stated, and how far what remains moves each, in the measured campaign's units."""
-    names = coefficient_names(chosen.problem)
-    return {name: own_estimate(given, study.similarity) for name, given in stated.items()}, {
-        name: study.similarity.own(coefficient_move(chosen, coefficient), given.unit)
-        for (name, given), coefficient in zip(stated.items(), names, strict=False)
-    }
-
-
 def _coefficients(study: Study, kinds: Sequence[type[Effect]]) -> Coefficients:
-    campaign = study.campaign
-    after = coefficients(possible_answers(study, kinds), campaign)
+    after = coefficients(possible_answers(study, kinds), study.campaign)
     before = before_the_causes(study.nominal, after) if study.causes else after
-    windy = "cn_beta" in before
-    notes = (
-        cnr_note(study.causes),
-        _AS_IDENTIFIED if windy and not study.causes else "",
-        size_note(campaign.rig, windy=windy),
-    )
-    return Coefficients(
-        before=sized_coefficients(before, campaign.rig),
-        after=sized_coefficients(after, campaign.rig),
-        note=" ".join(note for note in notes if note),
-    )
-
-
-def _rivals(study: Study) -> list[Weighed]:
-    chosen = set(study.fitted)
-    return [
-        answer
-        for answer in study.weighed[1:]
-        if answer.probability >= RIVAL_PROBABILITY
-        and answer.effects != UNKNOWN
-        and not chosen <= set(answer.effects)
-        and study.named
-    ]
-
-
-def _rival_names(study: Study) -> tuple[str, ...]:
-    names = {name for answer in _rivals(study) for name in answer.effects}
-    return tuple(sorted(names - set(study.causes)))
-
-
-def _next_run(study: Study, chosen: Fit) -> dict[str, Any] | None:
-    for answer in _rivals(study):
-        hypothesis = study.hypothesis(answer.effects)
-        if hypothesis is not None and chosen is not study.nominal:
-            return separating_run(chosen, hypothesis.fit)
-    return None
-
-
-def _noise(study: Study) -> NoiseSummary:
-    noise = study.noise
-    stated = None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance))
-    return NoiseSummary(noise.std, stated, noise.source, noise.reason)
+    windy, rig = "cn_beta" in before, study.campaign.rig
+    caveats = [effect_class(name).caveat for name in study.causes if name != "unknown"]
+    identified = _AS_IDENTIFIED if windy and not study.causes else ""
+    note = " ".join(filter(None, (*caveats, identified, size_note(rig, windy=windy))))
+    return Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), note)

@@ -11,9 +11,11 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from diagnosis.answer.candidates import meant_coefficient
-from diagnosis.answer.small_causes import Beside, alone, beside
-from diagnosis.answer.small_swings import (
+from diagnosis.answer.linear_theory import (
     JOINT_UNITS,
+    Beside,
+    alone,
+    beside,
     coefficient_move,
     coefficient_names,
     coefficient_value,
@@ -90,7 +92,6 @@ class Possible:
 
     Args:
         probability: of the answer, a fraction; those of all answers need not sum to 1.
-        fit: of its effects; of the nominal model where it names none.
         textbook: the same effects in textbook form, where the fit freed their forms.
         small: the small causes that may act beside them; None: neither these nor a misfit are considered.
     """
@@ -106,9 +107,7 @@ class Answers:
     """The answers that coefficients are averaged over.
 
     Args:
-        possible: those with a fit, the chosen one first.
         unknown: probability (a fraction) of ``unknown`` where an answer with names is the chosen one.
-        nominal: the fit of the nominal model.
     """
 
     possible: tuple[Possible, ...]
@@ -131,7 +130,12 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     textbook = {id(h.fit): h.textbook for h in study.hypotheses}
     others, own, unknown = [], 1.0, 0.0
     for place, answer in enumerate(study.weighed):
-        probability, fit = max(answer.probability - even, 0.0), _fit_of(study, answer.effects)
+        probability, fit = max(answer.probability - even, 0.0), None
+        random, hypothesis = study.random_answer(answer.effects), study.hypothesis(answer.effects)
+        if random is not None:  # alone it has no fit of its own
+            fit = study.nominal if random.beside is None else random.beside.fit
+        elif hypothesis is not None:
+            fit = hypothesis.fit
         if place == 0:
             own = probability
         elif answer.effects == UNKNOWN:
@@ -144,14 +148,6 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     return Answers((first, *others), unknown, study.nominal)
 
 
-def _fit_of(study: Study, effects: tuple[str, ...]) -> Fit | None:
-    """The fit of an answer; the nominal one for a random moment alone."""
-    random, hypothesis = study.random_answer(effects), study.hypothesis(effects)
-    if random is None:
-        return None if hypothesis is None else hypothesis.fit
-    return study.nominal if random.beside is None else random.beside.fit
-
-
 def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEstimate]:
     """The coefficients averaged over the answers.
 
@@ -160,30 +156,54 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
 
     Returns:
         By the names of `coefficient_names`; ``omega_n`` and ``zeta`` are those of small swings. The value is the
-        mean over the answers and over the sets of small causes beside them (`diagnosis.answer.small_causes`), with
+        mean over the answers and over the sets of small causes beside them (`diagnosis.answer.linear_theory`), with
         their probabilities. The variance is that within and that between them (the law of total variance). Within,
         it is the fit's own, what is left (the scatter of the runs where it is beyond chance, or half the difference
-        between two halves of the data, `diagnosis.answer.small_swings`, if that is greater), the rounding of air
-        density, the part of the causes' forms that no free decay shows, and half the change made by freeing the
-        forms: another family of forms may change as much. By the same rule ``unknown`` adds half the change from
-        the nominal model. The central interval of 0.95 is given where it is not that of a normal distribution. No
-        standard deviation is given at a bound and where the runs do not determine the coefficient.
+        between two halves of the data, `coefficient_move`, if that is greater), the rounding of air density, the
+        part of the causes' forms that no free decay shows, and half the change made by freeing the forms: another
+        family of forms may change as much. By the same rule ``unknown`` adds half the change from the nominal
+        model. The central interval of 0.95 is given where it is not that of a normal distribution. No standard
+        deviation is given at a bound and where the runs do not determine the coefficient.
     """
-    fit = answers.possible[0].fit
-    names = [
-        name for name in coefficient_names(fit.problem) if _value(fit, name) is not None
-    ]  # the rest is held
-    return {name: _averaged(answers, campaign, name) for name in names}
+    fit, found = answers.possible[0].fit, {}
+    for name in coefficient_names(fit.problem):
+        if _value(fit, name) is None:
+            continue  # held
+        each = [of for one in answers.possible if (of := _of_answer(one, campaign, name)) is not None]
+        _, first, parts = each[0]
+        change = FORM_CHANGE_STD * (first.mean - (_value(answers.nominal, name) or first.mean))
+        if answers.unknown > 0.0:
+            doubted = Mixture(first.weights, first.means, first.variances + change**2)
+            each.append((answers.unknown, doubted, {**parts, "rivals": change**2}))
+        probability = np.array([p for p, _, _ in each])
+        probability /= probability.sum()
+        whole = Mixture(
+            np.concatenate([p * m.weights for p, (_, m, _) in zip(probability, each, strict=True)]),
+            np.concatenate([m.means for _, m, _ in each]),
+            np.concatenate([m.variances for _, m, _ in each]),
+        )
+        shares = {
+            source: float(probability @ [given.get(source, 0.0) for _, _, given in each])
+            for source in _SOURCES
+            if any(source in given for _, _, given in each)
+        }
+        between = float(probability @ [(m.mean - whole.mean) ** 2 for _, m, _ in each])
+        shares["rivals"] = shares.get("rivals", 0.0) + between
+        found[name] = _estimate(fit, name, whole.mean, whole.std, shares)
+        if found[name].std is not None:
+            tail = 0.5 * (1.0 - _INTERVAL)
+            low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
+            reach = float(ndtri(1.0 - tail)) * whole.std
+            if max(abs(low - whole.mean + reach), abs(high - whole.mean - reach)) > _SKEWED * whole.std:
+                found[name] = replace(found[name], interval=(low, high))
+    return found
 
 
 def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
     """The coefficients of the nominal model.
 
     Args:
-        after: the averages over the answers.
-
-    Returns:
-        The variance adds the squared difference from the average to the variance of that.
+        after: the averages over the answers; the variance adds the squared difference from these to theirs.
     """
     found = {}
     for place, name in enumerate(coefficient_names(nominal.problem)):
@@ -199,41 +219,6 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
     return found
 
 
-def _averaged(answers: Answers, campaign: Campaign, name: str) -> ParameterEstimate:
-    """One coefficient averaged over the answers."""
-    each = [found for one in answers.possible if (found := _of_answer(one, campaign, name)) is not None]
-    first, parts = each[0][1], each[0][2]
-    change = FORM_CHANGE_STD * (first.mean - (_value(answers.nominal, name) or first.mean))
-    if answers.unknown > 0.0:
-        doubted = Mixture(first.weights, first.means, first.variances + change**2)
-        each.append((answers.unknown, doubted, {**parts, "rivals": change**2}))
-    probability = np.array([p for p, _, _ in each])
-    probability /= probability.sum()
-    whole = Mixture(
-        np.concatenate([p * m.weights for p, (_, m, _) in zip(probability, each, strict=True)]),
-        np.concatenate([m.means for _, m, _ in each]),
-        np.concatenate([m.variances for _, m, _ in each]),
-    )
-    sources = {source for _, _, found in each for source in found}
-    shares = {
-        s: float(probability @ [found.get(s, 0.0) for _, _, found in each]) for s in _SOURCES if s in sources
-    }
-    shares["rivals"] = shares.get("rivals", 0.0) + float(
-        probability @ [(m.mean - whole.mean) ** 2 for _, m, _ in each]
-    )
-    estimate = _estimate(answers.possible[0].fit, name, whole.mean, whole.std, shares)
-    return estimate if estimate.std is None else replace(estimate, interval=_interval(whole))
-
-
-def _interval(whole: Mixture) -> tuple[float, float] | None:
-    """The central interval; None where it is that of a normal distribution."""
-    tail = 0.5 * (1.0 - _INTERVAL)
-    low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
-    reach = float(ndtri(1.0 - tail)) * whole.std
-    away = max(abs(low - whole.mean + reach), abs(high - whole.mean - reach))
-    return (low, high) if away > _SKEWED * whole.std else None
-
-
 def _of_answer(
     answer: Possible, campaign: Campaign, name: str
 ) -> tuple[float, Mixture, dict[str, float]] | None:
@@ -246,18 +231,28 @@ def _of_answer(
     left = float(small.scatter[place])
     if answer.small is not None:
         left = max(left, coefficient_move(replace(fit, residuals=small.left), name))
-    windy = name.startswith("cn_")
+    rounding = unseen = 0.0
+    if name.startswith("cn_"):
+        for run in campaign.runs:
+            if run.wind_on and run.air_density:
+                exponent = Decimal(repr(float(run.air_density))).as_tuple().exponent
+                digits = -exponent if isinstance(exponent, int) else 4
+                own = 0.5 * 10.0 ** -min(digits, 8) / math.sqrt(3.0) / run.air_density
+                rounding = max(rounding, own)
+        runs, which = wind_on_runs(fit), 0 if name == "cn_beta" else 1
+        effects = fit.problem.effects_at(fit.point.common)
+        unseen = math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[which] for effect in effects))
     unfreed = None if answer.textbook is None else _value(answer.textbook, name)
     common = {
         "misfit": left**2,
-        "air density": (value * _density_rounding(campaign)) ** 2 if windy else 0.0,
-        "unseen form": _unseen_form(fit, name) ** 2 if windy else 0.0,
+        "air density": (value * rounding) ** 2,
+        "unseen form": unseen**2,
         "freed form": 0.0 if unfreed is None else (FORM_CHANGE_STD * (value - unfreed)) ** 2,
     }
-    own, forms = small.noise[:, place], small.forms[:, place]
-    found = Mixture(small.weights, value + small.moves[:, place], own + forms + sum(common.values()))
+    noise, forms = small.noise[:, place], small.forms[:, place]
+    found = Mixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))
     within = {
-        "noise": float(small.weights @ own),
+        "noise": float(small.weights @ noise),
         "small causes": float(small.weights @ forms) + found.between,
     }
     return answer.probability, found, within | common
@@ -274,24 +269,5 @@ def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str,
     return meant_coefficient(found, fit, name)
 
 
-def _unseen_form(fit: Fit, name: str) -> float:
-    """Standard deviation of Cnβ or Cnr, 1/rad, from the part of the causes' forms that no free decay shows."""
-    runs = wind_on_runs(fit)
-    place = 0 if name == "cn_beta" else 1
-    effects = fit.problem.effects_at(fit.point.common)
-    return math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[place] for effect in effects))
-
-
 def _value(fit: Fit, name: str) -> float | None:
     return coefficient_value(fit.problem.names, fit.point.common, name)
-
-
-def _density_rounding(campaign: Campaign) -> float:
-    """Relative standard deviation from the rounding of the stated air density."""
-    worst = 0.0
-    for run in campaign.runs:
-        if run.wind_on and run.air_density:
-            exponent = Decimal(repr(float(run.air_density))).as_tuple().exponent
-            digits = -exponent if isinstance(exponent, int) else 4
-            worst = max(worst, 0.5 * 10.0 ** -min(digits, 8) / math.sqrt(3.0) / run.air_density)
-    return worst

@@ -1,17 +1,23 @@
-"""How far the gap closes on readings that were not used for the fit: runs, or stretches of time."""
+"""How far the gap closes with each cause, on runs or stretches of time that no fit has seen (decision 0016)."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.likelihood.least_squares import Fit, FitError, clip, damped_step, scaled_residuals
+from diagnosis.closure import Step, Waterfall
+from diagnosis.likelihood.least_squares import Fit, FitError, clip, damped_step, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.search.hypothesis import restricted
+from diagnosis.search.investigate import COARSE_STEP, HUM, Study
+from diagnosis.search.random_moments import RandomAnswer
+from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
 FOLDS = 3
@@ -34,11 +40,6 @@ class HeldOut:
 
     residuals: dict[str, Array]
     points: dict[str, tuple[Array, Array]]
-
-    @property
-    def excess(self) -> dict[str, float]:
-        """By run id: mean squared scaled residual minus one."""
-        return {run: float(np.mean(residual**2)) - 1.0 for run, residual in self.residuals.items()}
 
 
 def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
@@ -68,24 +69,21 @@ def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
 
 
 def _covers(data: Data, left_out: list[RunData]) -> bool:
-    """Whether the other runs have every spring, and wind on and off, as all runs have."""
+    """Whether the other runs have every spring, wind on and off, and an input of unknown gain, as all runs have."""
     gone = {run.id for run in left_out}
-    kept = [run for run in data.runs if run.id not in gone]
-    if {run.gain_free for run in data.runs} != {run.gain_free for run in kept}:
-        return False
-    springs = {run.spring_stiffness for run in data.runs} == {run.spring_stiffness for run in kept}
-    return springs and {run.wind_on for run in data.runs} == {run.wind_on for run in kept}
+
+    def kinds(runs: Sequence[RunData]) -> tuple[set[object], ...]:
+        return (
+            {run.gain_free for run in runs},
+            {run.spring_stiffness for run in runs},
+            {run.wind_on for run in runs},
+        )
+
+    return kinds(data.runs) == kinds([run for run in data.runs if run.id not in gone])
 
 
 def predict_held_out(whole: Fit) -> HeldOut:
-    """Refit without each group of runs, and predict it.
-
-    Args:
-        whole: the fit of all runs, from which the smaller fits start.
-
-    Returns:
-        The excess of every run that could be left out.
-    """
+    """Refit without each group of runs, starting from the fit of all, and predict it."""
     data = whole.problem.data
     residuals: dict[str, Array] = {}
     points: dict[str, tuple[Array, Array]] = {}
@@ -96,7 +94,7 @@ def predict_held_out(whole: Fit) -> HeldOut:
         try:
             common = fit_seen(whole, seen)[0].common
             released, left = refit_releases(
-                _restricted(whole.problem, [ids[i] for i in out]),
+                replace(whole.problem, data=data.subset(tuple(ids[i] for i in out))),
                 Point(common, whole.point.release[out]),
                 [whole.jacobian[i][1] for i in out],
             )
@@ -134,15 +132,10 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
     return best, residuals
 
 
-def _restricted(problem: Problem, ids: list[str]) -> Problem:
-    return replace(problem, data=problem.data.subset(tuple(ids)))
-
-
 def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list[Array]]:
     """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
 
     Args:
-        whole: the fit of all blocks, from which this one starts.
         seen: by run the blocks to fit, shape (n,).
 
     Returns:
@@ -184,10 +177,6 @@ def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
 
     See docs/decisions/0016-held-out-cause-by-cause.md.
 
-    Args:
-        nominal: gives the runs and their cycles.
-        ids: of the runs to divide into stretches.
-
     Returns:
         By run, shape (n,): the turn, or −1 in the other runs. Every third stretch is left out in the same turn.
     """
@@ -203,10 +192,6 @@ def turns_of(nominal: Fit, ids: Collection[str]) -> list[NDArray[np.int64]]:
 
 def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
     """Refit without each turn's stretches, and predict them. No parameter sees the readings left out.
-
-    Args:
-        whole: the fit of all blocks, from which the smaller fits start.
-        turns: from `turns_of`.
 
     Returns:
         By id of the runs that are divided: reading minus prediction in noise standard deviations, every block
@@ -226,3 +211,199 @@ def predict_stretches(whole: Fit, turns: Turns) -> dict[str, Array]:
             if left.any():
                 found[run.id][left] = residual[left]
     return found
+
+
+@dataclass(frozen=True)
+class Base:
+    """The noise that an excess is measured against.
+
+    Args:
+        variance: of one sample, rad²: noise and stated resolution.
+        extra: share that a coarse step adds to it.
+        hum: share that a hum adds to it.
+    """
+
+    variance: float
+    extra: float
+    hum: float
+
+
+def excess_base(study: Study) -> Base:
+    """The noise that would remain with a perfect model.
+
+    Returns:
+        The stated noise, where it is stated and contradicted by the records or by the readings' step; else the
+        noise estimated from the records.
+    """
+    estimated = float(np.mean(list(study.noise.variance.values())))
+    stated = study.noise.stated_variance
+    hum = 0.0 if study.hum is None else study.hum.excess
+    if stated is not None and (study.coarse or study.test.noisy):
+        return Base(stated, max(estimated / stated - 1.0, 0.0), hum * estimated / stated)
+    if study.coarse:
+        fine = (study.campaign.sensor.resolution or 0.0) ** 2 / 12.0
+        alone = max(estimated - study.step**2 / 12.0, 0.05 * estimated) + fine
+        return Base(alone, estimated / alone - 1.0, hum * estimated / alone)
+    return Base(estimated, 0.0, hum)
+
+
+_ITERATIONS = 6  # the fit of all causes is close for the parameters that are left
+_NO_GAIN = 0.999  # of the χ² of a fit of fewer causes: another start may do better
+
+Names = frozenset[str]
+
+
+class Subsets:
+    """Fits by the set of causes in them, each made once."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self.causes: Names = frozenset(kind.name for kind in study.chosen.problem.effects)
+        self._fits: dict[Names, Fit] = {self.causes: study.chosen, frozenset(): study.nominal}
+
+    def __call__(self, names: Collection[str]) -> Fit:
+        """The best fit found with these causes.
+
+        Returns:
+            The study's own fit, or else one started from the fit of all causes. Where a fit of fewer of them is
+            better, the missing cause is added to that; a cause that gains nothing leaves the fit as it was.
+        """
+        key = frozenset(names)
+        if key not in self._fits:
+            fewer = min((known for known in self._fits if known < key), key=lambda k: self._fits[k].total)
+            known, own = self._fits[fewer], self._study.hypothesis(sorted(key))
+            if own is None:
+                start = restricted(self._study.chosen, key)
+                found = try_fit(
+                    start.problem, start.point, base=start, tolerance=1e-3, max_iterations=_ITERATIONS
+                )
+                found = _finite(found)
+            else:
+                found = own.fit
+            if found is None or found.total > _NO_GAIN * known.total:
+                added: Fit | None = known
+                for kind in self._study.chosen.problem.effects:
+                    if kind.name in key - fewer and added is not None:
+                        added = one_more(added, kind)
+                found = added or found
+            self._fits[key] = known if found is None or found.total > known.total else found
+        return self._fits[key]
+
+
+def one_more(base: Fit, kind: type[Effect]) -> Fit | None:
+    """A fit with one more effect, the better from its first two starting points; None where none succeeds."""
+    tried = (_finite(try_fit(start.problem, start.point)) for start in starting_points(base, kind)[:2])
+    return min((found for found in tried if found), key=lambda found: found.total, default=None)
+
+
+def _finite(found: Fit | None) -> Fit | None:
+    return found if found is not None and np.isfinite(found.total) else None
+
+
+def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
+    """Add the causes one after another in their best order, and take each alone out of the whole.
+
+    ``known`` holds what is held out of fits already. The excesses are those of the fits' own integrator. The order
+    is greedy: each cause is the one that closes most next in the fitted readings. A random moment comes last, since
+    it absorbs what the others would explain.
+    """
+    models = _Models(study, base, known)
+    names: Names = frozenset()
+    steps = [Step(None, models.excess(names))]
+    left = sorted(models.causes)
+    while left:
+        best = min(left, key=lambda name: models.fitted_excess(names | {name}))
+        names |= {best}
+        left.remove(best)
+        steps.append(Step(best, models.excess(names)))
+    random = study.random_answer(study.fitted)
+    if random is None:
+        without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
+    else:
+        last = models.random_excess(random)
+        without = {name: last + size for name, size in models.read_off.items()}
+        without[random.kind.name] = steps[-1].excess
+        steps.append(Step(random.kind.name, last))
+    return Waterfall(tuple(steps), without, models.words)
+
+
+def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
+    """The first and the last step only: the nominal model, and all causes together."""
+    models = _Models(study, base, known)
+    last = Step(" + ".join(sorted(models.causes)), models.excess(models.causes))
+    return Waterfall((Step(None, models.excess(frozenset())), last), {}, models.words)
+
+
+class _Models:
+    """The model with some of the causes: what it leaves of the gap."""
+
+    def __init__(self, study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> None:
+        self._study, self._base, self._known = study, base, dict(known)
+        powers = {HUM.name: base.hum, COARSE_STEP.name: base.extra}
+        self.read_off = {name: powers[name] for name in study.read_off if study.named}  # and what each adds
+        self._ratio = 1.0 + base.extra  # of the estimated noise to the base
+        self._always = base.hum + base.extra - sum(self.read_off.values())
+        self._fit = Subsets(study)
+        self.causes: Names = self._fit.causes | self.read_off.keys()
+        out = self._held_out(study.nominal)
+        self._ids = [run.id for run in study.nominal.problem.data.runs]
+        self._turns: Turns = turns_of(study.nominal, {run for run in self._ids if run not in out.residuals})
+        self._excess: dict[Fit, float] = {}
+
+    @property
+    def words(self) -> str:
+        """What is held out of the fits."""
+        runs = len(self._held_out(self._study.nominal).residuals)
+        if runs == len(self._ids):
+            return "on runs held out of the fit"
+        if runs == 0:
+            return "on stretches of time held out of the fit"
+        return "on runs held out of the fit, and on stretches of time where a run is the only one of its kind"
+
+    def fitted_excess(self, names: Names) -> float:
+        """What the causes leave in the readings they are fitted to, in noise variances of a sample."""
+        fitted = self._fit(names - self.read_off.keys())
+        return self._in_samples(dict(zip(self._ids, fitted.residuals, strict=True))) + self._left(names)
+
+    def excess(self, names: Names) -> float:
+        """What the causes leave in readings held out of the fit, in noise variances of a sample."""
+        fitted = self._fit(names - self.read_off.keys())
+        if fitted not in self._excess:
+            self._excess[fitted] = self._in_samples(self._predicted(fitted))
+        return self._excess[fitted] + self._left(names)
+
+    def random_excess(self, random: RandomAnswer) -> float:
+        """What all causes and a random moment leave: the moment's innovations where the wind is on."""
+        runs = self._study.nominal.problem.data.runs
+        still = self._predicted(self._study.chosen)
+        by_run = {
+            run.id: random.process.excess if run.wind_on else float(np.mean(still[run.id] ** 2)) - 1.0
+            for run in runs
+        }
+        return self._weighted(by_run) + self._left(self.causes)
+
+    def _left(self, names: Names) -> float:
+        """What the causes read off the records, as far as not among the names, add to the excess."""
+        return self._always + sum(size for name, size in self.read_off.items() if name not in names)
+
+    def _predicted(self, fitted: Fit) -> dict[str, Array]:
+        seen = dict(zip(self._ids, fitted.residuals, strict=True))
+        found = seen | self._held_out(fitted).residuals | predict_stretches(fitted, self._turns)
+        still = {run.id: run.scaled(run.reading) for run in fitted.problem.data.runs}
+        # a prediction that grows without bound is as good as none
+        return {run: r if np.all(np.isfinite(r)) else still[run] for run, r in found.items()}
+
+    def _held_out(self, fitted: Fit) -> HeldOut:
+        if fitted not in self._known:
+            self._known[fitted] = predict_held_out(fitted)
+        return self._known[fitted]
+
+    def _in_samples(self, residuals: Mapping[str, Array]) -> float:
+        return self._weighted({run: float(np.mean(r**2)) - 1.0 for run, r in residuals.items()})
+
+    def _weighted(self, excess: Mapping[str, float]) -> float:
+        """Mean over the runs' samples of an excess given in block means, in noise variances of a sample."""
+        runs = self._study.nominal.problem.data.runs
+        sizes = np.array([run.reading.size * run.block for run in runs], np.float64)
+        own = np.array([excess[run.id] / run.block for run in runs])
+        return float(sizes @ own / sizes.sum() * self._ratio)

@@ -23,11 +23,7 @@ _PHASES_TRIED = (1, 720, 72)  # of each of the rival's none, one or two, to fit
 
 
 def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
-    """The feasible run whose readings the two models predict most differently.
-
-    Args:
-        first: a fitted model.
-        second: its rival, fitted to the same runs.
+    """The feasible run whose readings two models, fitted to the same runs, predict most differently.
 
     Returns:
         Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected
@@ -36,21 +32,22 @@ def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
     data = first.problem.data
     if data.normalised:
         return None
-    best: tuple[float, RunData, float] | None = None
-    for run, angle in _designs(first):
-        difference = separation(first, second, run, angle)
-        if difference is not None and (best is None or difference > best[0]):
-            best = (difference, run, angle)
-    if best is None:
-        return None
-    apart, run, angle = best
-    return {
-        "spring_stiffness": run.spring_stiffness,
-        "wind_speed": run.wind_speed,
-        "release_angle": angle,
-        "duration": run.duration,
-        "separation": apart,
-    }
+    density = max((run.air_density for run in data.runs), default=0.0) or 1.2
+    factors = _STIFFNESS_FACTORS if data.law is None else ()  # a model's spring cannot be chosen
+    springs = sorted({round(k * f, 2) for k in data.springs for f in factors} | set(data.springs))
+    springs = springs[:: max(1, len(springs) // 4)]
+    speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
+    found = []
+    for spring, speed, duration in itertools.product(springs, speeds, _DURATIONS):
+        run = planned_run(
+            first, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
+        )
+        for angle in _ANGLES:
+            apart = separation(first, second, run, angle)
+            if apart is not None:
+                design = {"spring_stiffness": spring, "wind_speed": speed, "release_angle": angle}
+                found.append(design | {"duration": duration, "separation": apart})
+    return max(found, key=lambda one: one["separation"], default=None)
 
 
 def planned_run(
@@ -59,7 +56,6 @@ def planned_run(
     """A run not yet made, with the sampling and the noise of the runs made.
 
     Args:
-        fit: to the runs made.
         spring_stiffness: Kr, N m/rad.
         wind_speed: V, m/s.
         air_density: ρ, kg/m³; not used where the wind is off.
@@ -81,29 +77,10 @@ def planned_run(
     )
 
 
-def _designs(fit: Fit) -> list[tuple[RunData, float]]:
-    data = fit.problem.data
-    density = max((run.air_density for run in data.runs), default=0.0) or 1.2
-    factors = _STIFFNESS_FACTORS if data.law is None else ()  # a model's spring cannot be chosen
-    springs = sorted({round(k * f, 2) for k in data.springs for f in factors} | set(data.springs))
-    speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
-    designs = []
-    for spring in springs[:: max(1, len(springs) // 4)]:
-        for speed in speeds:
-            for duration in _DURATIONS:
-                run = planned_run(
-                    fit, spring_stiffness=spring, wind_speed=speed, air_density=density, duration=duration
-                )
-                designs += [(run, angle) for angle in _ANGLES]
-    return designs
-
-
 def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | None:
     """How far apart two models predict one run's readings, after the run's own parameters are refitted.
 
     Args:
-        first: a fitted model.
-        second: its rival.
         run: its conditions and length; the reading in it is not used.
         angle: of the release, rad.
 
@@ -122,17 +99,11 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
 
 @dataclass(frozen=True, eq=False)
 class _Prediction:
-    """A run as a model predicts it.
+    """A run as a model predicts it."""
 
-    Args:
-        reading: mean over the phases of its periodic effects, rad, shape (n,).
-        waves: what the cosine and the sine of each phase add, rad, shape (n, 2 × effects).
-        slopes: derivatives to the release, shape (n, 2).
-    """
-
-    reading: Array
-    waves: Array
-    slopes: Array
+    reading: Array  # mean over the phases of its periodic effects, rad, shape (n,)
+    waves: Array  # what the cosine and the sine of each phase add, rad, shape (n, 2 × effects)
+    slopes: Array  # derivatives to the release, shape (n, 2)
 
 
 def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:

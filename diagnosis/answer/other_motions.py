@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from diagnosis.policy import SECOND_MODE_LEFT
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
@@ -15,7 +16,7 @@ from identification.signal.frequency import starting_frequency, thinned_reading
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
+from tunnel_sim.vocabulary.record import Array, evenly_spaced
 
 _MOST = 1024  # thinned readings used: fifty cycles
 _LEAST = 64
@@ -24,20 +25,13 @@ _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix penc
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
-    """Decaying oscillations whose sum is fitted to a reading.
+class _Modes:
+    """Decaying oscillations whose sum is fitted to a reading."""
 
-    Args:
-        frequency: shape (m,), Hz.
-        rate: decay rates, shape (m,), 1/s.
-        amplitude: at the first reading, shape (m,), rad.
-        left: sum of squared residuals, rad².
-    """
-
-    frequency: Array
-    rate: Array
-    amplitude: Array
-    left: float
+    frequency: Array  # Hz, shape (m,)
+    rate: Array  # of decay, 1/s, shape (m,)
+    amplitude: Array  # at the first reading, rad, shape (m,)
+    left: float  # sum of squared residuals, rad²
 
 
 def second_modes(campaign: Campaign) -> tuple[str, ...]:
@@ -48,36 +42,20 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
         the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
         its first quarter. Driven runs are left out.
     """
-    free = [run for run in campaign.runs if run.drive is None]
-    return tuple(words for run in free if (words := _second_mode(run.id, run.record)))
+    found = []
+    for run in campaign.runs:
+        frequency = starting_frequency(run.record) if run.drive is None else None
+        if frequency is not None:
+            reading = thinned_reading(evenly_spaced(run.record), frequency)
+            interval = float(reading.time[-1]) / (reading.time.size - 1)
+            parts = [reading.yaw[: int(part * min(reading.yaw.size, _MOST))] for part in _PARTS]
+            words = (_two_modes(run.id, part, interval) for part in parts if part.size >= _LEAST)
+            found.append(next(filter(None, words), ""))
+    return tuple(filter(None, found))
 
 
-def left_vectors(values: Array) -> Array:
-    """Left singular vectors of the Hankel matrix of evenly spaced readings.
-
-    Args:
-        values: shape (n,), rad.
-
-    Returns:
-        Shape (rows, rows), the leading vectors first.
-    """
-    rows = int(values.size * _ROWS)
-    hankel = np.lib.stride_tricks.sliding_window_view(values, values.size - rows + 1)
-    return np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
-
-
-def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Modes | None:
-    """Fit a sum of decaying oscillations by the poles of a Hankel matrix.
-
-    Args:
-        values: evenly spaced readings, shape (n,), rad.
-        interval: between them, s.
-        count: number of oscillations.
-        vectors: of `left_vectors`, shape (rows, rows).
-
-    Returns:
-        The modes; None where the poles are not those of so many oscillations.
-    """
+def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:
+    """A sum of ``count`` decaying oscillations by the poles of a Hankel matrix with these left singular vectors."""
     left = vectors[:, : 2 * count]
     poles = np.linalg.eigvals(np.linalg.pinv(left[:-1]) @ left[1:]).astype(np.complex128)
     exponents = np.asarray(np.log(poles[np.abs(poles) > 0.0]) / interval, np.complex128)
@@ -89,25 +67,13 @@ def fit_modes(values: Array, interval: float, count: int, vectors: Array) -> Mod
     weights = np.linalg.lstsq(columns, values, rcond=None)[0]
     residual = values - columns @ weights
     amplitude = np.hypot(weights[:count], weights[count : 2 * count])
-    return Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
-
-
-def _second_mode(name: str, record: Record) -> str:
-    frequency = starting_frequency(record)
-    if frequency is None:
-        return ""
-    reading = thinned_reading(evenly_spaced(record), frequency)
-    interval = float(reading.time[-1]) / (reading.time.size - 1)
-    for part in _PARTS:
-        values = reading.yaw[: int(part * min(reading.yaw.size, _MOST))]
-        if values.size >= _LEAST and (words := _two_modes(name, values, interval)):
-            return words
-    return ""
+    return _Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
 
 
 def _two_modes(name: str, values: Array, interval: float) -> str:
-    vectors = left_vectors(values)
-    one, two = (fit_modes(values, interval, count, vectors) for count in (1, 2))
+    hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
+    vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
+    one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
     if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
         return ""
     order = np.argsort(np.abs(two.frequency - one.frequency[0]))
@@ -130,14 +96,7 @@ _NOTE = "no damping ratio and no derivative is stated, since no run is a free de
 
 
 def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnosis:
-    """Replace the answer by what the examination recognised.
-
-    Args:
-        nominal: the answer without effects, for the gap to a free decay and the noise.
-
-    Returns:
-        The answer ``unknown``, without coefficients, place or rest.
-    """
+    """The answer without effects replaced by ``unknown`` without coefficients, for runs in a limit cycle."""
     excess = nominal.gap.excess_before
     return replace(
         nominal,
@@ -153,11 +112,7 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
 
 
 def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
-    """The refusal where not even the nominal model can be fitted to runs in a limit cycle.
-
-    Returns:
-        The error, which says what was recognised.
-    """
+    """The refusal where not even the nominal model can be fitted to runs in a limit cycle."""
     return TunnelError(
         f"no run is a free decay: {_recognised(remarks)}", remedy="add decays at a lower wind speed"
     )

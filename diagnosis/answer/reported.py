@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from diagnosis.answer.held_out import HeldOut
+from diagnosis.answer.held_out import Base, HeldOut
 from diagnosis.closure import Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Point, Problem, blocks_beyond, campaign_rig, condensed, sample_means
-from diagnosis.likelihood.run_data import RunData
 from diagnosis.policy import CONFIRMATION_TOLERANCE, GAP_FALSE_ALARM_RATE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
-from tunnel_sim.physics.run_settings import Motion, released_by_spring_end
+from tunnel_sim.physics.run_settings import released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -56,36 +54,28 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
         common: common parameters, shape (common,), or (runs, common) where each run has its own, as runs
             held out of different fits do.
         release: every run's own parameters, shape (runs, own).
-
-    Returns:
-        Residuals from the MuJoCo model, and its differences from the forward integrator.
     """
     runs = problem.data.runs
     each = np.broadcast_to(common, (len(runs), common.shape[-1]))
     distinct, which = np.unique(each, axis=0, return_inverse=True)
     forward = problem.predict([Point(row, release) for row in distinct])
-    noise = tuple(run.noise_std for run in runs)
     before = [forward[int(k)][i] for i, k in enumerate(which.ravel())]
-    predicted, failure = before, ""
     try:
-        predicted = mujoco_blocks(problem, each, release)
+        predicted, failure = mujoco_blocks(problem, each, release), ""
     except TunnelError as error:
-        failure = error.what
+        predicted, failure = before, error.what
     return Comparison(
         ids=tuple(run.id for run in runs),
         residuals=[run.scaled(run.reading - p) for run, p in zip(runs, predicted, strict=True)],
         shifts=[run.scaled(p - f) for run, p, f in zip(runs, predicted, before, strict=True)],
         differences=[p - f for p, f in zip(predicted, before, strict=True)],
-        noise=noise,
+        noise=tuple(run.noise_std for run in runs),
         failure=failure,
     )
 
 
 def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
     """Judge whether the two models agree.
-
-    Args:
-        comparisons: of all fits that are reported; at least one.
 
     Returns:
         The largest difference, and the root mean square difference of the run closest to its tolerance.
@@ -121,38 +111,24 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
     """
     from tunnel_sim.engine.simulate import simulate_motions  # only here: MuJoCo is slow to load
 
-    cases = [_Case(problem, common[i], release[i], run) for i, run in enumerate(problem.data.runs)]
-    by_interval: dict[float, list[_Case]] = {}
-    for case in cases:
-        by_interval.setdefault(case.run.interval, []).append(case)
-    blocks: dict[str, Array] = {}
-    for interval, group in by_interval.items():
-        rig = campaign_rig(problem.data)
-        motions = simulate_motions(rig, [case.physics for case in group], 1.0 / interval)
-        for case, motion in zip(group, motions, strict=True):
-            blocks[case.run.id] = case.reading(motion)
-    return [blocks[run.id] for run in problem.data.runs]
-
-
-class _Case:
-    """One run at one point, as MuJoCo simulates it."""
-
-    def __init__(self, problem: Problem, common: Array, own: Array, run: RunData) -> None:
-        self.run = run
-        self.chain = problem.chain(common, own, run)
-        self.zero = problem.zero(common, own)
-        physics = released_by_spring_end(condensed(self.chain.physics(), problem.data))
+    runs, rig = problem.data.runs, campaign_rig(problem.data)
+    chains = [problem.chain(*each) for each in zip(common, release, runs, strict=True)]
+    simulated: dict[float, list[int]] = {}  # by interval
+    settings = []
+    for i, (run, chain) in enumerate(zip(runs, chains, strict=True)):
+        physics = released_by_spring_end(condensed(chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
         if run.drive is not None:  # steps end at its samples
             steps = run.block * -(-steps // run.block)
-        blocks = run.reading.size + blocks_beyond(physics, run)
-        self.physics = dataclasses.replace(
-            physics, timestep=run.interval / steps, duration=(blocks + 1) * run.interval
-        )
-
-    def reading(self, motion: Motion) -> Array:
-        """Block means of the reading from the motion at the blocks' ends."""
-        return sample_means(self.chain, motion, self.run, self.zero)
+        duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
+        settings.append(replace(physics, timestep=run.interval / steps, duration=duration))
+        simulated.setdefault(run.interval, []).append(i)
+    found: dict[int, Array] = {}
+    for interval, places in simulated.items():
+        motions = simulate_motions(rig, [settings[i] for i in places], 1.0 / interval)
+        for i, motion in zip(places, motions, strict=True):
+            found[i] = sample_means(chains[i], motion, runs[i], problem.zero(common[i], release[i]))
+    return [found[i] for i in range(len(runs))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,18 +153,16 @@ class Reported:
 def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: HeldOut) -> Reported:
     """Predict what is reported with the MuJoCo model, each fit once.
 
-    Args:
-        nominal: fit of the nominal model.
-        chosen: fit of the answer; the nominal one where nothing fitted is part of it.
-        nominal_out: runs held out of the first.
-        chosen_out: runs held out of the second.
-
     Returns:
         The residuals. Those of the nominal model's held-out runs are the fits' own, corrected by MuJoCo's
         difference in the fit of all runs, which is close to it.
     """
     before = compare(nominal.problem, nominal.point.common, nominal.point.release)
-    before_out = _corrected(nominal_out, before)
+    before_out = {
+        run: nominal_out.residuals[run] - shift
+        for run, shift in zip(before.ids, before.shifts, strict=True)
+        if run in nominal_out.residuals
+    }
     comparisons = [before]
     if chosen is nominal:
         after = dict(zip(before.ids, before.residuals, strict=True)) | before_out
@@ -210,59 +184,8 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
     )
 
 
-def _corrected(held_out: HeldOut, fitted: Comparison) -> dict[str, Array]:
-    """Residuals of held-out runs with MuJoCo's differences from the fit of all runs taken off."""
-    return {
-        run: held_out.residuals[run] - shift
-        for run, shift in zip(fitted.ids, fitted.shifts, strict=True)
-        if run in held_out.residuals
-    }
-
-
-@dataclass(frozen=True)
-class Base:
-    """The noise that an excess is measured against.
-
-    Args:
-        variance: of one sample, rad²: noise and stated resolution.
-        extra: share that a coarse step adds to it.
-        hum: share that a hum adds to it.
-    """
-
-    variance: float
-    extra: float
-    hum: float
-
-
-def excess_base(study: Study) -> Base:
-    """The noise that would remain with a perfect model.
-
-    Args:
-        study: its noise, step and hum.
-
-    Returns:
-        The stated noise, where it is stated and contradicted by the records or by the readings' step; else the
-        noise estimated from the records.
-    """
-    estimated = float(np.mean(list(study.noise.variance.values())))
-    stated = study.noise.stated_variance
-    hum = 0.0 if study.hum is None else study.hum.excess
-    if stated is not None and (study.coarse or study.test.noisy):
-        return Base(stated, max(estimated / stated - 1.0, 0.0), hum * estimated / stated)
-    if study.coarse:
-        fine = (study.campaign.sensor.resolution or 0.0) ** 2 / 12.0
-        alone = max(estimated - study.step**2 / 12.0, 0.05 * estimated) + fine
-        return Base(alone, estimated / alone - 1.0, hum * estimated / alone)
-    return Base(estimated, 0.0, hum)
-
-
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
-    """The gap of the campaign and of every run, in noise variances of a sample.
-
-    Args:
-        base: what an excess is measured against.
-        shown: residuals from the MuJoCo model.
-    """
+    """The gap of the campaign and of every run, in noise variances of a sample."""
     ratio = base.extra + 1.0  # of the estimated noise to the base
     random = study.random_answer(study.fitted)
     explained = 0.0 if study.coarse and COARSE_STEP.name in study.causes else base.extra
@@ -302,12 +225,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
 def held_out_totals(gap: GapSummary, held_out: Waterfall) -> GapSummary:
     """The summary with the totals of the waterfall, so that every figure and sentence states the same gap.
 
-    Args:
-        gap: by run.
-        held_out: excesses on what was held out, of which no reading is fitted.
-
-    Returns:
-        As it was where nothing is found.
+    Nothing changes where nothing is found.
     """
     if not gap.detected:
         return gap

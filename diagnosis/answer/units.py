@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.result import Confirmation, Diagnosis, NoiseSummary, ParameterEstimate
+from diagnosis.result import Diagnosis, ParameterEstimate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
@@ -25,9 +25,6 @@ _PER_INERTIA = {
 
 def parameter_unit(name: str, campaign: Campaign) -> str:
     """The unit of an effect's parameter as identified.
-
-    Args:
-        name: ``effect.parameter``.
 
     Returns:
         The parameter's own unit; over that of Izz where any run states no spring, and times those of the frontal
@@ -49,15 +46,19 @@ def parameter_unit(name: str, campaign: Campaign) -> str:
         return in_si(functools.reduce(product, within, NUMBER))
     if info.unit == "l/V" and rig.reference_length is None:
         return "m"  # a·l, which over V is the time
-    return _per_inertia(info.unit) if normalised else info.unit
+    if not normalised:
+        return info.unit
+    of = dimension(info.unit)
+    by_mass = in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else info.unit
+    return _PER_INERTIA.get(info.unit, by_mass)
 
 
-def _per_inertia(unit: str) -> str:
-    """The unit of a quantity whose mass is divided by Izz."""
-    if unit in _PER_INERTIA:
-        return _PER_INERTIA[unit]
-    of = dimension(unit)
-    return in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
+#: By whether area and length are not stated: name and unit of the product identified in place of a coefficient.
+_PRODUCTS = {
+    (True, False): {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")},
+    (False, True): {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")},
+    (True, True): {"cn_beta": ("cn_beta_area_length", "m3/rad"), "cn_r": ("cn_r_area_length2", "m4/rad")},
+}
 
 
 def sized_coefficients(
@@ -67,37 +68,23 @@ def sized_coefficients(
 
     Args:
         found: ``cn_beta`` and ``cn_r``, with 1 in place of every size that is not stated; or other coefficients.
-        rig: which sizes are stated.
 
     Returns:
         The same where both sizes are stated; else Cnβ and Cnr times the missing ones, which their names say:
         ``cn_beta_area_length`` is Cnβ·A·l (m³/rad) and ``cn_r_area_length2`` is Cnr·A·l² (m⁴/rad).
     """
-    names = _sized_names(rig)
-    return {
-        names[name][0] if name in names else name: replace(value, unit=names[name][1])
-        if name in names
-        else value
-        for name, value in found.items()
-    }
-
-
-def _sized_names(rig: RigProperties) -> dict[str, tuple[str, str]]:
-    """Name and unit of the product identified in place of each coefficient."""
-    if rig.frontal_area is not None and rig.reference_length is not None:
-        return {}
-    if rig.reference_length is not None:
-        return {"cn_beta": ("cn_beta_area", "m2/rad"), "cn_r": ("cn_r_area", "m2/rad")}
-    if rig.frontal_area is not None:
-        return {"cn_beta": ("cn_beta_length", "m/rad"), "cn_r": ("cn_r_length2", "m2/rad")}
-    return {"cn_beta": ("cn_beta_area_length", "m3/rad"), "cn_r": ("cn_r_area_length2", "m4/rad")}
+    products = _PRODUCTS.get((rig.frontal_area is None, rig.reference_length is None), {})
+    sized = {}
+    for name, value in found.items():
+        identified, unit = products.get(name, (name, value.unit))
+        sized[identified] = replace(value, unit=unit)
+    return sized
 
 
 def size_note(rig: RigProperties, *, windy: bool) -> str:
     """What is identified in place of the coefficients where sizes are not stated.
 
     Args:
-        rig: which sizes are stated.
         windy: whether there are aerodynamic coefficients at all.
 
     Returns:
@@ -125,29 +112,28 @@ _STEPS = {
 
 
 def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
-    """The answer with the parameters of the measured rig; what remains (`Remainder`) has its units already.
-
-    Args:
-        answer: for the similar campaign; its candidates, maps and places are in the measured campaign's units
-            already.
-        similarity: how that was made.
-
-    Returns:
-        The same answer in the measured campaign's units.
-    """
+    """The answer with the parameters of the measured rig; what remains (`Remainder`) has its units already."""
 
     def own(values: Mapping[str, ParameterEstimate]) -> dict[str, ParameterEstimate]:
         return {name: own_estimate(value, similarity) for name, value in values.items()}
 
+    given, noise, found = answer.coefficients, answer.noise, answer.confirmation
+    stated, reading = noise.stated_std, similarity.reading
+    factor = similarity.own(1.0, reading)
     return replace(
         answer,
-        coefficients=replace(
-            answer.coefficients,
-            before=own(answer.coefficients.before),
-            after=own(answer.coefficients.after),
+        coefficients=replace(given, before=own(given.before), after=own(given.after)),
+        noise=replace(
+            noise,
+            std=similarity.own(noise.std, reading),
+            stated_std=None if stated is None else similarity.own(stated, reading),
         ),
-        noise=_noise(answer.noise, similarity),
-        confirmation=_confirmation(answer.confirmation, similarity),
+        confirmation=replace(
+            found,
+            largest_difference=found.largest_difference * factor,
+            rms_difference=found.rms_difference * factor,
+            tolerance=found.tolerance * factor,
+        ),
         next_run=None if answer.next_run is None else own_next_run(answer.next_run, similarity),
     )
 
@@ -159,8 +145,6 @@ def own_parameters(
 
     Args:
         given: by ``effect.parameter``, in the effects' own units, for the similar campaign.
-        campaign: says which sizes and springs are stated.
-        similarity: how the similar campaign was made.
 
     Returns:
         The same quantities, in the units of `parameter_unit`. The coefficient of another power of the rate than the
@@ -183,15 +167,7 @@ def own_parameters(
 
 
 def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:
-    """An estimate in the measured campaign's units.
-
-    Args:
-        estimate: for the similar campaign.
-        similarity: how that was made.
-
-    Returns:
-        The same quantity, its value and standard deviation changed alike.
-    """
+    """An estimate in the measured campaign's units, its value and standard deviation changed alike."""
 
     def own(value: float) -> float:
         return similarity.own(value, estimate.unit)
@@ -205,38 +181,11 @@ def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> Paramet
     )
 
 
-def _noise(noise: NoiseSummary, similarity: Similarity) -> NoiseSummary:
-    stated = noise.stated_std
-    return replace(
-        noise,
-        std=similarity.own(noise.std, similarity.reading),
-        stated_std=None if stated is None else similarity.own(stated, similarity.reading),
-    )
-
-
-def _confirmation(found: Confirmation, similarity: Similarity) -> Confirmation:
-    factor = similarity.own(1.0, similarity.reading)
-    return replace(
-        found,
-        largest_difference=found.largest_difference * factor,
-        rms_difference=found.rms_difference * factor,
-        tolerance=found.tolerance * factor,
-    )
-
-
 def own_next_run(run: Mapping[str, Any], similarity: Similarity) -> dict[str, Any]:
-    """A run to make (`separating_run`) in the measured campaign's units, rounded to what an operator can set.
-
-    Args:
-        run: for the similar campaign.
-        similarity: how that was made.
-    """
+    """A run to make (`separating_run`) in the measured campaign's units, rounded to what an operator can set."""
     own = {name: similarity.own(v, _NEXT_RUN[name]) if name in _NEXT_RUN else v for name, v in run.items()}
-    return {name: _settable(value, _STEPS[name]) if name in _STEPS else value for name, value in own.items()}
-
-
-def _settable(value: float, step: float) -> float:
-    """A value that an operator can set: a whole number of steps, or two digits where it is only a few steps."""
-    if abs(value) < 10.0 * step:
-        return float(f"{value:.2g}")
-    return round(round(value / step) * step, 6)
+    for name, step in _STEPS.items():
+        if name in own:  # a whole number of steps, or two digits where it is only a few steps
+            few = abs(own[name]) < 10.0 * step
+            own[name] = float(f"{own[name]:.2g}") if few else round(round(own[name] / step) * step, 6)
+    return own

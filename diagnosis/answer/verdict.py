@@ -1,18 +1,28 @@
-"""The answer in plain words, and its caveats, each with its remedy."""
+"""The answer in plain words: the verdict, caveats with their remedies, and what remains of the gap."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 
-from diagnosis.closure import Remainder, of_swing, rms_shown
+import numpy as np
+from scipy.special import chdtrc
+
+from diagnosis.closure import Move, Remainder, of_swing, rms_shown
+from diagnosis.likelihood.run_data import Data
+from diagnosis.noise.gap import gap_test
+from diagnosis.noise.rounding import rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.policy import FEW_RUNS, NOISE_CONTRADICTED
-from diagnosis.printing import Decision, plain, probability, share, undecided_words
-from diagnosis.result import Confirmation, GapSummary, RunGap
+from diagnosis.policy import FEW_RUNS, GAP_FALSE_ALARM_RATE, MATERIAL_SHARE, NOISE_CONTRADICTED
+from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
+from diagnosis.result import Confirmation, GapSummary, ParameterEstimate, RunGap
+from diagnosis.search.investigate import Study
 from diagnosis.search.weigh import UNKNOWN
-from identification.printing import significant
+from identification.printing import COEFFICIENTS, significant, unit_mark
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
+
+Estimates = Mapping[str, ParameterEstimate]
 
 
 def cautions(
@@ -21,20 +31,52 @@ def cautions(
     """The caveats of an answer.
 
     Args:
-        noise: found in them.
         runs: the gap by run, which says whether the run could be held out of the fit.
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
-
-    Returns:
-        Sentences; none where there is nothing to caution against.
     """
-    found = [*_stiffness(campaign), *_noise(noise), *_integrators(confirmation)]
-    if len(campaign.runs) < FEW_RUNS:
-        number = "one run" if len(campaign.runs) == 1 else f"{len(campaign.runs)} runs"
+    found = []
+    if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
         found.append(
-            f"There {'is' if len(campaign.runs) == 1 else 'are'} {number} only: causes are distinguished by the "
-            f"form of the decay alone. Add runs with other springs, wind speeds and release angles."
+            "No run states spring_stiffness, so all runs are assumed to have the same spring, and moments are "
+            "per unit inertia. State it, or leave out the runs with another spring: a different spring looks like "
+            "a gap."
+        )
+    std = noise.estimated**0.5
+    ratio = std / noise.stated_variance**0.5 if noise.stated_variance else 1.0
+    said = f"The records' noise is {ratio:.3g} times what noise_std and resolution state"
+    if noise.source == "floor":
+        found.append(
+            f"The records contain almost no noise ({std:.1g} rad). The accuracy of the fits, "
+            f"{noise.used**0.5:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to "
+            f"simulated records."
+        )
+    elif ratio <= 1.0 / NOISE_CONTRADICTED:
+        found.append(
+            f"{said}. The answer is based on the noise found in the records; correct noise_std or leave it out."
+        )
+    elif ratio >= NOISE_CONTRADICTED:
+        found.append(
+            f"{said}, and noise above the stated level counts as a gap. If the sensor really is as noisy as that, "
+            f"correct noise_std or leave it out."
+        )
+    if confirmation.failure:
+        found.append(
+            f"The MuJoCo model could not follow the fitted motion ({confirmation.failure}), so all figures come "
+            f"from the fits' own integrator. Do not rely on the fitted parameters."
+        )
+    elif not confirmation.agrees:
+        found.append(
+            f"The fits' own integrator differs from the MuJoCo model by {confirmation.rms_difference:.1e} rad "
+            f"(root mean square over {confirmation.run}), more than a tenth of the noise "
+            f"({confirmation.tolerance:.1e} rad). The gap before and after comes from MuJoCo. The parameters and "
+            f"probabilities come from the fits, and may be wrong by as much."
+        )
+    if len(campaign.runs) < FEW_RUNS:
+        number = "is one run" if len(campaign.runs) == 1 else f"are {len(campaign.runs)} runs"
+        found.append(
+            f"There {number} only: causes are distinguished by the form of the decay alone. Add runs with other "
+            f"springs, wind speeds and release angles."
         )
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
@@ -51,55 +93,6 @@ def cautions(
     return tuple(found)
 
 
-def _stiffness(campaign: Campaign) -> list[str]:
-    if len(campaign.runs) == 1 or any(run.spring_stiffness is not None for run in campaign.runs):
-        return []
-    return [
-        "No run states spring_stiffness, so all runs are assumed to have the same spring, and moments are per unit "
-        "inertia. State it, or leave out the runs with another spring: a different spring looks like a gap."
-    ]
-
-
-def _noise(noise: Noise) -> list[str]:
-    std = noise.estimated**0.5
-    if noise.source == "floor":
-        return [
-            f"The records contain almost no noise ({std:.1g} rad). The accuracy of the fits, "
-            f"{noise.used**0.5:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to "
-            f"simulated records."
-        ]
-    if noise.stated_variance is None:
-        return []
-    ratio = std / noise.stated_variance**0.5
-    if 1.0 / NOISE_CONTRADICTED < ratio < NOISE_CONTRADICTED:
-        return []
-    said = f"The records' noise is {ratio:.3g} times what noise_std and resolution state"
-    if ratio < 1.0:
-        return [
-            f"{said}. The answer is based on the noise found in the records; correct noise_std or leave it out."
-        ]
-    return [
-        f"{said}, and noise above the stated level counts as a gap. If the sensor really is as noisy as that, "
-        f"correct noise_std or leave it out."
-    ]
-
-
-def _integrators(confirmation: Confirmation) -> list[str]:
-    if confirmation.failure:
-        return [
-            f"The MuJoCo model could not follow the fitted motion ({confirmation.failure}), so all figures come "
-            f"from the fits' own integrator. Do not rely on the fitted parameters."
-        ]
-    if confirmation.agrees:
-        return []
-    return [
-        f"The fits' own integrator differs from the MuJoCo model by {confirmation.rms_difference:.1e} rad (root "
-        f"mean square over {confirmation.run}), more than a tenth of the noise ({confirmation.tolerance:.1e} rad). "
-        f"The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, and may "
-        f"be wrong by as much."
-    ]
-
-
 _CHANNEL_WORDS = {
     "stiffness": "the restoring moment",
     "damping": "the damping",
@@ -110,20 +103,11 @@ _CHANNEL_WORDS = {
 
 
 def verdict(
-    causes: Sequence[str],
-    found: Decision,
-    gap: GapSummary,
-    *,
-    rest: Remainder,
-    both_winds: bool,
+    causes: Sequence[str], found: Decision, gap: GapSummary, *, rest: Remainder, both_winds: bool
 ) -> str:
     """The answer in one paragraph.
 
     Args:
-        causes: names; empty for no gap.
-        found: whether the answer is decided.
-        gap: how large it is, and how far it closes.
-        rest: what remains.
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
     """
     if not causes:
@@ -131,48 +115,28 @@ def verdict(
             f"No gap: the nominal model explains the runs down to their noise "
             f"(mean squared residual over noise variance, minus one: {gap.excess_before:+.3f})."
         )
-    size = _size(gap)
+    excess = gap.excess_before
+    size = f"{f'{excess:.2f}' if excess < 10.0 else significant(excess, 4)} times the noise power"
+    if gap.misfit is not None:
+        size = f"{rms_shown(gap.misfit, excess)} root mean square, {of_swing(gap.misfit, excess)}, {size}"
     if not found.decided:
         said = f"There is a gap ({size}), and its cause is undecided."
         with_first = f"With the first of them added, {share(gap.closed)} of the gap closes {gap.closed_on}."
         return " ".join((said, undecided_words(found), *(() if tuple(causes) == UNKNOWN else (with_first,))))
     if tuple(causes) == UNKNOWN:
         return f"There is a gap ({size}), and no effect of the vocabulary explains it. {rest.words}"
-    several = len(causes) > 1
-    sources = "; ".join(
-        _source(name, both_winds=both_winds) + (f" ({plain(name)})" if several else "") for name in causes
-    )
+    several, sources = len(causes) > 1, []
+    for name in causes:  # what each acts on and, where the campaign can show it, whether it needs the wind
+        kind = effect_class(name)
+        wind = (
+            f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}" if both_winds else ""
+        )
+        sources.append(f"{_CHANNEL_WORDS[kind.channel]}{wind}{f' ({plain(name)})' if several else ''}")
     return (
         f"The gap ({size}) comes {'only in part ' if rest.material else ''}"
         f"from {plain(*causes)} (probability {probability(found.credible[0][1])}): "
-        f"{sources}. With {'them' if several else 'it'} added, {share(gap.closed)} of the gap "
+        f"{'; '.join(sources)}. With {'them' if several else 'it'} added, {share(gap.closed)} of the gap "
         f"closes {gap.closed_on}. {rest.words}"
-    )
-
-
-def _size(gap: GapSummary) -> str:
-    """The gap, such as ``0.134° root mean square, 2.1 % of the swing, 19.34 times the noise power``."""
-    excess = gap.excess_before
-    times = f"{excess:.2f}" if excess < 10.0 else significant(excess, 4)
-    powers = f"{times} times the noise power"
-    if gap.misfit is None:
-        return powers
-    return f"{rms_shown(gap.misfit, excess)} root mean square, {of_swing(gap.misfit, excess)}, {powers}"
-
-
-def _source(name: str, *, both_winds: bool) -> str:
-    """What an effect acts on and, where the campaign can show it, whether it needs the wind."""
-    kind = effect_class(name)
-    acts_on = _CHANNEL_WORDS[kind.channel]
-    if not both_winds:
-        return acts_on
-    return f"{acts_on}, with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
-
-
-def cnr_note(causes: Sequence[str]) -> str:
-    """How to read the coefficients with the causes added, where a cause changes their meaning."""
-    return " ".join(
-        effect_class(name).caveat for name in causes if name != "unknown" and effect_class(name).caveat
     )
 
 
@@ -187,24 +151,11 @@ BLIND_SPOTS = (
 _OF_INPUT = "a common scale on the inertia and the moment of the input"
 
 
-def blind_spots(
-    *, springs: int, speeds: int, wind_off: bool, wind_on: bool, normalised: bool, driven: bool = False
-) -> tuple[str, ...]:
-    """What these runs cannot show.
-
-    Args:
-        springs: number of distinct stiffnesses; 0 where nothing holds the body.
-        speeds: number of distinct wind speeds above zero.
-        wind_off: whether there are runs with the wind off.
-        wind_on: whether there are runs with the wind on.
-        normalised: whether the stiffness is not stated.
-        driven: whether there are driven runs.
-
-    Returns:
-        Clauses; those that apply to every campaign come last.
-    """
+def blind_spots(data: Data) -> tuple[str, ...]:
+    """What these runs cannot show: clauses, those that apply to every campaign last."""
+    springs, speeds = len(data.springs), {run.wind_speed for run in data.runs if run.wind_on}
     found = []
-    if normalised:
+    if data.normalised:
         found.append("an error of a single spring: the runs state no stiffness")
     elif springs == 0:
         found.append(
@@ -214,15 +165,100 @@ def blind_spots(
         found.append(
             "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
         )
-    if not wind_on:
+    if not data.wind_on:
         found.append("any effect of the air: there is no run with the wind on")
-    elif speeds < 2:
+    elif len(speeds) < 2:
         found.append(
             "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
         )
-    if wind_on and not wind_off:
+    if data.wind_on and all(run.wind_on for run in data.runs):
         found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
-    if driven:
+    if data.driven:
         found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
-        return *found, BLIND_SPOTS[1], BLIND_SPOTS[2] if springs or normalised else _OF_INPUT, BLIND_SPOTS[3]
+        return (
+            *found,
+            BLIND_SPOTS[1],
+            BLIND_SPOTS[2] if springs or data.normalised else _OF_INPUT,
+            BLIND_SPOTS[3],
+        )
     return (*found, *BLIND_SPOTS)
+
+
+def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Remainder:
+    """Judge what the answer leaves of the gap; what chance explains is never material.
+
+    Args:
+        stated: the coefficients of the answer's fit with their standard deviations.
+        moved: by the same names, how far what remains moves them (`coefficient_move`), in their units.
+        excess: left on readings held out of the fit, in noise variances of a sample.
+    """
+    random = study.random_answer(study.fitted)
+    if random is not None:  # in its wind it leaves innovations
+        runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
+        still = [residual for run, residual in runs if not run.wind_on]
+        left = np.concatenate([*random.process.innovations, *still])
+        p_value = float(chdtrc(left.size, left @ left))
+    elif study.chosen is study.nominal:
+        p_value = study.test.p_value
+    else:  # no cause changes the tests of the noise itself: those of the residuals count
+        errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
+        p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
+    beyond_chance = p_value < GAP_FALSE_ALARM_RATE
+    moves, material = {}, []
+    for name, given in stated.items():
+        relative = moved[name] / abs(given.value) if given.value else None
+        moves[name] = Move(moved[name], relative, given.std, given.unit)
+        # by its standard deviation, or by 1 %, where the runs determine it
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
+        material += [name] if beyond_chance and far else []
+    words = _words(study, excess, stated, moves, material, beyond_chance=beyond_chance)
+    return Remainder(beyond_chance, excess, p_value, bool(material), moves, words)
+
+
+def _words(
+    study: Study,
+    excess: float,
+    stated: Estimates,
+    moves: Mapping[str, Move],
+    material: list[str],
+    *,
+    beyond_chance: bool,
+) -> str:
+    """What remains, in a sentence or two."""
+    if not study.causes:
+        return "No gap: nothing remains beyond the noise."
+    left = f"what remains ({noise_powers(excess)})" if study.named else "it"
+    if not beyond_chance:
+        return f"Explained; {left} is within the noise."
+    if material:
+        moved = _each(material, lambda name: _sized(moves[name].value, stated[name]))
+        start = f"Not all is explained: {left}" if study.named else "It"
+        return f"{start} could move {moved}. Do not trust the coefficients beyond the intervals given."
+    known = [name for name, move in moves.items() if move.std is not None]
+    if not known:
+        start = f"Explained; {left}" if study.named else "It"
+        return f"{start} concerns no coefficient that these runs determine."
+    bounds = _each(
+        known,
+        lambda name: f"less than {_sized(max(moves[name].value, moves[name].std or 0.0), stated[name])}",
+    )
+    return f"Explained; {left} moves {bounds}." if study.named else f"It hardly matters: it moves {bounds}."
+
+
+def _each(names: list[str], size: Callable[[str], str]) -> str:
+    return " and ".join(f"{COEFFICIENTS.get(name, name)} by {size(name)}" for name in names)
+
+
+def _sized(size: float, given: ParameterEstimate) -> str:
+    """A change of a coefficient as its share, rounded up; in its unit where the coefficient itself is uncertain."""
+    if given.std is not None and given.std < abs(given.value):
+        return f"{_rounded_up(100.0 * size / abs(given.value))} %"
+    return f"{_rounded_up(size)} {'' if given.unit == '1' else unit_mark(given.unit)}".strip()
+
+
+def _rounded_up(value: float) -> str:
+    """Two significant digits, never below the value."""
+    if value <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"

@@ -184,20 +184,13 @@ class Case:
     @property
     def rival(self) -> bool:
         """Whether the true effects were not the answer, but were named as possible confusions."""
-        return not self.right and set(self.truth) <= {
-            *(self.causes or ()),
-            *self.answer.get("ambiguous_with", ()),
-        }
+        mentioned = {*(self.causes or ()), *self.answer.get("ambiguous_with", ())}
+        return not self.right and set(self.truth) <= mentioned
 
     def error(self, name: str, when: str) -> tuple[float, float] | None:
-        """Error of a coefficient.
+        """Error of ``cn_beta`` or ``cn_r``, ``before`` or ``after`` the causes are added; None where there is none.
 
-        Args:
-            name: ``cn_beta`` or ``cn_r``.
-            when: ``before`` or ``after`` the causes are added.
-
-        Returns:
-            Estimate minus truth, in standard deviations and as a share of the truth; None where there is none.
+        Estimate minus truth, in standard deviations and as a share of the truth.
         """
         found = self.answer.get("coefficients", {}).get(when, {}).get(name)
         truth = self.coefficients.get(name)
@@ -210,15 +203,10 @@ class Case:
 def case(
     name: str, truth: Mapping[str, Any], answer: Mapping[str, Any], excluded: Sequence[str] = ()
 ) -> Case:
-    """Put a truth and an answer together.
+    """Put a truth, from the key, and an answer, the diagnosis' document, together.
 
     Args:
-        truth: from the key.
-        answer: the diagnosis' document.
-        excluded: effects that were withheld from the vocabulary.
-
-    Returns:
-        The case; its truth is ``unknown`` where one of its effects was withheld.
+        excluded: effects that were withheld from the vocabulary; the truth is ``unknown`` where it has one of them.
 
     Raises:
         ValueError: when truth or answer is malformed (pydantic's, which says where).
@@ -243,14 +231,7 @@ def case(
 
 
 def label(names: Sequence[str] | None) -> str:
-    """An answer or a truth in a word, for the confusion matrix.
-
-    Args:
-        names: effects, sorted.
-
-    Returns:
-        The effect's name, ``none``, ``unknown``, ``two or more`` or, for None, ``no answer``.
-    """
+    """An answer or truth in a word: its effect, ``none``, ``unknown``, ``two or more``; ``no answer`` if None."""
     if names is None:
         return "no answer"
     if not names:
@@ -312,11 +293,7 @@ class Found:
 
 
 def found_by_group(cases: Sequence[Case]) -> list[Found]:
-    """Causes found by group of campaigns, in the order of ``GROUPS``.
-
-    Args:
-        cases: truth and answer of every campaign.
-    """
+    """Causes found by group of campaigns, in the order of ``GROUPS``."""
     result = []
     for group, belongs in GROUPS.items():
         inside = [c for c in cases if belongs(c)]
@@ -341,11 +318,7 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
 def inclusions(cases: Sequence[Case]) -> list[tuple[list[float], list[bool]]]:
     """By campaign, the stated probability that each effect is among the causes, and whether it is.
 
-    Args:
-        cases: truth and answer of every campaign.
-
-    Returns:
-        Probabilities and flags. Small effects are left out, and so are campaigns without these probabilities.
+    Small effects are left out, and so are campaigns without these probabilities.
     """
     result = []
     for c in cases:

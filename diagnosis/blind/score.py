@@ -1,15 +1,14 @@
-"""Checks the hashes of a blind set and of its answers, opens the key and counts."""
+"""Checks the hashes of a blind set and of its answers, opens the key and counts; calibration of probabilities."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from diagnosis.blind.calibration import CalibrationBin, SmoothCalibration, calibration, smooth_calibration
 from diagnosis.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
 from diagnosis.blind.sets import (
     KEY,
@@ -18,15 +17,152 @@ from diagnosis.blind.sets import (
     campaign_folders,
     file_hash,
     folder_hash,
-    read_document,
     read_hashes,
 )
 from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
 from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
-from tunnel_sim.files.reading import as_described
+from tunnel_sim.files.reading import as_described, read_json
 from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.record import Array
+
+BINS = 10
+
+
+@dataclass(frozen=True)
+class CalibrationBin:
+    """Answers of about one probability.
+
+    Args:
+        low: end of the bin, probability.
+        high: other end, probability.
+        mean: their mean probability.
+        right: how many are right.
+    """
+
+    low: float
+    high: float
+    mean: float
+    right: Proportion
+
+
+def calibration(
+    probabilities: Sequence[float], right: Sequence[bool]
+) -> tuple[float, tuple[CalibrationBin, ...]]:
+    """Expected calibration error, and the bins that hold any answers.
+
+    The error is the mean over answers of |share right − mean probability| by bins of equal width; 0 for no answers.
+    """
+    p, hit = np.asarray(probabilities, dtype=float), np.asarray(right, dtype=bool)
+    if p.size == 0:
+        return 0.0, ()
+    which = np.minimum((p * BINS).astype(int), BINS - 1)
+    found = []
+    error = 0.0
+    for number in np.unique(which):
+        inside = which == number
+        mean, hits = float(p[inside].mean()), Proportion(int(hit[inside].sum()), int(inside.sum()))
+        found.append(CalibrationBin(number / BINS, (number + 1) / BINS, mean, hits))
+        error += hits.total / p.size * abs(hits.count / hits.total - mean)
+    return error, tuple(found)
+
+
+_POINTS = 401
+_WIDTHS = (0.005, 1.0)
+_HALVINGS = 20
+_RESAMPLES = 500
+_LEAST_WEIGHT = 1.0  # the curve is drawn where the kernel holds at least one statement
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothCalibration:
+    """The calibration of some statements without bins (Błasiok and Nakkiran 2023, arXiv:2309.12236).
+
+    Args:
+        error: smooth calibration error, a probability.
+        interval: of 95 %, by resampling campaigns at the width found.
+        width: standard deviation of the kernel, the one that equals the error it gives, a probability.
+        stated: probabilities of the curve, shape (points,).
+        observed: share that is true there, shape (points,).
+        low: lower end of its interval of 95 %, shape (points,).
+        high: upper end, shape (points,).
+        statements: number of statements.
+        campaigns: number of campaigns.
+    """
+
+    error: float
+    interval: tuple[float, float]
+    width: float
+    stated: Array
+    observed: Array
+    low: Array
+    high: Array
+    statements: int
+    campaigns: int
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """All figures but the curve."""
+        return {
+            "error": self.error, "interval_95": list(self.interval), "width": self.width,
+            "statements": self.statements, "campaigns": self.campaigns,
+        }  # fmt: skip
+
+
+def smooth_calibration(groups: Sequence[tuple[Sequence[float], Sequence[bool]]]) -> SmoothCalibration | None:
+    """Smooth calibration error of statements that come in groups; None without any.
+
+    Args:
+        groups: by campaign, stated probabilities and whether each is true.
+    """
+    if not groups:
+        return None
+    grid = np.linspace(0.0, 1.0, _POINTS)
+    counts, surplus = np.zeros((len(groups), _POINTS)), np.zeros((len(groups), _POINTS))
+    for row, (probabilities, true) in enumerate(groups):  # at the nearest points of the grid
+        p, y = np.asarray(probabilities, dtype=float), np.asarray(true, dtype=float)
+        at = np.rint(p * (_POINTS - 1)).astype(int)
+        counts[row] = np.bincount(at, minlength=_POINTS)
+        surplus[row] = np.bincount(at, weights=y - p, minlength=_POINTS)
+    # The error falls with the width, so that exactly one width equals its error.
+    low, high = _WIDTHS
+    for _ in range(_HALVINGS):
+        width = float(np.sqrt(low * high))
+        too_narrow = _error(_kernel(grid, width), surplus.sum(axis=0), counts.sum()) > width
+        low, high = (width, high) if too_narrow else (low, width)
+    kernel = _kernel(grid, high)
+    rng = np.random.default_rng(0)
+    drawn = rng.multinomial(len(groups), np.full(len(groups), 1.0 / len(groups)), _RESAMPLES)
+    errors = [_error(kernel, w @ surplus, float((w @ counts).sum())) for w in drawn]
+    weight = kernel @ counts.sum(axis=0) * high * np.sqrt(2.0 * np.pi)
+    shown = weight >= _LEAST_WEIGHT
+    observed = _curve(kernel, counts.sum(axis=0), surplus.sum(axis=0), grid)
+    curves = np.stack([_curve(kernel, w @ counts, w @ surplus, grid) for w in drawn])
+    ends = np.quantile(curves, (0.025, 0.975), axis=0)
+    return SmoothCalibration(
+        _error(kernel, surplus.sum(axis=0), float(counts.sum())),
+        (float(np.quantile(errors, 0.025)), float(np.quantile(errors, 0.975))),
+        high, grid[shown], observed[shown], ends[0][shown], ends[1][shown],
+        int(counts.sum()), len(groups),
+    )  # fmt: skip
+
+
+def _kernel(grid: Array, width: float) -> Array:
+    """Gaussian density between points of the grid, reflected at 0 and 1, shape (points, points)."""
+    a, b = grid[:, None], grid[None, :]
+    images = (sign * b + 2.0 * shift for shift in range(-2, 3) for sign in (1.0, -1.0))
+    density = sum(np.exp(-0.5 * ((a - image) / width) ** 2) for image in images)
+    return np.asarray(density / (width * np.sqrt(2.0 * np.pi)))
+
+
+def _error(kernel: Array, surplus: Array, number: float) -> float:
+    """∫ |mean of K (truth − probability)| over the probability."""
+    return float(np.trapezoid(np.abs(kernel @ surplus), dx=1.0 / (_POINTS - 1)) / number)
+
+
+def _curve(kernel: Array, counts: Array, surplus: Array, grid: Array) -> Array:
+    """Share that is true by kernel regression: the probability plus the mean surplus there."""
+    return np.clip(grid + kernel @ surplus / np.maximum(kernel @ counts, 1e-300), 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -103,8 +239,20 @@ class Score:
             ("both", "one of them", "one of them and another", "unknown", "none", "others"), 0
         )
         for c in self.cases:
-            if c.kind == "pair":
-                found[_pair_outcome(c)] += 1
+            if c.kind != "pair":
+                continue
+            named = set(c.causes or ())
+            if c.right:
+                outcome = "both"
+            elif c.causes == ():
+                outcome = "none"
+            elif c.causes == UNKNOWN:
+                outcome = "unknown"
+            elif not named & set(c.truth):
+                outcome = "others"  # or no answer
+            else:
+                outcome = "one of them" if named < set(c.truth) else "one of them and another"
+            found[outcome] += 1
         return found
 
     def calibration(self) -> tuple[float, tuple[CalibrationBin, ...]]:
@@ -188,10 +336,7 @@ class Score:
             "exact": as_json(self.exact()),
             "confusion": self.confusion(),
             "pairs": self.pairs(),
-            "calibration": {
-                "error": error,
-                "bins": as_json(bins),
-            },
+            "calibration": {"error": error, "bins": as_json(bins)},
             "found": {found.group: found.to_json_dict() for found in self.found()},
             "inclusion_calibration": as_json(self.inclusion()),
             "false_alarms": as_json(self.false_alarms()),
@@ -214,11 +359,7 @@ class Score:
 
 
 def score_set(
-    folder: Path,
-    *,
-    excluded: Sequence[str] = (),
-    key: Path | None = None,
-    effects_file: Path | None = None,
+    folder: Path, *, excluded: Sequence[str] = (), key: Path | None = None, effects_file: Path | None = None
 ) -> Score:
     """Check a set and its answers against their hashes, open the key and put both together.
 
@@ -240,10 +381,21 @@ def score_set(
         with as_described(
             "is no key", shown(folder / KEY if key is None else key), "name the key with --key"
         ):
-            truths, made_with = dict(document["truths"]), _made_with(document["made_with"])
+            truths, made_with = dict(document["truths"]), document["made_with"] or {}
+            if made_with:
+                made_with = {
+                    **made_with,
+                    "count": int(made_with["count"]),
+                    "seed": int(made_with["seed"]),
+                    "kinds": {str(kind): float(share) for kind, share in made_with["kinds"].items()},
+                    "textbook": float(made_with["textbook"]),
+                    "rare": float(made_with["rare"]),
+                    "variety": float(made_with.get("variety", 0.0)),
+                    "small": float(made_with.get("small", 0.0)),
+                }
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"
-        truths = {path.name: read_document(path / "truth.json", open_truth) for path in campaigns}
+        truths = {path.name: read_json(path / "truth.json", remedy=open_truth) for path in campaigns}
         key_sha256, made_with = "", {}
     cases = []
     for path in campaigns:
@@ -253,22 +405,6 @@ def score_set(
     return Score(
         tuple(cases), tuple(sorted(set(excluded))), key_sha256, answers_sha256, made_with, bool(key_sha256)
     )
-
-
-def _made_with(document: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments a set was made with, each of its kind; empty where the key holds none."""
-    if not document:
-        return {}
-    return {
-        **document,
-        "count": int(document["count"]),
-        "seed": int(document["seed"]),
-        "kinds": {str(kind): float(share) for kind, share in document["kinds"].items()},
-        "textbook": float(document["textbook"]),
-        "rare": float(document["rare"]),
-        "variety": float(document.get("variety", 0.0)),
-        "small": float(document.get("small", 0.0)),
-    }
 
 
 def _checked_answers(
@@ -289,7 +425,7 @@ def _checked_answers(
     answers = {}
     for path in campaigns:
         file = target / f"{path.name}.json"
-        answers[path.name] = read_document(file, again)
+        answers[path.name] = read_json(file, remedy=again)
         if file_hash(file) != hashes[path.name]:
             raise TunnelError("is not the answer that was given", where=str(file), remedy="restore it")
     return answers, file_hash(target / SEAL)
@@ -300,7 +436,7 @@ def _checked_key(
 ) -> tuple[dict[str, Any], str]:
     """The key, once everything is what it was when it was sealed."""
     hashes = read_hashes(folder / SEAL, "campaigns_sha256", "restore it")
-    key_sha256 = read_document(folder / SEAL, "restore it").get("key_sha256")
+    key_sha256 = read_json(folder / SEAL, remedy="restore it").get("key_sha256")
     if set(hashes) != {path.name for path in campaigns}:
         raise TunnelError("campaigns were added or removed", where=str(folder), remedy="restore the set")
     for path in campaigns:
@@ -311,7 +447,7 @@ def _checked_key(
                 "was answered from other data", where=str(path), remedy="remove the answers and answer again"
             )
     source = folder / KEY if key is None else key
-    document = read_document(source, "name the key with --key")
+    document = read_json(source, remedy="name the key with --key")
     if file_hash(source) != key_sha256:
         raise TunnelError(
             "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
@@ -321,17 +457,3 @@ def _checked_key(
 
 def _truth(c: Case) -> str:
     return "withheld" if c.withheld else label(c.truth)
-
-
-def _pair_outcome(c: Case) -> str:
-    """What was answered to a pair, in words."""
-    causes = set(c.causes or ("no answer",))
-    if c.right:
-        return "both"
-    if not c.causes:
-        return "none" if c.causes is not None else "others"
-    if causes == {"unknown"}:
-        return "unknown"
-    if causes < set(c.truth):
-        return "one of them"
-    return "one of them and another" if causes & set(c.truth) else "others"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import secrets
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,14 +35,7 @@ _CAMPAIGN = "campaign.toml"
 
 
 def write_document(path: Path, document: Mapping[str, Any]) -> str:
-    """Write JSON whole or not at all.
-
-    Args:
-        path: the file; replaced when it exists.
-        document: as for `tunnel_sim.files.writing.json_text`.
-
-    Returns:
-        SHA-256 of what was written, in hexadecimal.
+    """Write JSON whole or not at all, as `tunnel_sim.files.writing.json_text` makes it; its SHA-256 in hexadecimal.
 
     Raises:
         TunnelError: when the file cannot be written.
@@ -53,30 +46,13 @@ def write_document(path: Path, document: Mapping[str, Any]) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def read_document(path: Path, remedy: str) -> dict[str, Any]:
-    """Read a JSON document.
-
-    Args:
-        remedy: what to do when it is missing or broken.
-
-    Raises:
-        TunnelError: when it is missing, cannot be read or is no JSON object.
-    """
-    return read_json(path, remedy=remedy)
-
-
 def read_hashes(path: Path, key: str, remedy: str) -> dict[str, str]:
-    """Read hashes by name from a seal.
-
-    Args:
-        path: of the ``seal.json``.
-        key: under which they are listed.
-        remedy: what to do when the file is missing or broken.
+    """Read the hashes by name that a seal lists under a key.
 
     Raises:
         TunnelError: when the file is missing or malformed.
     """
-    found = read_document(path, remedy).get(key)
+    found = read_json(path, remedy=remedy).get(key)
     if not isinstance(found, dict) or not all(isinstance(value, str) for value in found.values()):
         raise TunnelError(f"has no hashes under '{key}'", where=shown(path), remedy=remedy)
     return found
@@ -88,14 +64,7 @@ def file_hash(path: Path) -> str:
 
 
 def folder_hash(folder: Path) -> str:
-    """SHA-256 over names and contents of a folder's files, in hexadecimal.
-
-    Args:
-        folder: with subfolders; hidden files are left out.
-
-    Returns:
-        A hash that changes when any file is changed, added, removed or renamed.
-    """
+    """SHA-256, in hexadecimal, over names and contents of a folder's files, but for hidden ones."""
     found = hashlib.sha256()
     for path in sorted(p for p in folder.rglob("*") if p.is_file() and not p.name.startswith(".")):
         found.update(f"{path.relative_to(folder).as_posix()}\0{file_hash(path)}\n".encode())
@@ -103,10 +72,7 @@ def folder_hash(folder: Path) -> str:
 
 
 def campaign_folders(folder: Path) -> list[Path]:
-    """Campaigns of a set, by name.
-
-    Returns:
-        Its subfolders that hold a campaign.
+    """Subfolders of a set that hold a campaign, by name.
 
     Raises:
         TunnelError: when there are none.
@@ -136,24 +102,19 @@ def make_blind(
     progress: MakeProgress | None = None,
     show_steps: bool = False,
 ) -> Path:
-    """Draw, simulate and write campaigns whose truth is only in the key.
+    """Draw, simulate and write campaigns whose truth is only in the key, and return the key's file.
 
     The key begins with 32 random bytes (the salt), so that the truth cannot be found by trying guesses against the
     published hash; the hash shows that the key was not changed later. The seed is in the key too, since the truth
     follows from it.
 
     Args:
-        out: folder to make.
-        count: number of campaigns.
         seed: of everything drawn; the same arguments give the same campaigns.
         shares: weight of each kind of campaign, of `tunnel_reference.draw.KINDS`.
         mixture: how often other forms, other circumstances and small effects are drawn.
         key: file of the key; inside the folder, beside the campaigns, when None.
         progress: called with the number of campaigns written and the number in all.
         show_steps: report on standard error how the sizing of the effects proceeds.
-
-    Returns:
-        The file of the key.
 
     Raises:
         TunnelError: when the folder or the key exists already, or the count is not above zero.
@@ -167,7 +128,15 @@ def make_blind(
             raise TunnelError("exists already", where=str(path), remedy="name another")
     mixture = mixture or Mixture()
     with whole_folder(out, replace=False) as partial:
-        truths = _write_campaigns(partial, count, seed, shares, mixture, progress, show_steps)
+        draws = draw_set(count, seed, dict(shares), mixture)
+        width = max(4, len(str(count)))
+        truths: dict[str, Any] = {}
+        for start in range(0, count, CHUNK):
+            for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
+                name = f"c{len(truths) + 1:0{width}d}"
+                truths[name] = truth_of(written(simulated, partial / name, show_steps))
+                if progress is not None:
+                    progress(len(truths), count)
         document = {
             "schema_version": SCHEMA_VERSION,
             "salt": secrets.token_hex(32),
@@ -191,38 +160,10 @@ def make_blind(
     return target
 
 
-def _write_campaigns(
-    folder: Path,
-    count: int,
-    seed: int,
-    shares: Mapping[str, float],
-    mixture: Mixture,
-    progress: MakeProgress | None,
-    show_steps: bool,
-) -> dict[str, Any]:
-    """Write the campaigns; their truths by name."""
-    draws = draw_set(count, seed, dict(shares), mixture)
-    width = max(4, len(str(count)))
-    truths: dict[str, Any] = {}
-    for start in range(0, count, CHUNK):
-        for simulated in simulate_set(draws[start : start + CHUNK], progress=show_steps):
-            name = f"c{len(truths) + 1:0{width}d}"
-            truths[name] = truth_of(written(simulated, folder / name, show_steps))
-            if progress is not None:
-                progress(len(truths), count)
-    return truths
-
-
 def written(simulated: Simulated, folder: Path, show_steps: bool) -> Simulated:
-    """Write a simulated campaign; one that the reader refuses, as for too few cycles, is drawn again.
+    """Write a simulated campaign to a folder of its name, and return it.
 
-    Args:
-        simulated: the campaign.
-        folder: to write, named as the campaign is to be.
-        show_steps: whether the steps of a second simulation are shown.
-
-    Returns:
-        The campaign that was written.
+    One that the reader refuses, as for too few cycles, is drawn again.
 
     Raises:
         TunnelError: when the reader refuses several draws in turn.
@@ -242,14 +183,9 @@ AnswerProgress = Callable[[int, int, str], None]
 
 
 def answers_folder(folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None) -> Path:
-    """Where the answers to a set go.
+    """Where the answers to a set go: ``answers`` in it, or ``answers-without-…-with-…``.
 
-    Args:
-        excluded: effects withheld from the vocabulary.
-        effects_file: of effects added to it; None: none.
-
-    Returns:
-        ``answers`` inside the set, or ``answers-without-…-with-…``, which ends with a hash of the effects file.
+    The latter ends with a hash of the file of effects added to the vocabulary.
     """
     without = ["without", *sorted(set(excluded))] if excluded else []
     names = sorted(kind.name for kind in _own_effects(effects_file))
@@ -289,61 +225,37 @@ def answer_set(
     vocabulary(exclude=excluded)
     target = answers_folder(folder, excluded, effects_file)
     output_folder(target)
-    hashes = _answered(target)
+    hashes: dict[str, str] = {}
+    if (target / SEAL).exists():
+        hashes = read_hashes(target / SEAL, "answers_sha256", "remove the folder and answer again")
+    for name, known in hashes.items():
+        path = target / f"{name}.json"
+        if not path.is_file() or file_hash(path) != known:
+            remedy = f"remove {target} and answer all campaigns again"
+            raise TunnelError("is not the answer that was given", where=str(path), remedy=remedy)
     names = {path.name for path in campaigns}
     left = [path for path in campaigns if path.name not in hashes]
     if progress is not None:
         progress(len(names & hashes.keys()), len(campaigns), "")
-    for name, answer in _answers(left, sorted(set(excluded)), jobs, effects_file):
+    without = tuple(sorted(set(excluded)))
+    work = partial(answer_campaign, excluded=without, effects_file=effects_file)
+    for _, (name, answer) in in_processes(work, left, jobs if jobs > 1 and len(left) > 1 else 0):
         hashes[name] = write_document(target / f"{name}.json", answer)
-        _write_seal(target, hashes, excluded)
+        seal = {
+            "schema_version": SCHEMA_VERSION,
+            "excluded": list(without),
+            "answers_sha256": dict(sorted(hashes.items())),
+        }
+        write_document(target / SEAL, seal)
         if progress is not None:
             progress(len(names & hashes.keys()), len(campaigns), name)
     return file_hash(target / SEAL)
-
-
-def _answered(target: Path) -> dict[str, str]:
-    """Hashes of the answers that exist, after a check of their files."""
-    if not (target / SEAL).exists():
-        return {}
-    hashes = read_hashes(target / SEAL, "answers_sha256", "remove the folder and answer again")
-    for name, known in hashes.items():
-        path = target / f"{name}.json"
-        if not path.is_file() or file_hash(path) != known:
-            raise TunnelError(
-                "is not the answer that was given",
-                where=str(path),
-                remedy=f"remove {target} and answer all campaigns again",
-            )
-    return hashes
-
-
-def _write_seal(target: Path, hashes: dict[str, str], excluded: Sequence[str]) -> None:
-    document = {
-        "schema_version": SCHEMA_VERSION,
-        "excluded": sorted(set(excluded)),
-        "answers_sha256": dict(sorted(hashes.items())),
-    }
-    write_document(target / SEAL, document)
-
-
-def _answers(
-    campaigns: Sequence[Path], excluded: Sequence[str], jobs: int, effects_file: Path | None
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Name and answer of each campaign, as they come."""
-    work = partial(answer_campaign, excluded=tuple(excluded), effects_file=effects_file)
-    processes = jobs if jobs > 1 and len(campaigns) > 1 else 0
-    return (answer for _, answer in in_processes(work, campaigns, processes))
 
 
 def answer_campaign(
     folder: Path, excluded: Sequence[str] = (), effects_file: Path | None = None
 ) -> tuple[str, dict[str, Any]]:
     """Diagnose one campaign of a set.
-
-    Args:
-        excluded: effects withheld from the vocabulary.
-        effects_file: of effects added to it; None: none.
 
     Returns:
         Its name and its answer: the diagnosis' JSON document with ``wall_s`` (s) and ``data_sha256``, or, where

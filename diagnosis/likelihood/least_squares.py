@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -43,13 +45,7 @@ def normal_equations(
     damping: float = 0.0,
     products: Products | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Normal matrix and gradient of the common parameters with every run's release eliminated.
-
-    Args:
-        jacobian: from `sensitivities`.
-        residuals: scaled.
-        damping: of the release's own step, as a share of its diagonal.
-        products: of the jacobian, where they are known.
+    """Normal matrix and gradient of the common parameters, each run's release eliminated; arguments as in `by_run`.
 
     Returns:
         Matrix (common, common), gradient (common,), and the (runs, own, common + 1) solutions that give the
@@ -97,18 +93,13 @@ def damped_step(
     damping: float,
     products: Products | None = None,
 ) -> Point:
-    """Where a Gauss–Newton step leads.
+    """Where a Gauss–Newton step leads, the common parameters inside their bounds.
 
     Args:
-        problem: gives the bounds.
-        point: where to start.
         residuals: scaled, by run.
         jacobian: from `sensitivities`, of the same rows as the residuals.
         damping: added to the scaled normal matrix's diagonal, dimensionless.
         products: of the jacobian, where they are known.
-
-    Returns:
-        The point, its common parameters inside their bounds.
     """
     matrix, gradient, solutions = normal_equations(jacobian, residuals, damping, products)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
@@ -129,9 +120,6 @@ def bounded_step(matrix: Array, gradient: Array, lower: Array, upper: Array) -> 
         gradient: shape (n,).
         lower: least steps, at most 0, shape (n,).
         upper: greatest steps, at least 0, shape (n,).
-
-    Returns:
-        Steps within their bounds, shape (n,).
     """
     step, free = np.zeros(gradient.size), np.ones(gradient.size, dtype=bool)
     while free.any():
@@ -151,9 +139,6 @@ def project_release(change: Array, slopes: Array) -> Array:
     Args:
         change: shape (n,).
         slopes: derivatives to the release, shape (n, own).
-
-    Returns:
-        The remainder, shape (n,).
     """
     left: Array = change - slopes @ np.linalg.lstsq(slopes, change, rcond=1e-10)[0]
     return left
@@ -178,8 +163,6 @@ class Fit:
     """A fitted problem.
 
     Args:
-        problem: what was fitted.
-        point: the parameter values found.
         residuals: reading minus prediction in noise standard deviations, by run.
         chi2: sum of their squares, by run, shape (runs,).
         covariance: of the common parameters for the assumed noise, releases eliminated, shape (common, common).
@@ -244,9 +227,8 @@ class Fit:
         i = self.problem.names.index(name)
         value = self.point.common[i]
         for end, limits in zip(("lower", "upper"), self.problem.bounds, strict=True):
-            if np.isfinite(limits[i]) and abs(value - limits[i]) <= _AT_BOUND * max(
-                abs(limits[i]), abs(value)
-            ):
+            near = _AT_BOUND * max(abs(limits[i]), abs(value))
+            if np.isfinite(limits[i]) and abs(value - limits[i]) <= near:
                 return end
         return None
 
@@ -262,14 +244,9 @@ def fit(
     """Minimise χ² from a starting point.
 
     Args:
-        start: parameter values to start from.
         base: a fit of the same runs with fewer effects. While progress is good, its sensitivities are used for
             the parameters that both have, which saves most of the simulations.
         tolerance: the fit goes on while a step lowers χ² by this share, or by 0.1.
-        max_iterations: Gauss–Newton steps at most.
-
-    Returns:
-        The fit at the best point found.
 
     Raises:
         FitError: when the model cannot be integrated at the start.
@@ -292,15 +269,15 @@ def fit(
     return state.result(converged)
 
 
+def try_fit(problem: Problem, start: Point, **options: Any) -> Fit | None:
+    """The fit, its arguments as in `fit`; None where it fails."""
+    with suppress(FitError, np.linalg.LinAlgError):
+        return fit(problem, start, **options)
+    return None
+
+
 def fit_at(problem: Problem, point: Point) -> Fit:
     """The fit that stands at a point found by other means.
-
-    Args:
-        problem: runs and effects.
-        point: parameter values.
-
-    Returns:
-        Residuals and sensitivities there.
 
     Raises:
         FitError: when the model cannot be integrated there.
@@ -347,40 +324,29 @@ class _State:
 
     def result(self, converged: bool) -> Fit:
         """The fit as it stands."""
+        none = [np.zeros(common.shape[0]) for common, _ in self.jacobian]
+        matrix, _, _ = normal_equations(self.jacobian, none, products=self.products)
+        scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+        inverse = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
         return Fit(
             self.problem,
             self.point,
             self.residuals,
             np.array([float(r @ r) for r in self.residuals]),
-            _covariance(self.jacobian, self.products),
+            np.asarray(inverse / np.outer(scale, scale), dtype=np.float64),
             self.jacobian,
             converged,
         )
 
 
 def clip(problem: Problem, point: Point) -> Point:
-    """Bring the common parameters inside their bounds.
-
-    Args:
-        problem: gives the bounds.
-        point: parameter values.
-
-    Returns:
-        The point, its common parameters clipped.
-    """
+    """The point, its common parameters brought inside their bounds."""
     lower, upper = problem.bounds
     return Point(np.clip(point.common, lower, upper), point.release)
 
 
 def scaled_residuals(problem: Problem, point: Point) -> list[Array]:
-    """Reading minus prediction.
-
-    Args:
-        point: parameter values.
-
-    Returns:
-        Residuals in noise standard deviations, by run, each of the shape of the run's reading.
-    """
+    """Reading minus prediction in noise standard deviations, by run."""
     return _scaled(problem, problem.predict([point])[0])
 
 
@@ -398,14 +364,10 @@ def _cost(residuals: list[Array]) -> float:
 
 
 def difference_steps(problem: Problem, common: Array) -> Array:
-    """Steps for one-sided finite differences of the common parameters, away from bounds.
+    """Steps for one-sided finite differences of the common parameters, away from bounds, in the parameters' units.
 
     Args:
-        problem: gives the parameters and their bounds.
         common: their values, shape (common,).
-
-    Returns:
-        Steps, shape (common,), each in its parameter's unit.
     """
     data = problem.data
     windy = [run for run in data.runs if run.wind_on]
@@ -482,18 +444,6 @@ def sensitivities(
         if base is None:
             result.append((np.stack(common, axis=1), np.stack(ends, axis=1)))
         else:
-            result.append(
-                (
-                    np.column_stack([base.jacobian[r][0], *common]),
-                    np.column_stack([base.jacobian[r][1], *ends]),
-                )
-            )
+            known_common, known_ends = base.jacobian[r]
+            result.append((np.column_stack([known_common, *common]), np.column_stack([known_ends, *ends])))
     return result
-
-
-def _covariance(jacobian: list[tuple[Array, Array]], products: Products | None) -> Array:
-    none = [np.zeros(c.shape[0]) for c, _ in jacobian]
-    matrix, _, _ = normal_equations(jacobian, none, products=products)
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse: Array = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)

@@ -9,38 +9,22 @@ the time scale of the rig that was measured.
 from __future__ import annotations
 
 import dataclasses
-import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 from identification.signal.driven import driven_start
 from identification.signal.frequency import peak_of_swing
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
 from tunnel_sim.vocabulary.rig import JointLaw
 from tunnel_sim.vocabulary.units import dimension
 
-REFERENCE_FREQUENCY = 2.0
-"""Frequency of the similar rig, Hz."""
-
-REFERENCE_STIFFNESS = 16.0
-"""Median stiffness of its springs, N m/rad."""
-
+REFERENCE_FREQUENCY = 2.0  # of the similar rig, Hz
+REFERENCE_STIFFNESS = 16.0  # median of its springs, N m/rad
+#: Inertia of the similar rig where it has no springs, kg m².
 REFERENCE_INERTIA = REFERENCE_STIFFNESS / (2.0 * np.pi * REFERENCE_FREQUENCY) ** 2
-"""Inertia of the similar rig, kg m², where it has no springs."""
-
-
-@functools.cache
-def _powers(unit: str) -> tuple[float, float]:
-    """How a quantity changes, by its unit: powers of m and s.
-
-    Speeds stay as they are, so a length changes as a time does; a mass then changes as a moment does. The rig's
-    sizes have rules of their own (`_rig`).
-    """
-    kg, metres, seconds = dimension(unit)
-    return (0.0, 0.0) if kg == seconds == 0.0 else (kg, metres + seconds)
 
 
 @dataclass(frozen=True)
@@ -70,9 +54,6 @@ class Similarity:
         Args:
             value: in the unit.
             unit: SI; one without time or moment leaves the value as it is, as does a speed.
-
-        Returns:
-            In the same unit.
         """
         return value / self._factor(unit)
 
@@ -82,15 +63,15 @@ class Similarity:
         Args:
             value: in the unit.
             unit: as in `own`.
-
-        Returns:
-            In the same unit.
         """
         return value * self._factor(unit)
 
     def _factor(self, unit: str) -> float:
-        moment, time = _powers(unit)
-        return float(self.moment**moment * self.time**time)
+        """Speeds stay as they are, so a length changes as a time does; a mass then changes as a moment does."""
+        kg, metres, seconds = dimension(unit)
+        if kg == seconds == 0.0:  # the rig's sizes have rules of their own
+            return 1.0
+        return float(self.moment**kg * self.time ** (metres + seconds))
 
 
 AS_MEASURED = Similarity()
@@ -100,47 +81,59 @@ AS_MEASURED = Similarity()
 def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
     """The campaign of the similar rig.
 
-    Args:
-        campaign: as measured.
-
     Returns:
         The similar campaign, and how it was made. Its wind-off runs have a median frequency of
         `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`; where no stiffness is
         stated the inertia is 1 before and after. Where nothing holds the body, its inertia is the one that swings
         at that frequency on a spring of that stiffness.
     """
+    rig, sensor = campaign.rig, campaign.sensor
     still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
     time = float(np.median([free_frequency(run) for run in still])) / REFERENCE_FREQUENCY
     springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
-    normalised = len(springs) < len(campaign.runs)
     if campaign.unrestrained:
-        moment = REFERENCE_INERTIA / (_inertia(campaign) * time**2)
+        inertia = rig.yaw_inertia
+        if not inertia:  # by the response to the known moments
+            found = [(run.input_gain or 1.0, response_to_input(run)) for run in campaign.runs]
+            inertia = float(
+                np.median([gain / response[2] for gain, response in found if response is not None])
+            )
+        moment = REFERENCE_INERTIA / (inertia * time**2)
+    elif len(springs) < len(campaign.runs):
+        moment = time**-2
     else:
-        moment = time**-2 if normalised else REFERENCE_STIFFNESS / float(np.median(springs))
+        moment = REFERENCE_STIFFNESS / float(np.median(springs))
     rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
-    unit = ("rad", "rad/s", "rad/s2")[campaign.sensor.derivative]
+    unit = ("rad", "rad/s", "rad/s2")[sensor.derivative]
     change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
-    return (
-        dataclasses.replace(
-            campaign,
-            rig=_rig(campaign.rig, change),
-            sensor=_sensor(campaign.sensor, change),
-            runs=tuple(_run(run, change) for run in campaign.runs),
-            law=None if campaign.law is None else _law(campaign.law, change),
-        ),
-        change,
+
+    def similar(value: float | None, unit: str) -> float | None:
+        return None if value is None else change.similar(value, unit)
+
+    similar_rig = RigProperties(
+        similar(rig.yaw_inertia, "kg m2"),
+        None if rig.frontal_area is None else rig.frontal_area * change.area,
+        None if rig.reference_length is None else rig.reference_length * time,
+        None if rig.width is None else rig.width * time,
     )
+    similar_sensor = dataclasses.replace(
+        sensor,
+        sample_rate=similar(sensor.sample_rate, "Hz"),
+        resolution=similar(sensor.resolution, unit),
+        noise_std=similar(sensor.noise_std, unit),
+    )
+    runs = tuple(_run(run, change) for run in campaign.runs)
+    law = None if campaign.law is None else _law(campaign.law, change)
+    return dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=runs, law=law), change
 
 
 _PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
+_MOST_CORNER = 8.0  # times the motion: of a body that is mostly damping the inertia hardly shows
+_MOTION = 0.999  # share of the swing's power that the lines of the motion hold: beyond them is noise
 
 
 def frequency(record: Record) -> float:
-    """The frequency of a decay.
-
-    Returns:
-        The peak of its spectrum, Hz.
-    """
+    """The frequency of a decay, the peak of its spectrum, Hz."""
     record = evenly_spaced(record, bridged=False)
     swing = record.yaw_rad - np.mean(record.yaw_rad)
     size = _PADDING * swing.size
@@ -157,13 +150,16 @@ def free_frequency(run: Run) -> float:
     """
     found = response_to_input(run)
     if run.unrestrained:
-        moved, corner = _rate_frequency(run.record), 0.0 if found is None else found[0] / np.pi
+        angle = run.record.yaw_rad
+        power = np.abs(np.fft.rfft((angle - np.mean(angle)) * np.hanning(angle.size)))[1:] ** 2
+        lines = int(np.searchsorted(np.cumsum(power), _MOTION * power.sum())) + 1
+        at = np.arange(1, lines + 1) / (angle.size * run.record.sample_interval)
+        moved = float(np.sum(at**3 * power[:lines]) / np.sum(at**2 * power[:lines]))
+        corner = 0.0 if found is None else found[0] / np.pi
         return float(np.clip(corner, moved, _MOST_CORNER * moved))
-    return (
-        frequency(run.record)
-        if found is None or found[1] <= 0.0
-        else float(np.sqrt(found[1])) / (2.0 * np.pi)
-    )
+    if found is None or found[1] <= 0.0:
+        return frequency(run.record)
+    return float(np.sqrt(found[1])) / (2.0 * np.pi)
 
 
 def response_to_input(run: Run) -> tuple[float, float, float] | None:
@@ -176,49 +172,6 @@ def response_to_input(run: Run) -> tuple[float, float, float] | None:
         return None
     record = run.record
     return driven_start(record.time_s, record.yaw_rad, run.drive.values, sprung=not run.unrestrained)
-
-
-_MOST_CORNER = 8.0  # times the motion: of a body that is mostly damping the inertia hardly shows
-_MOTION = 0.999  # share of the swing's power that the lines of the motion hold: beyond them is noise
-
-
-def _rate_frequency(record: Record) -> float:
-    """Mean frequency of the power of a rate, Hz, over the lines that hold most of the angle's power."""
-    power = np.abs(np.fft.rfft((record.yaw_rad - np.mean(record.yaw_rad)) * np.hanning(record.yaw_rad.size)))
-    power = power[1:] ** 2
-    lines = int(np.searchsorted(np.cumsum(power), _MOTION * power.sum())) + 1
-    at = np.arange(1, lines + 1) / (record.yaw_rad.size * record.sample_interval)
-    return float(np.sum(at**3 * power[:lines]) / np.sum(at**2 * power[:lines]))
-
-
-def _inertia(campaign: Campaign) -> float:
-    """Inertia of a body that nothing holds, kg m²: as stated, or by the response to the known moments."""
-    if campaign.rig.yaw_inertia:
-        return campaign.rig.yaw_inertia
-    found = [(run.input_gain or 1.0, response_to_input(run)) for run in campaign.runs]
-    return float(np.median([moment / response[2] for moment, response in found if response is not None]))
-
-
-def _rig(rig: RigProperties, change: Similarity) -> RigProperties:
-    inertia, width = rig.yaw_inertia, rig.width
-    return RigProperties(
-        None if inertia is None else change.similar(inertia, "kg m2"),
-        None if rig.frontal_area is None else rig.frontal_area * change.area,
-        None if rig.reference_length is None else rig.reference_length * change.time,
-        None if width is None else width * change.time,
-    )
-
-
-def _sensor(sensor: SensorProperties, change: Similarity) -> SensorProperties:
-    def similar(value: float | None, unit: str) -> float | None:
-        return None if value is None else change.similar(value, unit)
-
-    return dataclasses.replace(
-        sensor,
-        sample_rate=similar(sensor.sample_rate, "Hz"),
-        resolution=similar(sensor.resolution, change.reading),
-        noise_std=similar(sensor.noise_std, change.reading),
-    )
 
 
 def _law(law: JointLaw, change: Similarity) -> JointLaw:

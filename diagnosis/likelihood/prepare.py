@@ -50,16 +50,34 @@ def prepare(
     rig = campaign.rig
     held = {} if campaign.law is None else campaign.law.held
     dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
-    runs = (
-        _prepare_run(run, noise_variance[run.id], campaign.sensor.derivative, interval, dense=dense)
-        for run in campaign.runs
-    )
     normalised = any(run.spring_stiffness is None for run in campaign.runs)
+    runs = []
+    for run in campaign.runs:
+        record = run.record
+        block = max(1, round(interval * record.sample_rate))
+        count = record.yaw_rad.size // block
+        samples = None if record.uniform else Samples.of(record, block)
+        if samples is None:
+            reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
+        else:
+            since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
+            reading = samples.means(np.interp(samples.time, since, record.yaw_rad))
+        data = RunData(
+            id=run.id,
+            reading=reading,
+            block=block,
+            interval=block * record.sample_interval,
+            noise_variance=noise_variance[run.id] / block,
+            spring_stiffness=run.spring_stiffness,
+            wind_speed=run.wind_speed,
+            air_density=(run.air_density or 0.0) if dense else 1.0,
+            duration=record.duration + record.sample_interval,
+            derivative=campaign.sensor.derivative,
+            samples=samples,
+        )
+        runs.append(data if run.drive is None else _driven(data, run, normalised=normalised))
     return Data(
-        runs=tuple(
-            data if run.drive is None else _driven(data, run, normalised=normalised)
-            for data, run in zip(runs, campaign.runs, strict=True)
-        ),
+        runs=tuple(runs),
         frontal_area=rig.frontal_area or similarity.area,
         reference_length=rig.reference_length or similarity.time,
         width=rig.width or 0.0,
@@ -68,33 +86,6 @@ def prepare(
         own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held and not campaign.unrestrained,
         similarity=similarity,
         law=campaign.law,
-    )
-
-
-def _prepare_run(
-    run: Run, noise_variance: float, derivative: int, interval: float, *, dense: bool
-) -> RunData:
-    record = run.record
-    block = max(1, round(interval * record.sample_rate))
-    count = record.yaw_rad.size // block
-    samples = None if record.uniform else Samples.of(record, block)
-    if samples is None:
-        reading = record.yaw_rad[: count * block].reshape(count, block).mean(axis=1)
-    else:
-        since = record.time_s - record.time_s[0] + 0.5 * record.sample_interval
-        reading = samples.means(np.interp(samples.time, since, record.yaw_rad))
-    return RunData(
-        id=run.id,
-        reading=reading,
-        block=block,
-        interval=block * record.sample_interval,
-        noise_variance=noise_variance / block,
-        spring_stiffness=run.spring_stiffness,
-        wind_speed=run.wind_speed,
-        air_density=(run.air_density or 0.0) if dense else 1.0,
-        duration=record.duration + record.sample_interval,
-        derivative=derivative,
-        samples=samples,
     )
 
 
@@ -123,27 +114,21 @@ def without_start(data: Data) -> Data:
         The data with every run cut at the first passage through its mean after its first turning point; a run
         that would lose more than a quarter stays as it is.
     """
-    return dataclasses.replace(data, runs=tuple(_without_start(run) for run in data.runs))
-
-
-def _without_start(run: RunData) -> RunData:
-    values = run.reading - np.mean(run.reading)
-    passages = np.flatnonzero(np.diff(np.signbit(values)))
-    turn = int(np.argmax(np.abs(values[: passages[0] + 1]))) if passages.size else 0
-    later = passages[passages > turn]
-    if later.size == 0 or later[0] > values.size // 4:
-        return run
-    return run.part(int(later[0]) + 1)
+    runs = []
+    for run in data.runs:
+        values = run.reading - np.mean(run.reading)
+        passages = np.flatnonzero(np.diff(np.signbit(values)))
+        turn = int(np.argmax(np.abs(values[: passages[0] + 1]))) if passages.size else 0
+        later = passages[passages > turn]
+        stays = later.size == 0 or later[0] > values.size // 4
+        runs.append(run if stays else run.part(int(later[0]) + 1))
+    return dataclasses.replace(data, runs=tuple(runs))
 
 
 def without_rest(data: Data) -> Data:
-    """The runs up to where their motion ends.
+    """The runs up to their last reading that differs from their end by more than a fiftieth of their largest swing.
 
     Where dry friction stops a body depends on its last swing discontinuously, so that χ² has many minima.
-
-    Returns:
-        The data with every run cut after its last reading that differs from its end by more than a fiftieth of its
-        largest swing.
     """
     return dataclasses.replace(data, runs=tuple(run.part(last=_moves_until(run)) for run in data.runs))
 
@@ -180,13 +165,10 @@ _ITERATIONS = 15
 
 
 def long_stretch(short: Stretches) -> int:
-    """Length, in blocks, of the stretches on which sets of causes are compared.
+    """Length, in blocks, of the stretches on which sets of causes are compared, from stretches of two cycles.
 
     Over eighteen cycles a model of the motion shows in the phase as well; over a hundred the phase shows the clock,
     the temperature and the hand that let go.
-
-    Args:
-        short: stretches of two cycles.
     """
     return short.length * _LONG // _SHORT
 
@@ -215,13 +197,10 @@ class Stretches:
 
 
 def in_stretches(data: Data, length: int | None = None) -> Stretches:
-    """Cut runs into stretches.
+    """Cut runs into stretches, which may be fitted with effects that are autonomous.
 
     Args:
         length: of a stretch, in blocks; two cycles where not given. Multiples of it have ends in common.
-
-    Returns:
-        The stretches. They may be fitted with effects that are autonomous.
     """
     if length is None:
         length = round(_SHORT / (REFERENCE_FREQUENCY * data.runs[0].interval))
@@ -237,9 +216,6 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
 
 def spread_out(short: Stretches, data: Data) -> Stretches:
     """Stretches of two cycles to grow sets of causes on, spread over the runs where all would be too many.
-
-    Args:
-        short: all of them.
 
     Returns:
         Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least

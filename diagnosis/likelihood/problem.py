@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.parameters import SWING, ParameterInfo
+from tunnel_sim.effects.parameters import SWING
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate, slow_motion
 from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
@@ -89,14 +89,11 @@ class Problem:
         return 3 if self.data.own_zeros else 2
 
     def zero(self, common: Array, own: Array) -> float:
-        """The sensor's zero in one run.
+        """The sensor's zero in one run, in the unit of the reading.
 
         Args:
             common: as in `Point`, shape (common,).
             own: of the run, a row of ``Point.release``, shape (own,).
-
-        Returns:
-            In the unit of the reading.
         """
         if self.data.own_zeros:
             return float(own[2])
@@ -107,20 +104,16 @@ class Problem:
     @cached_property
     def effect_names(self) -> tuple[str, ...]:
         """Names of the free effect parameters, as ``effect.parameter``."""
+        # in small swings the rest angle of a body that nothing else holds acts as a constant moment does
+        loose = self.data.normalised or (self.data.unrestrained and self.data.swing < SWING)
         names = [
             f"{kind.name}.{info.name}"
             for kind in self.effects
             for info in kind.parameters()
-            if self._is_free(kind, info)
+            if (not info.form or kind.name in self.free_forms) and not (info.beside_spring and loose)
         ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)
-
-    def _is_free(self, kind: type[Effect], info: ParameterInfo) -> bool:
-        freed = not info.form or kind.name in self.free_forms
-        # in small swings the rest angle of a body that nothing else holds acts as a constant moment does
-        loose = self.data.normalised or (self.data.unrestrained and self.data.swing < SWING)
-        return freed and not (info.beside_spring and loose)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -133,13 +126,9 @@ class Problem:
         return tuple(kind.name for kind in self.effects if kind.line or kind.skips)
 
     def own_places(self, width: int) -> dict[str, slice]:
-        """Where the phase or the instants of each effect are among a run's own parameters.
+        """Where the phase or the instants of each effect are among a run's own parameters, by the effects' names.
 
-        Args:
-            width: number of a run's own parameters (a count), which gives the number of instants.
-
-        Returns:
-            By the effects' names.
+        ``width`` is the number of a run's own parameters, which gives the number of instants.
         """
         places, first = {}, self.first_phase
         instants = width - first - len(self.phased) + 1
@@ -171,15 +160,11 @@ class Problem:
         )
 
     def stated(self, common: Array, release: Array, run: RunData) -> RunSettings:
-        """The nominal physics of one run.
+        """The nominal physics of one run, before any effect.
 
         Args:
             common: as in `Point`, shape (common,).
             release: of the run, shape (2,).
-            run: conditions.
-
-        Returns:
-            The physics, before any effect.
         """
         value = {**self._held, **dict(zip(self.names, common.tolist(), strict=True))}
         law = self.data.law
@@ -203,16 +188,12 @@ class Problem:
     def chain(
         self, common: Array, own: Array, run: RunData, effects: tuple[Effect, ...] | None = None
     ) -> EffectChain:
-        """The effects of one run.
+        """The effects of one run, with the phases and instants that it has.
 
         Args:
             common: as in `Point`, shape (common,).
             own: the run's own parameters, a row of ``Point.release``, shape (own,).
-            run: conditions.
             effects: from `effects_at`, where they are known already.
-
-        Returns:
-            The effects with the phases and instants that the run has.
         """
         phases = {name: own[place] for name, place in self.own_places(own.size).items()}
         drawn = tuple(
@@ -223,21 +204,28 @@ class Problem:
         return EffectChain(self.stated(common, own, run), known, drawn)
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
-        """Predicted block means.
+        """Predicted block means of the reading, for every point, for every run.
 
-        Args:
-            points: parameter values.
-
-        Returns:
-            For every point, for every run, the reading's block means, rad; infinite where the motion grows
-            without bound, or a parameter is not finite.
+        In rad; infinite where the motion grows without bound, or a parameter is not finite.
         """
         found = [[np.full(run.reading.size, np.inf) for run in self.data.runs] for _ in points]
         alike: dict[object, list[tuple[int, int, _Job]]] = {}  # those of one motion, which is integrated once
+        # jobs whose moment law another run may share: the zero and, where no effect knows the time or the release,
+        # the release do not matter to it
         first: dict[object, _Job] = {}
+        autonomous = all(kind.autonomous for kind in self.effects)
         for i, point in enumerate(points):
-            for r, job in self._jobs(point, first):
-                alike.setdefault(job.motion, []).append((i, r, job))
+            if not np.all(np.isfinite(point.common)):
+                continue
+            effects = self.effects_at(point.common)
+            named = zip(self.names, point.common.tolist(), strict=True)
+            law = tuple(value for name, value in named if name != "zero")
+            for r, run in enumerate(self.data.runs):
+                if np.all(np.isfinite(point.release[r])):
+                    like = first.get((law, run.conditions)) if autonomous else None
+                    job = _Job(self, point, r, effects) if like is None else like.released(self, point, r)
+                    first.setdefault((law, run.conditions), job)
+                    alike.setdefault(job.motion, []).append((i, r, job))
         motions = list(alike.values())
         groups = -(-len(motions) // _TOGETHER)
         half = max(1, -(-groups // _THREADS)) * _TOGETHER
@@ -250,27 +238,6 @@ class Problem:
             for (i, r, _), values in zip(motion, readings, strict=True):
                 found[i][r] = values
         return found
-
-    def _jobs(self, point: Point, first: dict[object, _Job]) -> Iterator[tuple[int, _Job]]:
-        """What there is to integrate at a point, by run.
-
-        ``first`` holds jobs whose moment law another run may share: the zero and, where no effect knows the time or
-        the release, the release do not matter to it.
-        """
-        if not np.all(np.isfinite(point.common)):
-            return
-        effects = self.effects_at(point.common)
-        autonomous = all(kind.autonomous for kind in self.effects)
-        matters = [
-            value for name, value in zip(self.names, point.common.tolist(), strict=True) if name != "zero"
-        ]
-        law = tuple(matters)
-        for r, run in enumerate(self.data.runs):
-            if np.all(np.isfinite(point.release[r])):
-                like = first.get((law, run.conditions)) if autonomous else None
-                job = _Job(self, point, r, effects) if like is None else like.released(self, point, r)
-                first.setdefault((law, run.conditions), job)
-                yield r, job
 
 
 class _Job:
@@ -343,28 +310,16 @@ class _Job:
 
 
 def blocks_beyond(physics: RunSettings, run: RunData) -> int:
-    """By how many blocks a motion must outlast the record.
-
-    Args:
-        physics: of the run, effects included.
-
-    Returns:
-        0 unless an effect reads the motion after the record's end.
-    """
+    """By how many blocks a motion must outlast the record: 0 unless an effect reads it after the end."""
     return int(np.ceil(max(0.0, physics.duration - run.duration) / run.interval))
 
 
 def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) -> Array:
-    """Block means of the reading, sample by sample.
+    """Block means of the reading, rad, sample by sample.
 
     Args:
-        chain: the run's effects.
         motion: at the blocks' ends.
-        run: gives samples and blocks.
         zero: of the sensor, rad.
-
-    Returns:
-        rad, of the shape of the run's ``reading``.
     """
     reading = chain.reading(chain.seen(motion, run.sample_times, run.derivative) + zero)
     return run.means(reading)
@@ -375,13 +330,6 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
 
     With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
     sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².
-
-    Args:
-        physics: of one run.
-        data: gives the reference sizes.
-
-    Returns:
-        The run with a rigid rod, or as it was where the rod is soft.
     """
     twist = physics.rod_twist
     if twist is None or twist.compliance > _SOFT_ROD:
@@ -397,11 +345,7 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
 
 
 def campaign_rig(data: Data) -> Rig:
-    """A rig of the campaign's own reference sizes.
-
-    Args:
-        data: gives A, l and width.
-    """
+    """A rig of the campaign's own reference sizes."""
     return _rig(data.frontal_area, data.reference_length, data.width)
 
 

@@ -1,11 +1,9 @@
-"""What residuals hold: spectral lines, and the misfit by channel.
+"""What residuals hold: spectral lines, the misfit by channel, and effects with a number of their own in every run.
 
-An error in the damping changes the amplitude of the motion, and one in the stiffness its phase. In every cycle of a
-run the residual is split into its part along the motion, its part along the rate, its mean, and the rest. What
-changes in proportion to time over a run is a damping or a frequency of the run's own.
-
-An error of the frequency makes χ² large, because phases add up over the cycles. Apart, it does not hide a cause in
-the damping, nor the other way round.
+An error in the damping changes the amplitude of the motion, and one in the stiffness its phase. So in every cycle
+the residual is split into its part along the motion, its part along the rate, its mean, and the rest; what changes
+in proportion to time over a run is a damping or a frequency of the run's own. An error of the frequency makes χ²
+large, because phases add up: apart, it does not hide a cause in the damping, nor the other way round.
 """
 
 from __future__ import annotations
@@ -19,6 +17,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.whitening import correlate
+from tunnel_sim.effects.base import IN_RUNS, MULTIPLES, NEAR_MOTION
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
@@ -61,14 +61,8 @@ def residual_spectra(fit: Fit) -> list[ResidualSpectrum]:
     for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
         size = _PADDING * residual.size
         transform = np.fft.rfft(residual, size) * 2.0 / residual.size
-        spectra.append(
-            ResidualSpectrum(
-                np.asarray(np.fft.rfftfreq(size, run.interval), np.float64),
-                transform,
-                run.duration,
-                residual.size,
-            )
-        )
+        frequency = np.asarray(np.fft.rfftfreq(size, run.interval), np.float64)
+        spectra.append(ResidualSpectrum(frequency, transform, run.duration, residual.size))
     return spectra
 
 
@@ -83,7 +77,6 @@ class Line:
             shedding).
         amplitude: rad at the sensor for the mains, moment coefficient for shedding.
         phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
-        runs: number of runs searched.
     """
 
     parameter: float
@@ -91,7 +84,6 @@ class Line:
     contrast: float
     amplitude: float
     phases: Array
-    runs: int
 
 
 def by_moment(fit: Fit) -> Data:
@@ -111,7 +103,10 @@ def by_moment(fit: Fit) -> Data:
         left = np.convolve(residual, shape, "valid")
         likeliest, least = run, np.inf
         for power in _POWERS:
-            average = _moving_average(shape, power)
+            # the invertible factor of a spectrum: of the shape's, and a constant beside it
+            roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
+            inside = roots[np.argsort(np.abs(roots))][:2]
+            average = np.asarray(np.real(np.poly(inside)), np.float64)
             variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
             cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
             if cost < least:
@@ -126,12 +121,6 @@ def by_moment(fit: Fit) -> Data:
 _POWERS = np.geomspace(1e-12, 1e12, 49)
 
 
-def _moving_average(shape: Array, power: float) -> Array:
-    """The invertible factor of a spectrum: of the shape's, and a constant beside it."""
-    roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
-    return np.asarray(np.real(np.poly(roots[np.argsort(np.abs(roots))][:2])), np.float64)
-
-
 def mains_interval(similarity: Similarity) -> float:
     """Longest interval between blocks at which the mains can be seen, s."""
     return 1.0 / (_NYQUIST * similarity.similar(_MAINS, "Hz"))
@@ -140,8 +129,7 @@ def mains_interval(similarity: Similarity) -> float:
 def mains_line(fit: Fit) -> Line | None:
     """The strongest line near 50 Hz common to all runs.
 
-    Returns:
-        The line; None where the sampling is too slow to see it, or the motion too fast to distinguish it.
+    None where the sampling is too slow to see it, or the motion too fast to distinguish it.
     """
     data = fit.problem.data
     mains, around = (data.similarity.similar(value, "Hz") for value in (_MAINS, _MAINS_WANDER))
@@ -152,66 +140,52 @@ def mains_line(fit: Fit) -> Line | None:
     grid = np.arange(mains - around, mains + around, 0.005)
     total = np.sum([s.power(grid) for s in spectra], axis=0)
     best = float(grid[np.argmax(total)])
-    beside = np.concatenate(
-        [np.arange(best - 4.0, best - 0.6, 0.02), np.arange(best + 0.6, best + 4.0, 0.02)]
-    )
+    sides = np.arange(best - 4.0, best - 0.6, 0.02), np.arange(best + 0.6, best + 4.0, 0.02)
+    beside = np.concatenate(sides)
     floor = float(np.max(np.sum([s.power(beside) for s in spectra], axis=0)))
     drop = float(total.max())
     gain = [block_gain(best, run) * run.response(best) for run in data.runs]
     scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
-    amplitude = float(
-        np.sqrt(np.mean([np.abs(s.at(best) * k) ** 2 for s, k in zip(spectra, scale, strict=True)]))
-    )
+    sines = [s.at(best) * k for s, k in zip(spectra, scale, strict=True)]
+    amplitude = float(np.sqrt(np.mean([np.abs(sine) ** 2 for sine in sines])))
     amplitude *= float(
         np.sqrt(1.5)
-    )  # the smoothed transform keeps the noise's level: lines lose a third of power
+    )  # the smoothed transform keeps the noise's level: lines lose a third of it
     # transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
-    phases = np.array(
-        [float(np.angle(s.at(best) * k)) + np.pi / 2 for s, k in zip(spectra, scale, strict=True)]
-    )
-    return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases, len(spectra))
+    phases = np.array([float(np.angle(sine)) + np.pi / 2 for sine in sines])
+    return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases)
 
 
 def smooth_spectra(fit: Fit) -> list[ResidualSpectrum]:
     """`residual_spectra` with a Hann window, whose leakage from the motion does not reach the mains."""
-    return [_smooth(spectrum) for spectrum in residual_spectra(fit)]
-
-
-def _smooth(spectrum: ResidualSpectrum) -> ResidualSpectrum:
-    """The spectrum with less leakage of strong lines: a Hann window, applied in the frequency domain."""
-    step = _PADDING
-    values = spectrum.transform
-    hann = 0.5 * values.copy()
-    hann[step:-step] -= 0.25 * (values[: -2 * step] + values[2 * step :])
-    return ResidualSpectrum(spectrum.frequency, hann * np.sqrt(8.0 / 3.0), spectrum.duration, spectrum.count)
+    found, step = [], _PADDING
+    for spectrum in residual_spectra(fit):
+        values = spectrum.transform
+        hann = 0.5 * values.copy()  # the window is applied in the frequency domain
+        hann[step:-step] -= 0.25 * (values[: -2 * step] + values[2 * step :])
+        found.append(dataclasses.replace(spectrum, transform=hann * np.sqrt(8.0 / 3.0)))
+    return found
 
 
 def block_gain(frequency: float, run: RunData) -> float:
-    """Gain of a run's block mean at a frequency.
+    """Gain of a run's block mean at a frequency, dimensionless; 1 where a block is one sample.
 
     Args:
         frequency: Hz.
-        run: whose blocks.
-
-    Returns:
-        Dimensionless; 1 where a block is one sample.
     """
     x = np.pi * frequency * run.interval / run.block
     return float(np.sin(run.block * x) / (run.block * np.sin(x))) if run.block > 1 else 1.0
 
 
 def shedding_line(fit: Fit) -> Line | None:
-    """The strongest line at one Strouhal number in all wind-on runs.
-
-    Returns:
-        The line; None without wind or body width.
-    """
+    """The strongest line at one Strouhal number in all wind-on runs; None without wind or body width."""
     data = fit.problem.data
     concerned = [i for i, run in enumerate(data.runs) if run.wind_on]
     if not concerned or data.width <= 0.0:
         return None
     spectra = residual_spectra(fit)
-    speeds = np.array([_fitted_speed(fit, i) for i in concerned])
+    chains = [fit.problem.chain(fit.point.common, fit.point.release[i], data.runs[i]) for i in concerned]
+    speeds = np.array([chain.physics().wind_speed for chain in chains])  # corrected by the effects of the fit
     spacing = 0.1 * data.width / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
     grid = np.arange(0.02, 0.60, spacing)
     powers = []
@@ -220,7 +194,8 @@ def shedding_line(fit: Fit) -> Line | None:
         frequency = grid * speed / data.width
         power = spectra[i].power(frequency)
         power[np.abs(frequency / own - 1.0) < 0.08] = 0.0  # the free motion's own line is not evidence
-        powers.append(np.minimum(power, _local_excess(power)))
+        # no run carries a line alone
+        powers.append(np.minimum(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0))
     total = np.sum(powers, axis=0)
     best = float(grid[np.argmax(total)])
     floor = float(np.median(total)) / np.log(2.0)
@@ -229,37 +204,22 @@ def shedding_line(fit: Fit) -> Line | None:
     for i, speed in zip(concerned, speeds, strict=True):
         frequency = best * speed / data.width
         run = data.runs[i]
-        gain = _forced_gain(fit, i, frequency) / np.sqrt(run.noise_variance) * run.response(frequency)
+        inertia, damping, stiffness = linear_coefficients(fit, i)
+        omega = 2.0 * np.pi * frequency
+        forced = data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping)
+        forced = complex(forced * (1j * omega) ** run.derivative)  # reading per unit moment coefficient
+        gain = forced / np.sqrt(run.noise_variance) * run.response(frequency)
         value = complex(spectra[i].at(frequency))
         phases[i] = float(np.angle(value / gain)) + np.pi / 2
         amplitudes.append((abs(value) / abs(gain), abs(gain) ** 2))
     values, weights = np.array(amplitudes).T
     amplitude = float(np.sum(values * weights) / np.sum(weights))
-    return Line(
-        best, float(total.max()), float(total.max()) / max(floor, 1e-9), amplitude, phases, len(concerned)
-    )
-
-
-def _fitted_speed(fit: Fit, run_index: int) -> float:
-    """The wind speed of a run, corrected by the effects of the fit, m/s."""
-    run, point = fit.problem.data.runs[run_index], fit.point
-    return fit.problem.chain(point.common, point.release[run_index], run).physics().wind_speed
-
-
-def _local_excess(power: Array) -> Array:
-    """Cap on power, so that no run carries a line alone: ten times the run's own 99th percentile."""
-    return np.full_like(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0)
+    drop = float(total.max())
+    return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases)
 
 
 def resonance(fit: Fit, run_index: int) -> float:
-    """Frequency of a run's free motion in the fitted model.
-
-    Args:
-        fit: parameter values.
-
-    Returns:
-        Hz; of a body that nothing holds, that of `free_frequency` in the similar campaign.
-    """
+    """Frequency of a run's free motion in the fitted model, Hz; that of `free_frequency` without a spring."""
     if fit.problem.data.unrestrained:
         return REFERENCE_FREQUENCY
     inertia, _, stiffness = linear_coefficients(fit, run_index)
@@ -269,11 +229,7 @@ def resonance(fit: Fit, run_index: int) -> float:
 def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
     """Inertia, damping and stiffness of a run in the fitted model, air and gravity included.
 
-    Args:
-        fit: parameter values.
-
-    Returns:
-        kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
+    In kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
     """
     problem = fit.problem
     run = problem.data.runs[run_index]
@@ -283,16 +239,6 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
     stiffness += sum(effect.stiffness_at_rest for effect in problem.effects_at(fit.point.common))
     rate = pressure * problem.data.reference_length / run.wind_speed if run.wind_on else 0.0
     return stated.yaw_inertia, stated.mechanical_damping - rate * stated.derivatives.cn_r, stiffness
-
-
-def _forced_gain(fit: Fit, run_index: int, frequency: float) -> complex:
-    """Reading per unit moment coefficient at a frequency."""
-    data: Data = fit.problem.data
-    run = data.runs[run_index]
-    inertia, damping, stiffness = linear_coefficients(fit, run_index)
-    omega = 2.0 * np.pi * frequency
-    gain = data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping)
-    return complex(gain * (1j * omega) ** run.derivative)
 
 
 CHANNELS = ("damping", "frequency", "damping of runs", "frequency of runs", "zero", "harmonics")
@@ -325,51 +271,38 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
     """What a fit leaves, by channel.
 
     Args:
-        fit: gives the motion.
         residuals: scaled, by run, where they are not those of the fit, each of shape (n,).
     """
-    left = fit.residuals if residuals is None else residuals
-    parts = [
-        _of_run(fit, i, run, own)
-        for i, (run, own) in enumerate(zip(fit.problem.data.runs, left, strict=True))
-    ]
-    chi2, count, motion = (np.sum(values, axis=0) for values in zip(*parts, strict=True))
-    return ChannelMisfit(chi2, count, float(motion))
+    chi2, count, powers = [], [], []
+    given = fit.residuals if residuals is None else residuals
+    for index, (run, left) in enumerate(zip(fit.problem.data.runs, given, strict=True)):
+        reading = run.scaled(run.reading - fit.zero(index))
+        motion = reading - fit.residuals[index]
+        cycle = max(_LEAST, round(1.0 / (resonance(fit, index) * run.interval)))
+        cycles = max(1, left.size // cycle)
+        starts = np.arange(cycles) * cycle
+        sizes = np.diff([*starts, left.size])
+        along = _centred(motion, starts, sizes)
+        power = np.maximum(np.add.reduceat(along**2, starts), 1e-300)
+        slope = _centred(np.gradient(motion), starts, sizes)
+        slope -= along * np.repeat(np.add.reduceat(along * slope, starts) / power, sizes)
+        rate_power = np.maximum(np.add.reduceat(slope**2, starts), 1e-300)
+        amplitude, amplitude_line = _curve_and_line(np.add.reduceat(along * left, starts) / power, power)
+        phase, phase_line = _curve_and_line(np.add.reduceat(slope * left, starts) / rate_power, rate_power)
+        zero = float(np.sum(np.add.reduceat(left, starts) ** 2 / sizes))
+        known = amplitude + phase + amplitude_line + phase_line + zero
+        chi2.append([amplitude, phase, amplitude_line, phase_line, zero, float(left @ left) - known])
+        lines = min(cycles, 2)
+        count.append([cycles - lines, cycles - lines, lines, lines, cycles, left.size - 3 * cycles])
+        powers.append(float(np.sum(_centred(reading, starts, sizes) ** 2)))
+    return ChannelMisfit(
+        np.sum(chi2, axis=0, dtype=np.float64), np.sum(count, axis=0, dtype=np.float64), float(np.sum(powers))
+    )
 
 
-def _of_run(fit: Fit, index: int, run: RunData, left: Array) -> tuple[Array, Array, float]:
-    reading = run.scaled(run.reading - fit.zero(index))
-    motion = reading - fit.residuals[index]
-    cycle = max(_LEAST, round(1.0 / (resonance(fit, index) * run.interval)))
-    starts = np.arange(max(1, left.size // cycle)) * cycle
-    sizes = np.diff([*starts, left.size])
-
-    def sums(values: Array) -> Array:
-        return np.asarray(np.add.reduceat(values, starts), np.float64)
-
-    def centred(values: Array) -> Array:
-        return np.asarray(values - np.repeat(sums(values) / sizes, sizes), np.float64)
-
-    along = centred(motion)
-    power = np.maximum(sums(along**2), 1e-300)
-    slope = centred(np.gradient(motion))
-    slope -= along * np.repeat(sums(along * slope) / power, sizes)
-    rate_power = np.maximum(sums(slope**2), 1e-300)
-    amplitude, amplitude_line = _curve_and_line(sums(along * left) / power, power)
-    phase, phase_line = _curve_and_line(sums(slope * left) / rate_power, rate_power)
-    zero = float(np.sum(sums(left) ** 2 / sizes))
-    known = amplitude + phase + amplitude_line + phase_line + zero
-    chi2 = np.array([amplitude, phase, amplitude_line, phase_line, zero, float(left @ left) - known])
-    lines = min(starts.size, 2)
-    counts = [
-        starts.size - lines,
-        starts.size - lines,
-        lines,
-        lines,
-        starts.size,
-        left.size - 3 * starts.size,
-    ]
-    return chi2, np.array(counts, np.float64), float(np.sum(centred(reading) ** 2))
+def _centred(values: Array, starts: np.ndarray, sizes: np.ndarray) -> Array:
+    """Values without their mean in each cycle."""
+    return np.asarray(values - np.repeat(np.add.reduceat(values, starts) / sizes, sizes), np.float64)
 
 
 def _curve_and_line(values: Array, weights: Array) -> tuple[float, float]:
@@ -378,3 +311,188 @@ def _curve_and_line(values: Array, weights: Array) -> tuple[float, float]:
     columns = np.column_stack([root, root * np.arange(values.size)])
     line = columns @ np.linalg.lstsq(columns, root * values, rcond=None)[0]
     return float(np.sum((root * values - line) ** 2)), float(line @ line)
+
+
+_RINGING_PADDING = 4  # zero padding of the spectra
+_DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
+_MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
+_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the one common time found
+_EDGE = 8  # blocks at either end of a run in which a skip cannot be seen, or distinguished from the release
+
+
+@dataclass(frozen=True, eq=False)
+class PerRunParameters:
+    """What was found.
+
+    Args:
+        values: of the effect's parameters that belong to its textbook form, in their order.
+        numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
+        drop: of χ² by taking it out, dimensionless.
+    """
+
+    values: tuple[float, ...]
+    numbers: Array
+    drop: float
+
+
+def ringing(fit: Fit) -> PerRunParameters | None:
+    """The strongest decaying line that starts at the release and has one frequency in all runs.
+
+    Returns:
+        Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
+        frequency is left beside the motion's own.
+
+    Where a frequency is that of a run's own motion, or a multiple of it, that run does not count. At least half of
+    them must: springs and winds differ, and a line that is near the motion of one run is beside that of another.
+    """
+    runs = fit.problem.data.runs
+    step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))
+    grid = np.arange(step, 0.4 / max(run.interval for run in runs), step)
+    apart = []  # by run, where the grid is neither the run's own frequency nor a multiple of it
+    for run in runs:
+        padded = _RINGING_PADDING * run.reading.size
+        swing = (run.reading - run.reading.mean()) * np.hanning(run.reading.size)
+        own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
+        apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
+    beside = np.array(apart)
+    free = np.mean(beside, axis=0) >= IN_RUNS
+    if not free.any():
+        return None
+    shortest = min(run.duration for run in runs)
+    tried = [(rate, _amplitudes(fit, grid, rate)) for rate in np.array(_DECAYS) / shortest]
+    drops = [np.where(free, np.sum(drop * beside, axis=0), 0.0) for _, (_, drop) in tried]
+    best = int(np.argmax([drop.max() for drop in drops]))
+    at = int(np.argmax(drops[best]))
+    rate, (amplitude, _) = tried[best]
+    exponent = complex(-rate, 2.0 * np.pi * grid[at])
+    omega = abs(exponent)
+    found = amplitude[:, at] / exponent ** runs[0].derivative
+    size = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
+    return PerRunParameters((size, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
+
+
+def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:
+    """Complex amplitudes (rad) of exp(−rate t) cos on a grid of frequencies (Hz), and the drops of χ², by run."""
+    amplitudes, drops = [], []
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        decay = np.exp(-rate * run.interval * np.arange(residual.size))
+        size = 2 ** int(np.ceil(np.log2(2 * _RINGING_PADDING * residual.size)))
+        transform = np.conj(np.fft.rfft(residual * decay, size))
+        index = np.round(grid * size * run.interval).astype(int)
+        power = float(decay @ decay)
+        found = 2.0 * np.conj(transform[index]) / power
+        amplitudes.append(found * np.sqrt(run.noise_variance) / run.response(grid))
+        drops.append(0.5 * np.abs(found) ** 2 * power)
+    return np.array(amplitudes), np.array(drops)
+
+
+def skip(fit: Fit) -> PerRunParameters | None:
+    """The instants at which the runs jump ahead by one common time.
+
+    Returns:
+        The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough.
+    """
+    runs = [_Skipping(fit, number) for number in range(len(fit.problem.data.runs))]
+    if any(run.left.size < 4 * _EDGE for run in runs):
+        return None
+    found = [_skips(runs, count) for count in range(1, _MOST_SKIPS + 1)]
+    # of an instant, which is sought among as many blocks
+    cost = 2.0 * sum(np.log(run.left.size) for run in runs)
+    return max(found, key=lambda one: one.drop - cost * one.numbers.shape[1])
+
+
+def _skips(runs: list[_Skipping], count: int) -> PerRunParameters:
+    """So many skips in every run, all of one time."""
+    steps, lost = [run.steps(count) for run in runs], 0.0
+    for number in range(_ROUNDS):
+        if (
+            number > 0
+        ):  # two skips close together were found as one of twice the time, and another one of nothing
+            steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
+        times, weights = (
+            np.array([[getattr(step, name) for step in of_run] for of_run in steps])
+            for name in ("time", "weight")
+        )
+        lost = max(float(np.sum(times * weights) / np.sum(weights)), 0.0)
+    drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
+    numbers = np.array(
+        [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
+    )
+    return PerRunParameters((lost * count,), numbers, drop)
+
+
+@dataclass(frozen=True)
+class _Skip:
+    """A skip in one run: its block, the time lost (s) and the weight of that (1/s²)."""
+
+    block: int
+    time: float
+    weight: float
+
+
+class _Skipping:
+    """One run, in which skips are sought by linear theory.
+
+    The reading from block k on changes by the rate of the motion for every second lost, and the residual by what
+    the whitening filter makes of that. What the run's own sensitivities absorb is taken out for all k at once by
+    sums from the end.
+    """
+
+    def __init__(self, fit: Fit, number: int) -> None:
+        run, residual = fit.problem.data.runs[number], fit.residuals[number]
+        self.run = run
+        self.basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
+        self.rate = np.gradient(run.reading - run.unscaled(residual), run.interval)
+        filled = 1.0 if run.samples is None else np.sqrt(run.samples.count / run.block)
+        self.slope = np.asarray(self.rate * filled / np.sqrt(run.noise_variance), np.float64)  # not whitened
+        self.left = self._unabsorbed(residual)
+        # the sum from any value to the last is the power of the whitened slope from there on
+        lags = np.correlate(run.taps, run.taps, "full")[run.taps.size - 1 :]
+        power = _after(self.slope * (2.0 * correlate(self.slope, lags) - lags[0] * self.slope))
+        absorbed = _after(self.slope[:, None] * correlate(self.basis, run.taps))
+        power -= np.sum(absorbed**2, axis=1)
+        self.weight = np.maximum(power, 1e-9 * float(self.slope @ self.slope))
+
+    def steps(self, count: int, found: list[_Skip] | None = None, time: float | None = None) -> list[_Skip]:
+        """The skips that leave least, each sought again beside the others.
+
+        Args:
+            found: where the search starts; None starts without any.
+            time: lost at every skip, s; None for a time of its own at each.
+        """
+        found = list(found or [])
+        inside = slice(_EDGE, self.left.size - _EDGE)
+        weight = self.weight[inside]
+        for _ in range(1 if count == 1 else _SWEEPS):
+            for place in range(count):
+                others = found[:place] + found[place + 1 :]
+                change = self._change([(step, step.time if time is None else time) for step in others])
+                seen = _after(self.slope * correlate(self.left - change, self.run.taps))[inside]
+                own = seen / weight
+                lost = np.maximum(own, 0.0) if time is None else time
+                best = int(np.argmax(lost * (2.0 * seen - lost * weight)))
+                found[place : place + 1] = [_Skip(best + _EDGE, float(own[best]), float(weight[best]))]
+        return found
+
+    def drop(self, steps: list[_Skip], time: float) -> float:
+        """Of χ² by skips of one time (s)."""
+        left = self.left - self._change([(step, time) for step in steps])
+        return float(self.left @ self.left - left @ left)
+
+    def share(self, step: _Skip) -> float:
+        """Instant of a skip, as a share of the run."""
+        return float(step.block * self.run.interval / self.run.duration)
+
+    def _change(self, steps: list[tuple[_Skip, float]]) -> Array:
+        ahead = np.zeros(self.rate.size)
+        for step, time in steps:
+            ahead[step.block :] += time
+        return self._unabsorbed(self.run.scaled(self.rate * ahead))
+
+    def _unabsorbed(self, values: Array) -> Array:
+        return np.asarray(values - self.basis @ (self.basis.T @ values), np.float64)
+
+
+def _after(values: Array) -> Array:
+    """Sums from each block to the last."""
+    return np.asarray(np.cumsum(values[::-1], axis=0)[::-1], np.float64)

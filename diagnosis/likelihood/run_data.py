@@ -57,32 +57,15 @@ class Samples:
         return np.asarray((sums / np.maximum(self.count, 1)).reshape(*values.shape[:-1], -1), np.float64)
 
     def part(self, first: int, last: int, interval: float) -> Samples:
-        """The samples of some of the blocks.
+        """The samples of the blocks from one up to another.
 
         Args:
-            first: number of the first block.
-            last: number of the block after the last one.
             interval: of a block, s.
         """
         inside = slice(*np.searchsorted(self.block, (first, last)))
         return Samples(
             self.time[inside] - first * interval, self.block[inside] - first, self.count[first:last]
         )
-
-
-def hermite_means(block: int, derivative: int = 0, interval: float = 1.0) -> Array:
-    """Weights that turn a step's ends into the mean over its evenly spaced samples.
-
-    Args:
-        block: samples in the step, the first at its start.
-        derivative: as in `hermite_basis`.
-        interval: of the step, s.
-
-    Returns:
-        As `hermite_basis`, shape (4,).
-    """
-    means: Array = hermite_basis(np.arange(block) / block, derivative, interval).mean(axis=1)
-    return means
 
 
 def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array:
@@ -196,12 +179,13 @@ class RunData:
 
     @cached_property
     def weights(self) -> Array:
-        """Weights that turn a block's ends into its mean, as `hermite_means` gives them.
+        """Weights that turn a block's ends, as in `hermite_basis`, into its mean.
 
         Shape (4,), or (4, n) where the samples are not evenly spaced.
         """
         if self.samples is None:
-            return hermite_means(self.block, self.derivative, self.interval)
+            places = np.arange(self.block) / self.block
+            return np.asarray(hermite_basis(places, self.derivative, self.interval).mean(axis=1), np.float64)
         u = self.samples.time / self.interval - self.samples.block
         return self.samples.means(hermite_basis(u, self.derivative, self.interval))
 
@@ -224,13 +208,12 @@ class RunData:
         )
 
     def scaled(self, difference: Array) -> Array:
-        """A difference of readings as white residuals.
+        """A difference of readings as white residuals, in noise standard deviations.
+
+        Blocks of fewer samples weigh less, and empty ones are 0.
 
         Args:
             difference: of block means, in the unit of the reading, shape (n,).
-
-        Returns:
-            In noise standard deviations, shape (n,); blocks of fewer samples weigh less, and empty ones are 0.
         """
         if self.samples is None:
             return np.asarray(self.white(difference) / np.sqrt(self.noise_variance), np.float64)
@@ -238,13 +221,10 @@ class RunData:
         return self.white(seen) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
 
     def white(self, values: Array) -> Array:
-        """Block means with white noise.
+        """Block means with white noise, of the values' shape and unit.
 
         Args:
             values: of the run, or several in columns, shape (n,) or (n, k), any unit.
-
-        Returns:
-            Of the values' shape and unit.
         """
         found = whiten(values, self.whitening)
         if self.innovations is None:
@@ -261,26 +241,11 @@ class RunData:
         impulse[: self.whitening.size] = self.whitening[: impulse.size]
         return _filtered(self.innovations, impulse)
 
-    def unwhitened(self, difference: Array) -> Array:
-        """A difference of readings over the noise of its innovations, not whitened.
-
-        Args:
-            difference: of block means, in the unit of the reading, shape (n,).
-
-        Returns:
-            Dimensionless, shape (n,): `scaled` of it where the noise is white.
-        """
-        filled = 1.0 if self.samples is None else np.sqrt(self.samples.count / self.block)
-        return np.asarray(difference * filled / np.sqrt(self.noise_variance), np.float64)
-
     def unscaled(self, residual: Array) -> Array:
-        """The inverse of `scaled`.
+        """The inverse of `scaled`: differences of block means in the unit of the reading, 0 in empty blocks.
 
         Args:
             residual: white, in noise standard deviations, shape (n,).
-
-        Returns:
-            Difference of block means, in the unit of the reading, shape (n,); 0 in empty blocks.
         """
         if self.samples is not None:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
@@ -295,13 +260,10 @@ class RunData:
         return self.reading.size if self.samples is None else int(np.count_nonzero(self.samples.count))
 
     def means(self, values: Array) -> Array:
-        """Block means of one value per sample.
+        """Block means of one value per sample, shape (n,) or (k, n).
 
         Args:
             values: shape (m,) or (k, m).
-
-        Returns:
-            Shape (n,) or (k, n).
         """
         if self.samples is not None:
             return self.samples.means(values)
@@ -309,14 +271,9 @@ class RunData:
         return np.asarray(blocks.mean(axis=-1), np.float64)
 
     def part(self, first: int = 0, last: int | None = None) -> RunData:
-        """The run from one block up to another.
+        """The run from one block up to, and without, another; None: to the end.
 
-        Args:
-            first: its first block.
-            last: the block after its last one; None: to the end.
-
-        Returns:
-            The shorter run. Its duration is that of the record less what is left out at the start.
+        Its duration is that of the record less what is left out at the start.
         """
         last = self.reading.size if last is None else last
         return dataclasses.replace(
@@ -333,24 +290,18 @@ class RunData:
         return float(np.sqrt(self.noise_variance)) * colouring(self.whitening)
 
     def noise_at(self, frequency: float | Array) -> Array:
-        """The noise at a frequency.
+        """Standard deviation of white noise of the same density as the noise at a frequency, rad.
 
         Args:
             frequency: Hz, any shape.
-
-        Returns:
-            Standard deviation of white noise of the same density, rad, of the frequency's shape.
         """
         return np.asarray(np.sqrt(self.noise_variance) / np.abs(self.response(frequency)))
 
     def response(self, frequency: float | Array) -> np.ndarray:
-        """What the whitening filters make of a sinusoid.
+        """The complex factor by which the whitening filters change a sinusoid; 1 where the noise is white.
 
         Args:
             frequency: Hz, any shape.
-
-        Returns:
-            Complex factor, dimensionless, of the frequency's shape; 1 where the noise is white.
         """
         cycles = np.asarray(frequency) * self.interval
         found = response(self.whitening, cycles)
@@ -421,12 +372,6 @@ class Data:
         return max(0.5 * float(np.ptp(run.reading)) / turn**run.derivative for run in self.runs)
 
     @property
-    def extremes(self) -> tuple[float, float]:
-        """The least and the greatest reading of all runs, rad."""
-        readings = [run.reading for run in self.runs]
-        return min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
-
-    @property
     def springs(self) -> tuple[float, ...]:
         """Stated stiffnesses, ascending, N m/rad; none where nothing holds the body."""
         return tuple(sorted({run.spring_stiffness for run in self.runs if run.spring_stiffness}))
@@ -437,14 +382,7 @@ class Data:
         return self.windy or any(run.wind_on for run in self.runs)
 
     def air_moment(self, run: RunData | RunSettings) -> float:
-        """The air's yaw moment on the model for a moment coefficient of 1.
-
-        Args:
-            run: gives the air's density and speed.
-
-        Returns:
-            ½ρV²·A·l, N m.
-        """
+        """The air's yaw moment on the model for a moment coefficient of 1, ½ρV²·A·l, N m."""
         return aerodynamic_stiffness(
             1.0,
             air_density=run.air_density,
@@ -454,11 +392,7 @@ class Data:
         )
 
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:
-        """Other runs of the same campaign, whose model has the same parameters.
-
-        Args:
-            runs: some of the runs, or further ones.
-        """
+        """Other runs of the same campaign, whose model has the same parameters."""
         return dataclasses.replace(self, runs=runs, windy=self.wind_on, keeps_gain=self.gain_free)
 
     def undriven(self) -> Data:
@@ -468,19 +402,12 @@ class Data:
         return self.with_runs(tuple(dataclasses.replace(r, drive=None, gain_free=False) for r in self.runs))
 
     def subset(self, keep: tuple[str, ...]) -> Data:
-        """The runs of the given ids.
-
-        Args:
-            keep: ids.
-        """
+        """The runs of the given ids."""
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
 
 
 def departure(law: JointLaw) -> Expression:
-    """The moment that a joint's law has beside its linear spring, damper and friction.
-
-    Args:
-        law: with one term or more.
+    """The moment that a joint's law has beside its linear spring, damper and friction; it has one term or more.
 
     Returns:
         Of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s), in N m.

@@ -10,9 +10,17 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, normal_equations
 from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
-from diagnosis.likelihood.per_run_parameters import PerRunParameters, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
-from diagnosis.likelihood.residuals import CHANNELS, Line, mains_line, misfit, shedding_line
+from diagnosis.likelihood.residuals import (
+    CHANNELS,
+    Line,
+    PerRunParameters,
+    mains_line,
+    misfit,
+    ringing,
+    shedding_line,
+    skip,
+)
 from diagnosis.likelihood.run_data import Data, RunData, departure
 from diagnosis.policy import GROSS_MISFIT
 from identification.signal.decay_fit import Reading, fit_run
@@ -66,14 +74,18 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     driven = [None if run.drive is None else _driven_start(run) for run in data.runs]
     if data.unrestrained:
         return _unrestrained_start(data, driven)
-    omega2 = np.array(
-        [
-            (2.0 * np.pi * _frequency(run)) ** 2 if response is None else response[1]
-            for run, response in zip(data.runs, driven, strict=True)
-        ]
-        if decays is None
-        else [decay.stiffness for decay in decays]
-    )
+    squares = []
+    for i, (run, response) in enumerate(zip(data.runs, driven, strict=True)):
+        if decays is not None:
+            squares.append(decays[i].stiffness)
+        elif response is not None:
+            squares.append(response[1])
+        else:
+            values = run.reading - run.reading.mean()
+            size = _PADDING * values.size
+            peak = float(peak_of_swing(values, size) / (size * run.interval))
+            squares.append((2.0 * np.pi * peak) ** 2)
+    omega2 = np.array(squares)
     swing = np.array([float(np.std(run.reading)) for run in data.runs])
     moving = (swing > _STILL * swing.max()).astype(np.float64)  # a body at rest has no frequency
     typical = float(np.median(omega2[moving > 0.0]))
@@ -87,8 +99,15 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     loss = float(np.median(losses)) if losses else 0.01 * float(np.sqrt(typical))
     gain: tuple[float, ...] = (_gain_start(data, driven),) if data.gain_free else ()
     if data.normalised:
-        return Point(np.array([typical, loss, *_still(data), *gain, *zero]), release)
-    spring = _seen_stiffness(data, swing)
+        still = (0.0, 0.0) if data.wind_on else ()
+        return Point(np.array([typical, loss, *still, *gain, *zero]), release)
+    spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+    if data.law is not None and data.law.terms:  # seen at the amplitude of every run, by harmonic balance
+        phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+        amplitude = np.sqrt(2.0) * swing[:, None]
+        further = departure(data.law).value({"b": amplitude * np.cos(phase), "r": 0.0})
+        seen = spring - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude[:, 0], 1e-12)
+        spring = np.where(seen > 0.0, seen, spring)
     pressure = np.array([data.air_moment(run) for run in data.runs])
     # Kr = Izz ω² + pressure Cnβ, with equal relative errors
     design = np.column_stack([omega2, pressure]) / spring[:, None] * moving[:, None]
@@ -140,32 +159,6 @@ def _gain_start(data: Data, driven: Sequence[tuple[float, float, float] | None])
     return float(np.median(gains)) if gains else 0.0
 
 
-def _seen_stiffness(data: Data, swing: Array) -> Array:
-    """Stiffness of every run at its amplitude, N m/rad, shape (runs,), by harmonic balance.
-
-    ``swing`` holds the runs' root mean square displacements, rad.
-    """
-    stated = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
-    if data.law is None or not data.law.terms:
-        return stated
-    phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
-    amplitude = np.sqrt(2.0) * swing[:, None]
-    further = departure(data.law).value({"b": amplitude * np.cos(phase), "r": 0.0})
-    seen = stated - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude[:, 0], 1e-12)
-    return np.where(seen > 0.0, seen, stated)
-
-
-def _still(data: Data) -> tuple[float, ...]:
-    return (0.0, 0.0) if data.wind_on else ()
-
-
-def _frequency(run: RunData) -> float:
-    """Frequency of the greatest peak of a run's spectrum, Hz."""
-    values = run.reading - run.reading.mean()
-    size = _PADDING * values.size
-    return float(peak_of_swing(values, size) / (size * run.interval))
-
-
 @dataclass(frozen=True, eq=False)
 class StartingPoint:
     """Where the fit of an effect starts, and how much linear theory predicts that it closes.
@@ -214,19 +207,23 @@ _FINDERS: Mapping[str, Callable[[Fit], PerRunParameters | None]] = {
 def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     """Starting points for adding one effect to a fitted problem, by the drop of χ² predicted, greatest first.
 
-    Args:
-        base: the fit without it.
-        kind: the effect to add.
-
-    Returns:
-        One per trial; none where the effect cannot be seen in these runs.
+    One per trial; none where the effect cannot be seen in these runs.
     """
     data = base.problem.data
     if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
         return []
     if kind.line or kind.skips:
         found_own = _FINDERS[kind.line or "skips"](base)
-        return [] if found_own is None else [_own_start(base, kind, found_own)]
+        if found_own is None:
+            return []
+        problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
+        infos = zip(found_own.values, _own_parameters(problem, kind), strict=True)
+        values = [np.clip(value, info.lower, info.upper) for value, info in infos]
+        release = np.column_stack([base.point.release, found_own.numbers])
+        point = Point(np.concatenate([base.point.common, values]), release)
+        predicted = misfit(base).excess
+        predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= found_own.drop
+        return [StartingPoint(problem, point, found_own.drop, predicted, base.point.common.size)]
     found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
     return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
 
@@ -234,24 +231,12 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 def misses_motion(fit: Fit) -> bool:
     """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
-    Returns:
-        True where the residual holds more than a hundredth of the reading's power.
+    Its residual then holds more than a hundredth of the reading's power.
     """
     readings = sum(
         float(np.sum(r.scaled(r.reading - np.mean(r.reading)) ** 2)) for r in fit.problem.data.runs
     )
     return fit.total > GROSS_MISFIT * readings
-
-
-def _own_start(base: Fit, kind: type[Effect], found: PerRunParameters) -> StartingPoint:
-    problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
-    infos = _own_parameters(problem, kind)
-    values = [np.clip(value, info.lower, info.upper) for value, info in zip(found.values, infos, strict=True)]
-    release = np.column_stack([base.point.release, found.numbers])
-    point = Point(np.concatenate([base.point.common, values]), release)
-    predicted = misfit(base).excess
-    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= found.drop
-    return StartingPoint(problem, point, found.drop, predicted, base.point.common.size)
 
 
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:
@@ -337,7 +322,6 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
     """What an effect of typical size changes that the fitted parameters cannot absorb.
 
     Args:
-        base: a fit without it.
         kind: an effect without numbers of its own in every run.
 
     Returns:
@@ -362,14 +346,10 @@ def unabsorbed(base: Fit, kind: type[Effect]) -> tuple[Array, float] | None:
 
 
 def project_out(base: Fit, columns: list[Array]) -> list[Array]:
-    """The part of a change of the prediction that the fitted parameters cannot absorb.
+    """The part of a change of the prediction, by run, that the fitted common parameters and releases cannot absorb.
 
     Args:
-        base: a fit, whose common parameters and releases absorb.
         columns: scaled change by run, each of shape (n,).
-
-    Returns:
-        The remainder, by run.
     """
     matrix, gradient, solutions = normal_equations(base.jacobian, columns, products=base.products)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))

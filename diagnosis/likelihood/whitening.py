@@ -37,14 +37,11 @@ def whiten(values: Array, whitening: Array) -> Array:
 
 
 def colour(errors: Array, whitening: Array) -> Array:
-    """The values of which `whiten` makes these errors.
+    """The values of which `whiten` makes these errors, in their unit.
 
     Args:
         errors: shape (n,), any unit.
         whitening: the filter, shape (order + 1,).
-
-    Returns:
-        The values, shape (n,), of the same unit.
     """
     if whitening.size == 1:
         return errors
@@ -57,15 +54,11 @@ def colour(errors: Array, whitening: Array) -> Array:
 
 
 def correlate(errors: Array, whitening: Array) -> Array:
-    """The transpose of the filter.
+    """The transpose of the filter: the sum of its taps times the errors that follow each value, 0 beyond the end.
 
     Args:
         errors: of a record, or of several in columns, shape (n,) or (n, k), any unit.
         whitening: the filter, shape (order + 1,).
-
-    Returns:
-        The sum of the filter's taps times the errors that follow each value, of the errors' shape and unit; errors
-        beyond the end count as 0.
     """
     if whitening.size == 1:
         return np.asarray(errors * whitening[0], np.float64)
@@ -76,26 +69,20 @@ def correlate(errors: Array, whitening: Array) -> Array:
 
 
 def response(whitening: Array, frequency: Array) -> np.ndarray:
-    """The frequency response of a whitening filter.
+    """The complex frequency response of a whitening filter, of the frequency's shape.
 
     Args:
         whitening: the filter, shape (order + 1,).
         frequency: in cycles per value, any shape.
-
-    Returns:
-        Complex factor, of the frequency's shape.
     """
     return np.asarray(np.polynomial.polynomial.polyval(np.exp(-2j * np.pi * frequency), whitening))
 
 
 def colouring(whitening: Array) -> float:
-    """Standard deviation of noise over that of its innovations.
+    """Standard deviation of noise over that of its innovations, 1 or more.
 
     Args:
         whitening: the filter, shape (order + 1,).
-
-    Returns:
-        The ratio, 1 or more.
     """
     return 1.0 if whitening.size == 1 else 1.0 / float(_start(whitening.tobytes())[0, 0])
 

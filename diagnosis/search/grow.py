@@ -8,25 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis import policy
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.prepare import Stretches, fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
-from diagnosis.policy import (
-    ALWAYS_FITTED,
-    FREED_FROM,
-    FREED_HYPOTHESES,
-    GROWN_BY,
-    GROWN_FROM,
-    GROWTH_LOSS,
-    LENGTHENED,
-    MODEL_ERROR,
-    MOST_CAUSES,
-    NEEDLESS_CHI2,
-    PREDICTED_SHARE,
-    SAME_CHANGE,
-)
 from diagnosis.search.hypothesis import (
     Hypothesis,
     Scale,
@@ -54,9 +41,6 @@ def grow(
     """Add effects one after another, to the best few sets of each size.
 
     Args:
-        nominal: the fit without any effect.
-        kinds: effects to try.
-        progress: called with the names of each set.
         first: the set that all others contain; None: none.
 
     Returns:
@@ -69,20 +53,19 @@ def grow(
         children = sets_with_one_more(level, kinds, progress)
         scale = Scale.of(children, gap)
         if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
-            count = FREED_HYPOTHESES if not level[0].effects else 1
-            children = with_forms(children, gap, FREED_FROM * level[0].fit.excess, count)
+            count = policy.FREED_HYPOTHESES if not level[0].effects else 1
+            children = with_forms(children, gap, policy.FREED_FROM * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
-        going = going_on(children, level, gap)
-        level = _distinct(going, nominal)[:GROWN_FROM]
+        going, level = going_on(children, level, gap), []
+        for hypothesis in going:  # those that change the readings alike would grow alike
+            if not any(_same_change(hypothesis.fit, other.fit, nominal) for other in level):
+                level.append(hypothesis)
+        level = level[: policy.GROWN_FROM]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
 
 def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis | None:
     """The second mode, where the nominal model misses the motion because it has one mode only.
-
-    Args:
-        nominal: a fit that misses the motion.
-        kinds: effects that may be tried.
 
     Returns:
         The fit with the mode added; None where it misses the motion too, or may not be tried.
@@ -92,62 +75,43 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
     return found[0] if found and not misses_motion(found[0].fit) else None
 
 
-def _distinct(ranked: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
-    """The hypotheses without those that change the readings as a better one does: they would grow alike."""
-    kept: list[Hypothesis] = []
-    for hypothesis in ranked:
-        if not any(_same_change(hypothesis.fit, other.fit, nominal) for other in kept):
-            kept.append(hypothesis)
-    return kept
-
-
 def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
     """Whether two fits differ by less than `SAME_CHANGE` of the power by which they change the nominal one."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
-    return apart < SAME_CHANGE * (nominal.total - max(one.total, other.total))
+    return apart < policy.SAME_CHANGE * (nominal.total - max(one.total, other.total))
 
 
 def going_on(
     children: Sequence[Hypothesis], parents: Sequence[Hypothesis], gap: ChannelMisfit
 ) -> list[Hypothesis]:
-    """The sets to grow further.
+    """The sets to grow further from their parents, best first; none where the best of all could gain nothing.
 
     Args:
-        children: fitted sets of one size.
-        parents: those that they grew from.
         gap: what the nominal model leaves.
-
-    Returns:
-        Best first; none where the best of all could gain nothing.
     """
     scale = Scale.of((*children, *parents), gap)
     ranked = sorted(children, key=lambda h: -scale.weight(h))
     if not ranked or not _may_gain(ranked[0], scale):
         return []
-    return [child for child in ranked if _goes_on(child, parents, scale)]
+    going = []
+    for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
+        smaller = [h for h in parents if set(h.effects) < set(child.effects)]
+        first = not any(parent.effects for parent in smaller)
+        if first or scale.weight(child) > max(map(scale.weight, smaller)) - policy.GROWTH_LOSS:
+            going.append(child)
+    return going
 
 
 def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
     """Whether the weight could rise if one more effect left nothing."""
     if not hypothesis.effects:
         return True
-    return len(hypothesis.effects) < MOST_CAUSES and scale.greatest(hypothesis) > scale.weight(hypothesis)
-
-
-def _goes_on(child: Hypothesis, level: Sequence[Hypothesis], scale: Scale) -> bool:
-    """Whether a set may still lead on from the best it grew from: one of two equal causes closes only half."""
-    parents = [h for h in level if set(h.effects) < set(child.effects)]
-    if not any(parent.effects for parent in parents):
-        return True
-    return scale.weight(child) > max(scale.weight(parent) for parent in parents) - GROWTH_LOSS
+    rises = scale.greatest(hypothesis) > scale.weight(hypothesis)
+    return rises and len(hypothesis.effects) < policy.MOST_CAUSES
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses with one effect less than a given one that were not fitted yet.
-
-    Args:
-        whole: with two effects or more.
-        found: fitted hypotheses.
 
     Returns:
         The missing ones, each started from the values of the whole.
@@ -168,7 +132,6 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
     Args:
         whole: with two effects or more.
         found: fitted hypotheses, those with one effect less than ``whole`` among them.
-        nominal: the fit without any effect.
 
     Returns:
         Those that were not fitted yet. Two effects are alike where each was fitted alone and the fits are.
@@ -186,27 +149,14 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
             and _same_change(h.fit, alone[name].fit, nominal)
         ]
         if others in by_name:
-            sets += [_to_the_end(child) for child in sets_with_one_more([by_name[others]], alike, None)]
+            for child in sets_with_one_more([by_name[others]], alike, None):  # converged, as its rival is
+                fitted = None if child.fit.converged else try_fit(child.fit.problem, child.fit.point)
+                sets.append(child if fitted is None else replace(child, fit=fitted))
     return sets
 
 
-def _to_the_end(child: Hypothesis) -> Hypothesis:
-    """The hypothesis with its fit converged, as that of its rival is."""
-    if not child.fit.converged:
-        with suppress(FitError, np.linalg.LinAlgError):
-            return replace(child, fit=fit(child.fit.problem, child.fit.point))
-    return child
-
-
 def without(whole: Fit, kind: type[Effect]) -> Fit:
-    """Refit with one effect taken out.
-
-    Args:
-        whole: a fit.
-        kind: one of its effects.
-
-    Returns:
-        The fit of the others, started from their values.
+    """Refit with one effect taken out, starting from the values of the others.
 
     Raises:
         FitError: when the model cannot be integrated.
@@ -220,33 +170,30 @@ def sets_with_one_more(
 ) -> list[Hypothesis]:
     """The sets with one effect more, each fitted from its best starting points.
 
-    Args:
-        level: fitted sets.
-        kinds: effects to add to each.
-        progress: called with the names of each set.
-
     Returns:
         One for every set of effects: that of more weight where two sets lead to it, so that a freed form of one
         does not take the place of the other.
     """
+    # alone, a freed form also follows what other causes do
+    single = [h for h in level if len(h.effects) == 1]
+    textbook = [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
     found: dict[tuple[str, ...], Hypothesis] = {}
-    for parent in (*level, *_in_textbook_form(level)):
+    for parent in (*level, *textbook):
+        base = parent.fit
         others = [kind for kind in kinds if kind.name not in parent.effects]
         for kind, starts in _worth_fitting(parent, others):
             if progress is not None:
                 progress(" + ".join((*parent.effects, kind.name)))
-            best = _best_fit(starts[: kind.tries], parent.fit)
-            if best is None:
-                continue
-            child = Hypothesis((*parent.effects, kind.name), best)
-            found[child.names] = of_more_weight(found.get(child.names), child, misfit(parent.fit))
+            starts = starts[: kind.tries]
+            tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
+            if all(fitted.total > base.total for fitted in tried):  # linear theory led too far
+                near = [point for start in starts if (point := start.nearer()) is not None]
+                tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
+            best = min(filter(is_plausible, tried), key=lambda fitted: fitted.total, default=None)
+            if best is not None:
+                child = Hypothesis((*parent.effects, kind.name), turned_back(best))
+                found[child.names] = of_more_weight(found.get(child.names), child, misfit(base))
     return list(found.values())
-
-
-def _in_textbook_form(level: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The single effects whose form was freed, without it: alone, a form also follows what other causes do."""
-    single = [h for h in level if len(h.effects) == 1]
-    return [Hypothesis(h.effects, h.textbook) for h in single if h.textbook is not None]
 
 
 def _worth_fitting(
@@ -260,34 +207,24 @@ def _worth_fitting(
     scale = misfit_scale(misfit(parent.fit))
     scored.sort(key=lambda item: min(log_misfit(start.predicted, scale) for start in item[1]))
     if parent.effects:
-        return [(kind, starts) for kind, starts in scored[:GROWN_BY] if _is_needed(starts[0], parent.fit)]
-    limit = PREDICTED_SHARE * parent.fit.total
-    return [item for i, item in enumerate(scored) if i < ALWAYS_FITTED or item[1][0].predicted_drop > limit]
-
-
-def _is_needed(start: StartingPoint, base: Fit) -> bool:
-    """Whether linear theory predicts that an effect lowers χ² by more than a needless one."""
-    own = own_gain(start.problem, start.point) - own_gain(base.problem, base.point)
-    return start.predicted_drop > NEEDLESS_CHI2 + own
-
-
-def _best_fit(starts: Sequence[StartingPoint], base: Fit) -> Fit | None:
-    found = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
-    if all(fitted.total > base.total for fitted in found):  # linear theory led too far
-        near = [point for start in starts if (point := start.nearer()) is not None]
-        found += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
-    best = min((f for f in found if is_plausible(f)), key=lambda f: f.total, default=None)
-    return None if best is None else turned_back(best)
+        needed, own = [], own_gain(parent.fit.problem, parent.fit.point)
+        for kind, starts in scored[: policy.GROWN_BY]:
+            by_chance = own_gain(starts[0].problem, starts[0].point) - own
+            if starts[0].predicted_drop > policy.NEEDLESS_CHI2 + by_chance:
+                needed.append((kind, starts))
+        return needed
+    limit = policy.PREDICTED_SHARE * parent.fit.total
+    return [
+        item for i, item in enumerate(scored) if i < policy.ALWAYS_FITTED or item[1][0].predicted_drop > limit
+    ]
 
 
 def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
-    with suppress(FitError, np.linalg.LinAlgError):
-        if misses_motion(base):
-            found = fit(start.problem, start.point)
-        else:
-            found = fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
-        return found if np.isfinite(found.total) else None
-    return None
+    if misses_motion(base):
+        found = try_fit(start.problem, start.point)
+    else:
+        found = try_fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
+    return found if found is not None and np.isfinite(found.total) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,14 +242,7 @@ class InStretches:
     hypotheses: tuple[Hypothesis, ...]
 
     def whole(self, hypothesis: Hypothesis, data: Data) -> Hypothesis | None:
-        """The hypothesis fitted to whole runs, from its fit to stretches.
-
-        Args:
-            hypothesis: fitted to the stretches.
-
-        Returns:
-            The same effects; None where the fit fails.
-        """
+        """The hypothesis fitted to whole runs, from its fit to stretches; None where the fit fails."""
         with suppress(FitError, np.linalg.LinAlgError):
             return replace(hypothesis, fit=fit_longer(hypothesis.fit, self.stretches, data)[0])
         return None
@@ -336,8 +266,6 @@ def grow_in_stretches(
 
     Args:
         fit_nominal: fits the nominal model to any runs.
-        kinds: effects to try; those that are autonomous are.
-        progress: called with the names of each set.
 
     Returns:
         The best sets of each size, compared in long stretches. Effects are added in short ones, in which the phase
@@ -353,12 +281,14 @@ def grow_in_stretches(
     able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
     while level:
         grown = _longer_sets(level, short, data, able, progress)
-        least = min(FREED_FROM * level[0].long.fit.excess, MODEL_ERROR**2 * gap.motion / nominal.count)
+        least = min(
+            policy.FREED_FROM * level[0].long.fit.excess, policy.MODEL_ERROR**2 * gap.motion / nominal.count
+        )
         children = with_forms([child.long for child in grown.values()], gap, least)
         found += children
         parents = [g.long for g in level]
         going = _of_each(parents, going_on(children, parents, gap))
-        level = [replace(grown[h.names], long=h) for h in going[:GROWN_FROM]]
+        level = [replace(grown[h.names], long=h) for h in going[: policy.GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 
 
@@ -366,9 +296,8 @@ def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> lis
     """The best child of each parent, then the others: what fits better at first may be a dead end."""
     first: list[Hypothesis] = []
     for parent in parents:
-        child = next((h for h in ranked if h not in first and set(parent.effects) < set(h.effects)), None)
-        if child is not None:
-            first.append(child)
+        own = [h for h in ranked if h not in first and set(parent.effects) < set(h.effects)]
+        first += own[:1]
     return first + [h for h in ranked if h not in first]
 
 
@@ -381,18 +310,14 @@ def _longer_sets(
 ) -> dict[tuple[str, ...], _Grown]:
     """The sets with one effect more, by their names, from the better of two starts where there are two."""
     tried = sets_with_one_more([g.short for g in level if g.short is not None], kinds, progress)
-    best = sorted(tried, key=lambda h: h.fit.total)[:LENGTHENED]
-    grown = {h.names: g for h in best if (g := _lengthened(h, short, data)) is not None}
+    grown = {}
+    for h in sorted(tried, key=lambda h: h.fit.total)[: policy.LENGTHENED]:
+        with suppress(FitError, np.linalg.LinAlgError):
+            longer, _ = fit_longer(h.fit, short, data, long_stretch(short))
+            grown[h.names] = _Grown(replace(h, fit=longer), h)
     following = [g.long for g in level if g.long.effects and not misses_motion(g.long.fit)]
     for child in sets_with_one_more(following, kinds, progress):
         other = grown.get(child.names)
         if other is None or child.fit.total < other.long.fit.total:
             grown[child.names] = _Grown(child, None if other is None else other.short)
     return grown
-
-
-def _lengthened(hypothesis: Hypothesis, short: Stretches, data: Data) -> _Grown | None:
-    with suppress(FitError, np.linalg.LinAlgError):
-        found, _ = fit_longer(hypothesis.fit, short, data, long_stretch(short))
-        return _Grown(replace(hypothesis, fit=found), hypothesis)
-    return None

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING, OWN_EVIDENCE
@@ -58,18 +57,12 @@ class Hypothesis:
         """
         problem, width = self.fit.problem, self.fit.point.release.shape[1]
         places = problem.own_places(width)
-        instants = sum(
-            int(places[k.name].stop) - int(places[k.name].start) for k in problem.effects if k.skips
-        )
-        return self.forms + instants - 2 * _needs_no_spring(self.fit)
-
-    def share_left(self, nominal: Fit) -> float:
-        """Share of the nominal gap that the set leaves open; below 0 by chance.
-
-        What instants and phases of the runs gain by chance counts as left.
-        """
-        by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
-        return (self.fit.excess + by_chance) / nominal.gap
+        skips = [places[kind.name] for kind in problem.effects if kind.skips]
+        numbers = self.forms + sum(int(place.stop) - int(place.start) for place in skips)
+        if problem.data.normalised and problem.data.law is None:
+            needless = self.fit.value("stiffness") < NEEDLESS_SPRING * linear_coefficients(self.fit, 0)[2]
+            numbers -= 2 * needless
+        return numbers
 
     @cached_property
     def excess(self) -> Array:
@@ -89,8 +82,13 @@ class Hypothesis:
         return found
 
     def fitted_set(self, nominal: Fit) -> FittedSet:
-        """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves."""
-        return FittedSet(self.effects, self.share_left(nominal), self.excess, self.further_numbers)
+        """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves.
+
+        What instants and phases of the runs gain by chance counts as left.
+        """
+        by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
+        share = (self.fit.excess + by_chance) / nominal.gap
+        return FittedSet(self.effects, share, self.excess, self.further_numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,25 +119,13 @@ class Scale:
 
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
-    """That of more weight, the first if they are equal.
-
-    Args:
-        one: None for none.
-        gap: what the nominal model leaves.
-    """
+    """That of more weight beside what the nominal model leaves; the first if they are equal."""
     return other if one is None else max(one, other, key=Scale.of((one, other), gap).weight)
 
 
 def own_gain(problem: Problem, point: Point) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
     return float(OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
-
-
-def _needs_no_spring(fitted: Fit) -> bool:
-    data = fitted.problem.data
-    if not data.normalised or data.law is not None:
-        return False
-    return fitted.value("stiffness") < NEEDLESS_SPRING * linear_coefficients(fitted, 0)[2]
 
 
 def is_plausible(fitted: Fit) -> bool:
@@ -158,7 +144,8 @@ def turned_back(fitted: Fit) -> Fit:
         Where the zero is beyond the readings, the fit from half a turn nearer if it explains them as well; else the
         fit that was given.
     """
-    problem, (least, greatest) = fitted.problem, fitted.problem.data.extremes
+    problem, readings = fitted.problem, [run.reading for run in fitted.problem.data.runs]
+    least, greatest = min(float(r.min()) for r in readings), max(float(r.max()) for r in readings)
     signs = [f"{kind.name}.{kind.turns}" for kind in problem.effects if kind.turns]
     if not signs or "zero" not in problem.names or least <= fitted.value("zero") <= greatest:
         return fitted
@@ -167,18 +154,12 @@ def turned_back(fitted: Fit) -> Fit:
     common[problem.names.index("zero")] += turn
     common[[problem.names.index(name) for name in signs]] *= -1.0
     release[:, 0] -= turn
-    with suppress(FitError, np.linalg.LinAlgError):
-        turned = fit(problem, Point(common, release))
-        return turned if turned.total < _AS_WELL * fitted.total else fitted
-    return fitted
+    turned = try_fit(problem, Point(common, release))
+    return fitted if turned is None or turned.total >= _AS_WELL * fitted.total else turned
 
 
 def restricted(whole: Fit, names: Collection[str]) -> Fit:
-    """A fit with some effects taken out and everything else as it was; its residuals are still those of the whole.
-
-    Args:
-        whole: with more effects.
-        names: of the effects to keep.
+    """A fit with some effects only, by name, and everything else as it was; its residuals are those of the whole.
 
     Returns:
         A start, with its sensitivities, for the fit of the smaller problem.
@@ -206,10 +187,9 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
 def with_forms(
     found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int = FREED_HYPOTHESES
 ) -> list[Hypothesis]:
-    """Free the forms of the best hypotheses where the textbook form leaves a good part open.
+    """Free the forms of the best hypotheses where the textbook form leaves a good part open and they gain weight.
 
     Args:
-        found: fitted hypotheses.
         gap: what the nominal model leaves.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
         count: how many of the best are tried with free forms.
@@ -218,81 +198,52 @@ def with_forms(
         All hypotheses, best first.
     """
     ranked = sorted(found, key=lambda h: h.fit.total)
-    freed = [_freed_if_it_pays(h, gap, least) for h in ranked[:count]]
-    return sorted([*freed, *ranked[count:]], key=lambda h: h.fit.total)
-
-
-def _freed_if_it_pays(hypothesis: Hypothesis, gap: ChannelMisfit, least: float) -> Hypothesis:
-    """The hypothesis with its forms free where it then has more weight; else as it is."""
-    fitted = hypothesis.fit
-    freed = _free_forms(fitted) if fitted.excess > least else None
-    if freed is None:
-        return hypothesis
-    needed = _forms_that_matter(freed, FORM_SHARE * fitted.excess * fitted.count)
-    if needed and needed != freed.problem.free_forms:
-        freed = _free_forms(fitted, only=needed) or freed
-    found = Hypothesis(hypothesis.effects, freed, fitted)
-    return of_more_weight(hypothesis, found, gap)
-
-
-def _forms_that_matter(freed: Fit, least: float) -> tuple[str, ...]:
-    """Effects whose forms differ from the textbook's so that χ² would rise by more than ``least`` without."""
-    needed = []
-    for kind in freed.problem.effects:
-        if kind.name in freed.problem.free_forms:
-            values = [(f"{kind.name}.{info.name}", info.default) for info in kind.parameters() if info.form]
-            # a form that the runs cannot tell has no standard deviation
-            pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
-            if max(np.square(pulls), default=0.0) > least:
-                needed.append(kind.name)
-    return tuple(needed)
+    for place, hypothesis in enumerate(ranked[:count]):
+        textbook = hypothesis.fit
+        freed = _free_forms(textbook) if textbook.excess > least else None
+        if freed is None:
+            continue
+        needed = []  # effects without whose form χ² would rise by a good part
+        for kind in freed.problem.effects:
+            if kind.name in freed.problem.free_forms:
+                values = [
+                    (f"{kind.name}.{info.name}", info.default) for info in kind.parameters() if info.form
+                ]
+                # a form that the runs cannot tell has no standard deviation
+                pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
+                if max(np.square(pulls), default=0.0) > FORM_SHARE * textbook.excess * textbook.count:
+                    needed.append(kind.name)
+        if needed and tuple(needed) != freed.problem.free_forms:
+            freed = _free_forms(textbook, only=needed) or freed
+        ranked[place] = of_more_weight(hypothesis, Hypothesis(hypothesis.effects, freed, textbook), gap)
+    return sorted(ranked, key=lambda h: h.fit.total)
 
 
 def polish(chosen: Hypothesis) -> Hypothesis:
     """The hypothesis fitted to convergence with its forms free, so that its covariance includes the forms.
 
-    Args:
-        chosen: a fitted hypothesis.
-
     Returns:
         The same effects with a χ² no larger, but for what following the rod changes; as given where the fit cannot
         go on.
     """
-    first = _rod_followed(chosen.fit)
-    better = _free_forms(first, tolerance=_POLISH)
-    if better is None:
-        with suppress(FitError, np.linalg.LinAlgError):
-            better = fit(first.problem, first.point, tolerance=_POLISH)
+    first = chosen.fit
+    problem = dataclasses.replace(first.problem, rod_followed=True)
+    followed = zip(scaled_residuals(problem, first.point), first.residuals, strict=True)
+    if max(float(np.max(np.abs(one - other))) for one, other in followed) >= _SAME_READING:
+        # adding the ringing to the slow motion is not exact enough; the confirmation says how far off it is
+        first = try_fit(problem, first.point) or first
+    better = _free_forms(first, tolerance=_POLISH) or try_fit(first.problem, first.point, tolerance=_POLISH)
     if better is None or better.total > first.total:
         better = first
-    textbook = _textbook(better, first) if better.problem.free_forms else None
+    textbook = None
+    if better.problem.free_forms and not first.problem.free_forms:
+        textbook = first
+    elif better.problem.free_forms:
+        problem = dataclasses.replace(better.problem, free_forms=())
+        values = dict(zip(better.problem.names, better.point.common.tolist(), strict=True))
+        start = Point(np.array([values[name] for name in problem.names]), better.point.release)
+        textbook = try_fit(problem, start)
     return Hypothesis(chosen.effects, better, textbook)
-
-
-def _rod_followed(fitted: Fit) -> Fit:
-    """The fit with the rod's ringing integrated, where adding it to the slow motion is not exact enough."""
-    problem = dataclasses.replace(fitted.problem, rod_followed=True)
-    differences = [
-        one - other
-        for one, other in zip(scaled_residuals(problem, fitted.point), fitted.residuals, strict=True)
-    ]
-    if max(float(np.max(np.abs(d))) for d in differences) < _SAME_READING:
-        return fitted
-    with suppress(FitError, np.linalg.LinAlgError):
-        return fit(problem, fitted.point)
-    return fitted  # the confirmation by MuJoCo then says how far it is off
-
-
-def _textbook(freed: Fit, first: Fit) -> Fit | None:
-    """The same effects in textbook form: the first fit where it had that, else one from the freed values."""
-    if not first.problem.free_forms:
-        return first
-    problem = dataclasses.replace(freed.problem, free_forms=())
-    values = dict(zip(freed.problem.names, freed.point.common.tolist(), strict=True))
-    start = Point(np.array([values[name] for name in problem.names]), freed.point.release)
-    with suppress(FitError, np.linalg.LinAlgError):
-        return fit(problem, start)
-    return None
 
 
 def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | None = None) -> Fit | None:
@@ -306,11 +257,8 @@ def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | No
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
     defaults = {f"{k.name}.{i.name}": _within(i) for k in kinds for i in k.parameters() if i.form}
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
-    try:
-        found = fit(freed, start, tolerance=tolerance)
-    except (FitError, np.linalg.LinAlgError):
-        return None
-    return found if found.total < fitted.total and is_plausible(found) else None
+    found = try_fit(freed, start, tolerance=tolerance)
+    return found if found is not None and found.total < fitted.total and is_plausible(found) else None
 
 
 def _within(info: ParameterInfo) -> float:

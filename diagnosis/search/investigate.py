@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from diagnosis import policy
 from diagnosis.diagnosable import refuse_indefinite
-from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
@@ -28,14 +29,6 @@ from diagnosis.noise.sensor_noise import (
     reading_levels,
     reading_step,
     typical_step,
-)
-from diagnosis.policy import (
-    COARSER_STEP,
-    HUM_LEFT,
-    MOMENT_LEFT,
-    NOISE_EXPLAINS_UP_TO,
-    NOISE_LEAVES,
-    RIVAL_PROBABILITY,
 )
 from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
@@ -152,11 +145,7 @@ class Study:
 
 
 def located(study: Study) -> Place:
-    """Where the gap of a study is, found now where it was not found before.
-
-    Args:
-        study: up to the test of the gap.
-    """
+    """Where the gap of a study is, found now where it was not found before."""
     if study.place is not None:
         return study.place
     stated = study.noise.stated_variance if study.coarse else None
@@ -177,13 +166,10 @@ _IN_HARMONICS = np.eye(len(CHANNELS))[CHANNELS.index("harmonics")]
 def investigate(
     campaign: Campaign, kinds: Sequence[type[Effect]] = ALL_EFFECTS, progress: Progress | None = None
 ) -> Study:
-    """Test a campaign for a gap, and weigh the effects that may cause it.
+    """Test a campaign for a gap, and weigh the effects that may cause it, in the units of the similar campaign.
 
     Args:
         progress: called with the name of each step.
-
-    Returns:
-        What was found, in the units of the similar campaign.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -198,13 +184,10 @@ def investigate(
 
 
 def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
-    """Test a campaign for a gap, and fit no effect.
+    """Test a campaign for a gap, and fit no effect: the study up to the fit of the nominal model.
 
     Args:
         kinds: the effects that may be read off the records.
-
-    Returns:
-        The study up to the fit of the nominal model.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -238,14 +221,22 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > COARSER_STEP * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.COARSER_STEP * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
-        cleaned, hum = campaign, None
-        line = find_hum(_fine(nominal, campaign, noise.variance)) if HUM.name in allowed else None
+        cleaned, hum, line = campaign, None, None
+        if HUM.name in allowed:
+            fine, least = nominal, mains_interval(similarity)
+            if any(run.interval >= least for run in nominal.problem.data.runs):  # too long to show the mains
+                problem = Problem(prepare(campaign, noise.variance, similarity, 0.5 * least))
+                residuals = scaled_residuals(problem, nominal.point)
+                fine = replace(nominal, problem=problem, residuals=residuals)
+            line = find_hum(fine)
         if line is not None:
             frequency = refine_frequency(campaign, line)
-            cleaned, noise, hum = _without_hum(campaign, frequency, noise)
+            for _ in range(2):  # as a hum may count as noise at first
+                cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
+                noise = campaign_noise(cleaned)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
         missed = misses_motion(nominal) and not campaign.driven
@@ -256,34 +247,23 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
     return Study(campaign, similarity, cleaned, noise, trend, step, coarse, hum, nominal, test, cut)
 
 
-def _fine(nominal: Fit, campaign: Campaign, variance: dict[str, float]) -> Fit:
-    """The nominal fit with the residuals of blocks short enough to show the mains; those of a slow rig are not."""
-    similarity, least = nominal.problem.data.similarity, mains_interval(nominal.problem.data.similarity)
-    if all(run.interval < least for run in nominal.problem.data.runs):
-        return nominal
-    problem = Problem(prepare(campaign, variance, similarity, 0.5 * least))
-    return replace(nominal, problem=problem, residuals=scaled_residuals(problem, nominal.point))
-
-
-def _without_hum(campaign: Campaign, frequency: float, noise: Noise) -> tuple[Campaign, Noise, Hum]:
-    """The campaign without a hum, its noise, and the hum; twice, as a hum may count as noise at first."""
-    for _ in range(2):
-        cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
-        noise = campaign_noise(cleaned)
-    return cleaned, noise, hum
-
-
 def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
     """The study with sets of effects and random moments fitted and weighed."""
     fitted = [kind for kind in kinds if kind.fitted]
     first = second_mode_alone(found.nominal, fitted) if misses_motion(found.nominal) else None
     # an input holds the phase of the motion, so that no stretches are needed
     if fitted and first is None and misses_motion(found.nominal) and not found.campaign.driven:
-        return _weigh_in_stretches(found, fitted, clock)
+        data = found.nominal.problem.data
+        with clock.step("effects"):
+            grown = grow_in_stretches(data, fit_nominal, fitted, clock.progress)
+        found = _pruned(replace(found, hypotheses=grown.hypotheses), grown.nominal, clock)
+        with clock.step("polishing"):
+            return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
     moving, rested = without_long_rest(found.nominal.problem.data)
     if rested:  # where dry friction stops a body, χ² has many minima
-        with suppress(FitError, np.linalg.LinAlgError):  # what is left may be too short: whole runs then
-            found = replace(found, nominal=fit(Problem(moving), found.nominal.point), rested=rested)
+        nominal = try_fit(Problem(moving), found.nominal.point)
+        if nominal is not None:  # what is left may be too short: whole runs then
+            found = replace(found, nominal=nominal, rested=rested)
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(found.nominal, fitted, clock.progress, first)))
     with clock.step("random moments"):
@@ -292,8 +272,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _pruned(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
-    named = (found.hypothesis(w.effects) for w in weighed)
-    best = next((h for h in named if h is not None), None) if found.campaign.unrestrained else None
+    best = _best(found, weighed) if found.campaign.unrestrained else None
     if best is not None and best.fit.chance < 1.0:
         again = _weigh_by_moment(found, best, fitted, clock, explained=weighed[0].effects != UNKNOWN)
         if again is not None:
@@ -308,17 +287,6 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     return replace(found, weighed=tuple(weighed))
 
 
-def _weigh_in_stretches(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
-    """The study where the nominal model misses the motion itself: sets are weighed by their fits to stretches."""
-    with clock.step("effects"):
-        grown = grow_in_stretches(found.nominal.problem.data, fit_nominal, kinds, clock.progress)
-    found = replace(found, hypotheses=grown.hypotheses)
-    found = _pruned(found, grown.nominal, clock)
-    with clock.step("polishing"):
-        data = found.nominal.problem.data
-        return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
-
-
 def _weigh_by_moment(
     found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock, *, explained: bool
 ) -> Study | None:
@@ -328,7 +296,6 @@ def _weigh_by_moment(
 
     Args:
         best: the set that leaves the random moment, which from then on is noise.
-
         explained: whether it also explains the angle.
 
     Returns:
@@ -339,14 +306,12 @@ def _weigh_by_moment(
         base = fit(Problem(by_moment(best.fit)), found.nominal.point)
     except (FitError, np.linalg.LinAlgError):
         return None
-    if not explained and MOMENT_LEFT * (1.0 + base.excess) < 1.0:
+    if not explained and policy.MOMENT_LEFT * (1.0 + base.excess) < 1.0:
         return None
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
-        with suppress(FitError, np.linalg.LinAlgError):
-            of_set = hypothesis.fit
-            return replace(hypothesis, fit=fit(replace(of_set.problem, data=data), of_set.point))
-        return None
+        fitted = try_fit(replace(hypothesis.fit.problem, data=data), hypothesis.fit.point)
+        return None if fitted is None else replace(hypothesis, fit=fitted)
 
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(base, kinds, clock.progress)))
@@ -374,26 +339,26 @@ def _with_whole_runs(
 
 def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
     """The study with every set that has one effect less than the answer, or another one that does the same."""
-    named = (found.hypothesis(w.effects) for w in _weighed(found, base))
-    best = next((hypothesis for hypothesis in named if hypothesis is not None), None)
+    best = _best(found, _weighed(found, base))
     if best is None or len(best.effects) == 1:
         return found
     with clock.step("pruning"):
         known = (*found.hypotheses, *prune(best, found.hypotheses))
         found = replace(found, hypotheses=(*known, *exchange(best, known, base)))
-    with clock.step("forms"):
-        return _with_forms(found, base)
+    with clock.step("forms"):  # of rival sets, free where that pays: growth frees those of few sets
+        weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
+        near = [w.effects for w in weighed if w.probability > policy.RIVAL_PROBABILITY]
+        if len(near) < 2:
+            return found
+        rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
+        others = [h for h in found.hypotheses if not any(h is rival for rival in rivals)]
+        return replace(found, hypotheses=(*others, *with_forms(rivals, misfit(base), 0.0, len(rivals))))
 
 
-def _with_forms(found: Study, base: Fit) -> Study:
-    """The study with the forms of rival sets free where that pays: growth frees those of few sets."""
-    weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
-    near = [w.effects for w in weighed if w.probability > RIVAL_PROBABILITY]
-    if len(near) < 2:
-        return found
-    rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
-    others = [h for h in found.hypotheses if not any(h is rival for rival in rivals)]
-    return replace(found, hypotheses=(*others, *with_forms(rivals, misfit(base), 0.0, len(rivals))))
+def _best(found: Study, weighed: Sequence[Weighed]) -> Hypothesis | None:
+    """The most probable answer that is a fitted set."""
+    named = (found.hypothesis(w.effects) for w in weighed)
+    return next((hypothesis for hypothesis in named if hypothesis is not None), None)
 
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
@@ -417,7 +382,7 @@ def _of_read_off(found: Study, base: Fit) -> Array:
     """
     left = np.zeros(len(CHANNELS))
     if found.hum is not None:
-        left += HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
+        left += policy.HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
     errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
@@ -449,8 +414,8 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     Effects of a few numbers close little of any noise, however it misbehaves.
     """
     block = found.nominal.problem.data.runs[0].block
-    small = found.test.noisy and found.nominal.excess < NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < NOISE_LEAVES for w in weighed)
+    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
+    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)
 
 

@@ -84,11 +84,10 @@ class _Channel:
     reduced: float  # V/width, Hz
 
 
-def random_moments(fit: Fit, spectra: Collection[str] = ("broad_band", "narrow_band")) -> list[ProcessNoise]:
+def random_moments(fit: Fit, spectra: Collection[str]) -> list[ProcessNoise]:
     """The random moments that may explain the residuals of a fit.
 
     Args:
-        fit: with residuals in the sensor's noise alone.
         spectra: of the effects that may act (`tunnel_sim.effects.Effect.random`).
 
     Returns:
@@ -106,7 +105,6 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
     """Explain the residuals of the wind-on runs by turbulence of common coefficient.
 
     Args:
-        fit: the deterministic model's fit; its coefficients give the rig's response.
         centred: whether its spectrum has a centre of its own.
 
     Returns:
@@ -122,14 +120,7 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
 
 
 def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
-    """Explain the residuals of the wind-on runs by vortex shedding with a wandering phase.
-
-    Args:
-        fit: the deterministic model's fit.
-
-    Returns:
-        The fit; None without wind-on runs or body width.
-    """
+    """As `fit_turbulence`, by vortex shedding with a wandering phase; None without wind or body width too."""
     data = fit.problem.data
     fastest = max(run.wind_speed for run in data.runs)
     if data.width <= 0.0 or fastest <= 0.0:
@@ -157,7 +148,11 @@ def _fit(
 
     every = [spectrum(x) for x in grid for _ in channels]
     by_run = np.array([c for c, _ in _filtered(channels * len(grid), every)]).reshape(len(grid), -1)
-    start = np.log(grid[int(np.argmin(by_run.sum(axis=1)))])
+    start, ends = np.log(grid[int(np.argmin(by_run.sum(axis=1)))]), np.log(bounds)
+    # steps of half a logarithm in size and bandwidth, and a tenth of that in a centre found by the grid
+    corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
+    if start.size == 3 and ends[2, 1] < 0.5:  # a Strouhal number
+        corners[3, 2] = start[2] + 2e-3
     found = minimize(
         cost,
         start,
@@ -167,7 +162,7 @@ def _fit(
             "maxfev": _EVALUATIONS * len(start) // 2,
             "xatol": 0.02,
             "fatol": 0.5,
-            "initial_simplex": _simplex(start, np.log(bounds)),
+            "initial_simplex": np.clip(corners, ends[:, 0], ends[:, 1]),
         },
     )
     best = spectrum(np.exp(found.x).tolist())
@@ -176,10 +171,17 @@ def _fit(
     count = sum(i.size for i in innovations)
     white = [float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True)]
     drops = np.array(white) - np.array(costs)
+    # power of the response to a unit moment at the end of each run that began at rest, in that of the noise
+    unit = MomentSpectrum(1.0, LONGEST_BANDWIDTH)
+    power = []
+    for channel, a, q in zip(channels, *_discrete(channels, [unit] * len(channels)), strict=True):
+        for _ in range(int(np.log2(channel.residual.size))):
+            a, q = a @ a, q + a @ q @ a.T
+        power.append(q[0, 0] / channel.variance)
     return ProcessNoise(
         best,
         float(drops.sum()),
-        np.maximum(drops, 0.0) / _predicted(channels, MomentSpectrum(1.0, LONGEST_BANDWIDTH)),
+        np.maximum(drops, 0.0) / np.array(power),
         float(found.fun),
         sum(float(i @ i) for i in innovations) / count - 1.0,
         list(innovations),
@@ -187,30 +189,10 @@ def _fit(
     )
 
 
-def _predicted(channels: Sequence[_Channel], spectrum: MomentSpectrum) -> Array:
-    """Power of the response at the end of each run that began at rest, in units of the noise's, shape (runs,)."""
-    transition, disturbance = _discrete(channels, [spectrum] * len(channels))
-    power = []
-    for channel, a, q in zip(channels, transition, disturbance, strict=True):
-        for _ in range(int(np.log2(channel.residual.size))):
-            a, q = a @ a, q + a @ q @ a.T
-        power.append(q[0, 0] / channel.variance)
-    return np.array(power)
-
-
-def _simplex(start: Array, bounds: Array) -> Array:
-    """Steps of half a logarithm in size and bandwidth, and a tenth of that in a centre found by the grid."""
-    corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
-    if start.size == 3 and bounds[2, 1] < 0.5:  # a Strouhal number
-        corners[3, 2] = start[2] + 2e-3
-    return np.clip(corners, bounds[:, 0], bounds[:, 1])
-
-
 def with_response(fit: Fit, spectrum: MomentSpectrum) -> Data | None:
     """The runs of a fit, the noise of those in the wind being the sensor's and the response to a random moment.
 
     Args:
-        fit: its coefficients give the rig's response.
         spectrum: of the moment.
 
     Returns:
@@ -245,14 +227,8 @@ def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Ch
     moment = 0.5 * run.air_density * run.wind_speed**2 * data.frontal_area * data.reference_length / inertia
     oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
     reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
-    return _Channel(
-        residual,
-        run.noise_variance / group,
-        group * run.interval,
-        oscillator,
-        passed * moment,
-        reduced,
-    )
+    interval = group * run.interval
+    return _Channel(residual, run.noise_variance / group, interval, oscillator, passed * moment, reduced)
 
 
 def _skip(channel: _Channel) -> int:
@@ -314,14 +290,7 @@ def _discrete(channels: Sequence[_Channel], spectra: Sequence[MomentSpectrum]) -
 
 
 def is_steady_noise(result: ProcessNoise) -> bool:
-    """Whether a random moment passes all tests.
-
-    Args:
-        result: a fit of process noise.
-
-    Returns:
-        False where its innovations are not white and steady, come in bursts, or are those of one run.
-    """
+    """Whether innovations are white and steady, do not come in bursts, and are not those of one run."""
     return (
         departure_from_white(result) <= WHITE_INNOVATIONS
         and bursts(result, BURST_FALSE_ALARM_RATE) <= BURST
@@ -331,9 +300,6 @@ def is_steady_noise(result: ProcessNoise) -> bool:
 
 def departure_from_white(result: ProcessNoise) -> float:
     """How far innovations are from white and steady.
-
-    Args:
-        result: a fit of process noise.
 
     Returns:
         Largest departure from 1 of the mean power in a frequency band, or in a quarter of the record in time, in
@@ -356,22 +322,17 @@ def bursts(result: ProcessNoise, false_alarm_rate: float) -> float:
     to a quarter of it.
 
     Args:
-        result: a fit of process noise.
         false_alarm_rate: probability that a steady normal moment exceeds 1 in any window, at most, a fraction.
-
-    Returns:
-        A ratio.
     """
     lengths = [1 << k for k in range(20)]
     windows = [(i, n) for i in result.innovations for n in lengths if 4 * n <= i.size]
     rate = false_alarm_rate / max(sum(i.size - n + 1 for i, n in windows), 1)
-    highest = [float(np.max(_moving_power(i, n))) / float(chdtri(n, rate)) for i, n in windows]
-    return max(highest, default=0.0)
-
-
-def _moving_power(innovations: Array, length: int) -> Array:
-    total = np.concatenate(([0.0], np.cumsum(innovations**2)))
-    return np.asarray(total[length:] - total[:-length])
+    highest = 0.0
+    for innovations, length in windows:
+        total = np.concatenate(([0.0], np.cumsum(innovations**2)))
+        power = float(np.max(total[length:] - total[:-length]))
+        highest = max(highest, power / float(chdtri(length, rate)))
+    return highest
 
 
 def of_all_runs(result: ProcessNoise) -> float:
@@ -380,9 +341,6 @@ def of_all_runs(result: ProcessNoise) -> float:
     A gust in one run is not turbulence. The power of the response to the narrowest random moment, which has two
     quadratures, is an exponential variable, and that of a broader one varies less. Fisher's test of the greatest of
     n such variables: Proc. R. Soc. A 125 (1929) 54, doi 10.1098/rspa.1929.0151.
-
-    Args:
-        result: a fit of process noise.
 
     Returns:
         The first term of Fisher's series, which is at least the probability; a fraction.

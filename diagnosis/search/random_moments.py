@@ -8,14 +8,14 @@ agree.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import fdtrc
 
-from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at
+from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
@@ -36,8 +36,6 @@ class RandomAnswer:
     """A random moment, alone or beside other effects.
 
     Args:
-        kind: of the random moment.
-        process: its fit.
         beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
         left: what remains. The share is that of the innovations' and the wind-off runs' excess in the nominal
             one's, and the same in every channel.
@@ -66,11 +64,6 @@ def weigh_random_moments(
 ) -> list[RandomAnswer]:
     """Try turbulence, and vortices with a wandering phase, under all sets of effects.
 
-    Args:
-        nominal: fitted with the sensor's noise alone.
-        hypotheses: sets of effects fitted likewise.
-        kinds: the vocabulary to answer in.
-
     Returns:
         The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
         than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes, or
@@ -81,8 +74,15 @@ def weigh_random_moments(
     best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
     if not allowed or not _may_act(best, scale, allowed):
         return []
-    top = _settled(best, nominal, [kind for kind in kinds if kind.fitted], allowed)
-    for seen in _until_steady(top, nominal.problem.data, [kind for kind in kinds if kind.fitted]):
+    able = [kind for kind in kinds if kind.fitted]
+    top = _settled(best, nominal, able, allowed)
+    for number in range(_FURTHER + 1):
+        if number > 0:  # a small effect that no gap shows may keep the innovations from being white
+            further = _evident(top, able)
+            if not further:
+                break
+            top = further[0]
+        seen = _seen_in(top, nominal.problem.data)
         process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
         if process is not None and not follows_the_motion(seen.fit):
             kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
@@ -98,34 +98,17 @@ def without_the_random_moment(
 ) -> list[Hypothesis]:
     """The sets beside random moments fitted with the sensor's noise alone: what they leave may be no random moment.
 
-    Args:
-        known: fitted sets.
-        gap: what the nominal model leaves.
-
     Returns:
         All sets; of two with the same effects that of more weight.
     """
     found = {hypothesis.names: hypothesis for hypothesis in known}
     for answer in answers:
         if answer.beside is not None:
-            with suppress(FitError, np.linalg.LinAlgError):
-                alone = replace(answer.beside, fit=fit(answer.beside.fit.problem, answer.beside.fit.point))
+            fitted = try_fit(answer.beside.fit.problem, answer.beside.fit.point)
+            if fitted is not None:
+                alone = replace(answer.beside, fit=fitted)
                 found[alone.names] = of_more_weight(found.get(alone.names), alone, gap)
     return list(found.values())
-
-
-def _until_steady(top: Hypothesis, data: Data, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
-    """The set, and those with a further effect or two, with residuals in the sensor's noise alone.
-
-    A small effect that no gap shows may keep the innovations from being white.
-    """
-    yield _seen_in(top, data)
-    for _ in range(_FURTHER):
-        further = _evident(top, kinds)
-        if not further:
-            return
-        top = further[0]
-        yield _seen_in(top, data)
 
 
 def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]:
@@ -175,9 +158,6 @@ def follows_the_motion(fitted: Fit) -> bool:
     A random moment does not know the phase of the motion: what it adds along the motion and along the rate has the
     same power. A missing damping adds to the first, and a missing stiffness to the second.
 
-    Args:
-        fitted: with residuals in the sensor's noise alone.
-
     Returns:
         By Fisher's test of the ratio of the two powers. Every run in the wind counts as one degree of freedom of
         each, since a slow random motion may have no more.
@@ -196,9 +176,6 @@ def follows_the_motion(fitted: Fit) -> bool:
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     """Variance of an effect's parameters over what independent noise would give, 1 or more.
-
-    Args:
-        fitted: with the effect.
 
     Returns:
         From the scatter of the runs' gradients, whose sum is zero (the sandwich covariance with the runs
@@ -226,18 +203,13 @@ def _settled(
 ) -> Hypothesis:
     """The best set of effects on rows in whose noise the response to the random moment is part.
 
-    Args:
-        best: the set from whose residuals the random moment is estimated first.
-        kinds: effects to try.
-        spectra: of random moments that may act.
-
-    Returns:
-        The set given where no random moment acts, or its filter does not settle. The random moment is estimated
-        from what the best set leaves when it is fitted with the sensor's noise alone: the fit with the response as
-        noise lets the motion wander as the response does, and its own residuals overstate it. The rounds end where
-        the best set is the one that the random moment was estimated beside.
+    The set given, where no random moment acts or its filter does not settle. The random moment is estimated from
+    what the best set leaves when it is fitted with the sensor's noise alone: the fit with the response as noise
+    lets the motion wander as the response does, and its own residuals overstate it. The rounds end where the best
+    set is the one that the random moment was estimated beside.
     """
     data, known, top = nominal.problem.data, best.fit, best
+    windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
             process = _likeliest(random_moments(known, spectra))
@@ -247,27 +219,18 @@ def _settled(
             base = fit(Problem(noisy), nominal.point)
             sets = [Hypothesis((), base), *grow(base, kinds)]
             found = max(sets, key=Scale.of(sets, misfit(base)).weight)
-            *_, top = _with_more_of_the_wind(_sought_again(found), kinds)
+            # a random moment leaves little of a gap in the wind for effects to be compared there: more are added
+            # while one of the wind is evident, the most evident of all, so that none mops up what another leaves
+            top = _sought_again(found)
+            further = _evident(top, kinds)
+            while any(h.effects[-1] in windy for h in further):
+                top = further[0]
+                further = _evident(top, kinds)
             if top.names == best.names:
                 break
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
     return top
-
-
-def _with_more_of_the_wind(top: Hypothesis, kinds: Sequence[type[Effect]]) -> Iterator[Hypothesis]:
-    """The set, and those with one, two, … more effects, as long as one of the wind is evident in the noise.
-
-    A random moment leaves little of a gap in the wind for effects to be compared there. Of all effects the most
-    evident one is added, so that none of the wind mops up what another leaves.
-    """
-    windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
-    while True:
-        yield top
-        further = _evident(top, kinds)
-        if not any(h.effects[-1] in windy for h in further):
-            return
-        top = further[0]
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
@@ -277,27 +240,22 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
     """
     known = hypothesis.fit
     for kind in known.problem.effects:
-        if kind.skips or kind.line:
-            known = _better_in_each_run(known, kind)
+        if not (kind.skips or kind.line):
+            continue
+        others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
+        start = next(iter(starting_points(fit_at(others.problem, others.point), kind)), None)
+        if start is None:
+            continue
+        sought = fit(start.problem, start.point)
+        tried, width = [known, sought], known.point.release.shape[1]
+        if sought.point.release.shape[1] == width:  # else another number of instants
+            release = sought.point.release.copy()
+            kept = known.chi2 < sought.chi2
+            old, new = (f.problem.own_places(width)[kind.name] for f in (known, sought))
+            release[kept, new] = known.point.release[kept, old]
+            tried.append(fit(sought.problem, Point(sought.point.common, release)))
+        known = min(tried, key=lambda f: f.total)
     return replace(hypothesis, fit=known)
-
-
-def _better_in_each_run(known: Fit, kind: type[Effect]) -> Fit:
-    """The fit with the instants or phases of one effect sought once more."""
-    others = restricted(known, {other.name for other in known.problem.effects} - {kind.name})
-    starts = starting_points(fit_at(others.problem, others.point), kind)
-    if not starts:
-        return known
-    sought = fit(starts[0].problem, starts[0].point)
-    width = known.point.release.shape[1]
-    if sought.point.release.shape[1] != width:  # another number of instants
-        return min(known, sought, key=lambda f: f.total)
-    release = sought.point.release.copy()
-    kept = known.chi2 < sought.chi2
-    old, new = (f.problem.own_places(width)[kind.name] for f in (known, sought))
-    release[kept, new] = known.point.release[kept, old]
-    merged = fit(sought.problem, Point(sought.point.common, release))
-    return min(known, sought, merged, key=lambda f: f.total)
 
 
 def _seen_in(hypothesis: Hypothesis, data: Data) -> Hypothesis:

@@ -1,19 +1,8 @@
 """From fitted sets of effects to answers with probabilities (docs/decisions/0007-how-causes-are-weighed.md).
 
 Real effects never have exactly a textbook form, and at the rig's signal-to-noise ratio every misfit of form is
-significant. So sets are weighed by what they leave relative to a scale, and not by χ² itself. The model's error
-has an unknown scale of its own in every channel c of the residuals (`diagnosis.likelihood.residuals`), with an
-inverse-gamma prior. Integrated over these scales, a set of k effects has the weight
-
-    ln w = −γ Σ_c ln(1 + x_c/φ_c) − SET_PRICE k − FORM_PRICE numbers
-
-where x_c is the χ² beyond noise that it leaves in the channel, with a small part of what it leaves in the others,
-because an error of the phase leaks into the amplitude. φ_c is the misfit that needs no cause: what chance does, and
-the share `MODEL_ERROR` of the motion.
-
-The odds against an unknown cause are those of a logistic regression. With G = Σ_c ln(1 + x_c/φ_c) of the nominal
-model and L of the set, it uses G, ln(1 + L) and ln(1 − L/G): how significant the gap is in all its channels, what
-the set leaves in them, and the share that it closes.
+significant. So sets are weighed by what they leave in every channel of the residuals relative to a scale, and the
+odds against an unknown cause are those of a logistic regression.
 """
 
 from __future__ import annotations
@@ -23,21 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis import policy
 from diagnosis.likelihood.residuals import ChannelMisfit
-from diagnosis.policy import (
-    CHANCE_STDS,
-    EVEN_SHARE,
-    FORM_PRICE,
-    LEAK,
-    MODEL_ERROR,
-    NEEDLESS_CHI2,
-    SET_PRICE,
-    STEEPNESS,
-    UNKNOWN_AT,
-    UNKNOWN_CLOSED,
-    UNKNOWN_GAP,
-    UNKNOWN_LEFT,
-)
 from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN = ("unknown",)
@@ -81,7 +57,6 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
 
     Args:
         sets: fitted sets of effects; of two with the same effects the better one counts.
-        nominal: what the nominal model leaves.
 
     Returns:
         All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` speaks of
@@ -96,15 +71,22 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
     scale = misfit_scale(nominal)
     logs = np.array([log_weight(s.excess - least, scale, len(key), s.numbers) for key, s in best.items()])
     weights = np.exp(logs - logs.max(initial=-np.inf))
-    against = np.array([_log_odds(given.excess, nominal) for given in best.values()])
+    # odds of each set against an unknown cause
+    by_chance = misfit_scale(nominal, policy.CHANCE_STDS * np.sqrt(2.0 * nominal.count))
+    gap, against = log_misfit(nominal.excess, by_chance), []
+    for given in best.values():
+        left = log_misfit(given.excess, by_chance)
+        closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
+        doubt = policy.UNKNOWN_LEFT * np.log1p(left) - policy.UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
+        against.append(float(policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - doubt))
     odds = float(weights @ np.exp(against) / weights.sum()) if best else 0.0
-    known = (1.0 - EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
-    even = EVEN_SHARE / (len(best) + 1)
+    known = (1.0 - policy.EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
+    even = policy.EVEN_SHARE / (len(best) + 1)
     found = [
         Weighed(key, max(given.share, 0.0), float(probability) + even)
         for (key, given), probability in zip(best.items(), known, strict=True)
     ]
-    unknown = Weighed(UNKNOWN, 1.0, (1.0 - EVEN_SHARE) / (1.0 + odds) + even)
+    unknown = Weighed(UNKNOWN, 1.0, (1.0 - policy.EVEN_SHARE) / (1.0 + odds) + even)
     if unknown.probability < 0.5:
         first = max(found, key=lambda w: w.probability)
         rest = [unknown, *(w for w in found if w is not first)]
@@ -124,14 +106,14 @@ def least_excess(excesses: Sequence[Array]) -> Array:
     return np.asarray(np.min([np.zeros(6), *excesses], axis=0), np.float64)
 
 
-def misfit_scale(nominal: ChannelMisfit, chance: float | Array = NEEDLESS_CHI2) -> Array:
+def misfit_scale(nominal: ChannelMisfit, chance: float | Array = policy.NEEDLESS_CHI2) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
     Args:
         nominal: gives the motion.
         chance: χ² that chance explains, by channel or common to all.
     """
-    return np.asarray(np.broadcast_to(chance, 6) + MODEL_ERROR**2 * nominal.motion, np.float64)
+    return np.asarray(np.broadcast_to(chance, 6) + policy.MODEL_ERROR**2 * nominal.motion, np.float64)
 
 
 def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
@@ -139,12 +121,12 @@ def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
 
     Args:
         left: χ² by channel beyond that of the best set, shape (6,).
-        scale: as `misfit_scale` gives it, shape (6,).
-        effects: how many it has, a count.
-        numbers: how many it has beside their own, a count.
+        scale: from `misfit_scale`, shape (6,).
+        effects: how many it has.
+        numbers: how many it has beside their own.
     """
-    price = SET_PRICE * effects + FORM_PRICE * numbers
-    return -STEEPNESS * log_misfit(left, scale) - price
+    price = policy.SET_PRICE * effects + policy.FORM_PRICE * numbers
+    return -policy.STEEPNESS * log_misfit(left, scale) - price
 
 
 def log_misfit(left: Array, scale: Array) -> float:
@@ -152,19 +134,10 @@ def log_misfit(left: Array, scale: Array) -> float:
 
     Args:
         left: χ² by channel, shape (6,), dimensionless.
-        scale: as `misfit_scale` gives it, shape (6,).
+        scale: from `misfit_scale`, shape (6,).
     """
     above = np.maximum(left, 0.0)
-    return float(np.sum(np.log1p((above + LEAK * (above.sum() - above)) / scale)))
-
-
-def _log_odds(excess: Array, nominal: ChannelMisfit) -> float:
-    """Logarithm of the odds of a set against an unknown cause."""
-    scale = misfit_scale(nominal, CHANCE_STDS * np.sqrt(2.0 * nominal.count))
-    gap, left = log_misfit(nominal.excess, scale), log_misfit(excess, scale)
-    closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
-    against = UNKNOWN_LEFT * np.log1p(left) - UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
-    return float(UNKNOWN_AT + UNKNOWN_GAP * gap - against)
+    return float(np.sum(np.log1p((above + policy.LEAK * (above.sum() - above)) / scale)))
 
 
 def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from diagnosis.blind.sets import file_hash, read_document, read_hashes
+from diagnosis.blind.sets import file_hash, read_hashes
 from identification.estimate import Estimate, Quantity, RunEstimate
 from identification.neural.networks import read_networks, shipped_record
 from identification.neural.train import Checkpoint, read_checkpoint
@@ -44,7 +44,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "baseline": ("trials.parquet", read_trials),
     "weights": ("w.safetensors", read_networks),
     "seal": ("seal.json", lambda path: read_hashes(path, "answers_sha256", "restore it")),
-    "answer": ("c.json", lambda path: read_document(path, "restore it")),
+    "answer": ("c.json", lambda path: read_json(path, remedy="restore it")),
     "hash": ("run.csv", file_hash),
 }
 

@@ -93,7 +93,8 @@ def make(
       0 made, 2 bad input, 130 interrupted; no incomplete set is left.
     """
     from diagnosis.blind import DEFAULT_SHARES, Mixture, make_blind, parse_shares
-    from diagnosis.blind.sets import SEAL, read_document
+    from diagnosis.blind.sets import SEAL
+    from tunnel_sim.files.reading import read_json
 
     shares = DEFAULT_SHARES if kinds is None else parse_shares(kinds)
     refuse_unwritable_files(key)
@@ -103,7 +104,7 @@ def make(
             progress=progress, show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
-    say(f"Key sha256 {read_document(out / SEAL, '')['key_sha256']}, in {out / SEAL}")
+    say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")
 
 
 @app.command("diagnose")

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.blind.calibration import smooth_calibration
 from diagnosis.blind.cases import case, found_by_group, inclusions
-from diagnosis.blind.score import Score
+from diagnosis.blind.score import Score, smooth_calibration
 from identification.statistics import Proportion
 from tests.unit.diagnosis.test_blind_score import document
 from tunnel_lab.report import blind

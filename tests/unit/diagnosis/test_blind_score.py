@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from diagnosis import result
-from diagnosis.blind.calibration import calibration
 from diagnosis.blind.cases import case
-from diagnosis.blind.score import Score
+from diagnosis.blind.score import Score, calibration
 from identification.statistics import Proportion
 from tunnel_lab.report import blind
 

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from diagnosis._diagnose import diagnose, vocabulary
 from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import candidates
-from diagnosis.answer.reported import excess_base
+from diagnosis.answer.held_out import excess_base
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed

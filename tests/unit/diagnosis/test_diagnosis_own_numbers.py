@@ -12,7 +12,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.per_run_parameters import ringing, skip
+from diagnosis.likelihood.residuals import ringing, skip
 from diagnosis.likelihood.starting_points import starting_points
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import campaign, nominal

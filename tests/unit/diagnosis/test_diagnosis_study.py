@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from diagnosis.answer.reported import excess_base
+from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.mains import Hum
 from diagnosis.policy import HUM_LEFT
 from diagnosis.search.hypothesis import Hypothesis

@@ -19,7 +19,7 @@ from diagnosis.answer.coefficients import (
     coefficients,
     possible_answers,
 )
-from diagnosis.answer.small_causes import beside
+from diagnosis.answer.linear_theory import beside
 from diagnosis.answer.units import own_estimate
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.nondimensional import Similarity

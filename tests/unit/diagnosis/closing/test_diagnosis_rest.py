@@ -10,13 +10,13 @@ import pytest
 
 from diagnosis.answer.candidates import meant_coefficient, meant_parameter
 from diagnosis.answer.coefficients import Answers, Possible, coefficients
-from diagnosis.answer.small_swings import (
+from diagnosis.answer.linear_theory import (
     coefficient_gradient,
     coefficient_move,
     coefficient_value,
     wind_on_runs,
 )
-from diagnosis.answer.what_remains import remainder
+from diagnosis.answer.verdict import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.starting_points import nominal_start

@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.candidates import inclusion
-from diagnosis.answer.held_out import FOLDS, fit_seen, predict_held_out, predict_stretches, turns_of
-from diagnosis.answer.reported import Base
-from diagnosis.answer.waterfall import Subsets, waterfall
+from diagnosis.answer.held_out import (
+    FOLDS,
+    Base,
+    Subsets,
+    fit_seen,
+    predict_held_out,
+    predict_stretches,
+    turns_of,
+    waterfall,
+)
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
@@ -152,7 +159,8 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, random=(random,), weighed=(Weighed((kind.name, IDLE), 0.01, 0.9),))
     found = waterfall(study, replace(NO_BASE, hum=2.0), {})
-    still = predict_held_out(best).excess
+    residuals = predict_held_out(best).residuals
+    still = {run: float(np.mean(left**2)) - 1.0 for run, left in residuals.items()}
     off = [still[run.id] for run in data.runs if not run.wind_on]
     assert {step.effect for step in found.steps[1:-1]} == {IDLE, HUM}
     assert found.steps[-1].effect == kind.name

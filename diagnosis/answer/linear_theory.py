@@ -1,0 +1,392 @@
+"""Linear theory of the coefficients: gradients, how far what remains moves them, and what small causes may do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, normal_equations
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import linear_coefficients, resonance
+from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
+from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, LEAST_HALF, NEEDLESS_CHI2, OWN_EVIDENCE
+from identification.statistics import scatter_of_runs
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects.parameters import WindOnRun
+from tunnel_sim.vocabulary.record import Array
+
+_DEGREES = 6.0  # effective degrees of freedom of a real model's error
+_MOST = 3  # small causes at once
+_TRIED = 8  # effects that sets are made of: those that alone lower χ² most
+_DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
+_SECANTS, _SETTLED = 4, 0.25  # times a size is changed, and the share by which it then changes no more
+_OWN_SIZE = 3.0  # factor by which linear theory may change the size that was found in the records' lines
+
+
+def wind_on_runs(fit: Fit) -> list[WindOnRun]:
+    """Stiffnesses, frequencies and loads of the wind-on runs that a spring holds, in SI units."""
+    data = fit.problem.data
+    found = []
+    for i, run in enumerate(data.runs):
+        if not run.wind_on:
+            continue
+        inertia, _, stiffness = linear_coefficients(fit, i)
+        spring = fit.problem.stated(fit.point.common, fit.point.release[i], run).spring_stiffness
+        if stiffness <= 0.0 or spring <= 0.0:
+            continue
+        load = 0.5 * run.air_density * run.wind_speed * data.frontal_area * data.reference_length**2
+        omega, still = math.sqrt(stiffness / inertia), math.sqrt(spring / inertia)
+        pressure = load * run.wind_speed / data.reference_length
+        found.append(WindOnRun(spring, omega, still, pressure, load))
+    return found
+
+
+#: Parameters of a joint's law, by name in a fit, and their units.
+JOINT_UNITS = {
+    "yaw_inertia": "kg m2",
+    "mechanical_damping": "N m s/rad",
+    "added_stiffness": "N m/rad",
+    "moment_offset": "N m",
+}
+
+#: Parameters that add to the spring's stiffness at small amplitudes, as gravity does.
+_STIFFNESSES = tuple(
+    f"{kind.name}.{kind.parameters()[0].name}"
+    for kind in ALL_EFFECTS
+    if kind.channel == "stiffness" and kind.parameters()[0].unit == "N m/rad"
+)
+
+
+def coefficient_names(problem: Problem) -> tuple[str, ...]:
+    """The coefficients that a diagnosis states.
+
+    Returns:
+        ``omega_n`` and ``zeta`` in normalised form, else ``cn_beta`` and ``cn_r``; before these the free inertia,
+        damping and stiffness of a joint in a model of one's own. Inertia, damping and constant moment of a body
+        that nothing holds.
+    """
+    if problem.data.normalised:
+        return "omega_n", "zeta"
+    own = JOINT_UNITS if problem.data.law is not None or problem.data.unrestrained else ()
+    air = () if problem.data.unrestrained else ("cn_beta", "cn_r")
+    return *(name for name in own if name in problem.names), *air
+
+
+def stiffness_names(names: Sequence[str]) -> tuple[str, ...]:
+    """The parameters whose sum is the stiffness of small swings, in normalised form.
+
+    Those of effects that add to the spring's are among them: a pendulum's only spring is gravity.
+    """
+    return ("stiffness", *(name for name in _STIFFNESSES if name in names))
+
+
+def coefficient_value(names: Sequence[str], common: Array, name: str) -> float | None:
+    """A coefficient of a fit, in 1/rad, rad/s or 1, or in the unit of the parameter; None where it has none.
+
+    Args:
+        names: of the common parameters.
+        common: their values, shape (common,).
+    """
+    value = dict(zip(names, common.tolist(), strict=True))
+    if name not in ("omega_n", "zeta"):
+        return value.get(name)
+    omega = math.sqrt(max(sum(value[part] for part in stiffness_names(names)), 0.0))
+    return omega if name == "omega_n" else value["mechanical_damping"] / max(2.0 * omega, 1e-150)
+
+
+def coefficient_gradient(names: Sequence[str], common: Array, name: str) -> Array:
+    """Derivative of a coefficient with respect to the common parameters, shape (common,).
+
+    Args:
+        names: of the common parameters, the coefficient or those it is made of among them.
+        common: their values, shape (common,).
+    """
+    found = dict.fromkeys(names, 0.0)
+    if name in found:
+        found[name] = 1.0
+        return np.array(list(found.values()))
+    omega = max(coefficient_value(names, common, "omega_n") or 0.0, 1e-150)
+    damping = float(common[list(names).index("mechanical_damping")])
+    slope = 0.5 / omega if name == "omega_n" else -0.25 * damping / omega / omega / omega
+    found |= dict.fromkeys(stiffness_names(names), slope)
+    if name == "zeta":
+        found["mechanical_damping"] = 0.5 / omega
+    return np.array(list(found.values()))
+
+
+def coefficient_move(fit: Fit, name: str) -> float:
+    """Half the difference between the coefficients of two halves of the data, beyond chance.
+
+    The data are halved by amplitude, by time, by wind speed and by spring, and the halves that differ most count.
+    The difference is that of one Gauss–Newton step from the fit: the scores of a fit sum to zero, and what one half
+    pulls up the other pulls down. Were the model right, the pull would be the noise's alone. This is the test of
+    Zeileis & Hornik (Stat. Neerl. 61 (2007) 488) for parameters that change along an ordering, in the parameter's
+    unit; a refit of each half would answer the same, but is undetermined where one half shows only some causes.
+
+    Returns:
+        The move in the coefficient's unit, reduced by what the noise alone gives (2 standard deviations, in
+        quadrature); 0 where it gives as much.
+    """
+    gradient = coefficient_gradient(fit.problem.names, fit.point.common, name)
+    _, slope, solutions = normal_equations(fit.jacobian, fit.residuals)
+    # the step is what the fit had still to go
+    direction, step = fit.covariance @ gradient, fit.covariance @ slope
+    rows: list[tuple[float, ...]] = []  # of pieces of one cycle
+    for index, (run, (common, release), residual, solution) in enumerate(
+        zip(fit.problem.data.runs, fit.jacobian, fit.residuals, solutions, strict=True)
+    ):
+        left = common - release @ solution[:, :-1]
+        influence = left @ direction
+        pull = influence * (residual - left @ step - release @ solution[:, -1])
+        motion, count = np.abs(run.reading - np.mean(run.reading)), run.reading.size
+        cycles = resonance(fit, index) * run.interval  # to a block
+        pieces = min(max(int(count * cycles), 1), count)
+        starts = np.arange(pieces, dtype=np.int64) * count // pieces
+        columns: Sequence[Array] = (
+            np.add.reduceat(pull, starts),
+            np.add.reduceat(influence**2, starts),
+            np.maximum.reduceat(motion, starts),
+            starts / count,
+        )
+        rows += [(*row, run.wind_speed, run.spring_stiffness or 0.0) for row in zip(*columns, strict=True)]
+    pull, weight, *orders = np.array(rows, np.float64).T
+    found, total = 0.0, float(weight.sum())
+    for order in orders:
+        rank = np.argsort(order, kind="stable")
+        at = int(np.searchsorted(np.cumsum(weight[rank]), 0.5 * total))
+        middle = order[rank[min(at, rank.size - 1)]]
+        for low in (order < middle, order <= middle):  # runs of one condition are not divided
+            share = float(weight[low].sum()) / max(total, 1e-300)
+            if LEAST_HALF < share < 1.0 - LEAST_HALF:  # else one half says nothing
+                both = 2.0 * share * (1.0 - share)
+                moved = float(pull[low].sum()) / both
+                chance = CHANCE_STDS**2 * total / (2.0 * both)
+                found = max(found, math.sqrt(max(moved**2 - chance, 0.0)))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A fit and the same with sets of small causes added, by linear theory.
+
+    Args:
+        weights: probability of each set, the empty one first, shape (sets,).
+        moves: how far each set moves the coefficients of `coefficient_names`, shape (sets, coefficients).
+        noise: variances due to the noise of the readings, of that shape.
+        forms: further variances due to the forms of the small causes, of that shape.
+        left: scaled residuals that the sets leave on the average, by run.
+        scatter: standard deviations from the scatter of the runs in these, where they are beyond chance, shape
+            (coefficients,); else 0.
+    """
+
+    weights: Array
+    moves: Array
+    noise: Array
+    forms: Array
+    left: list[Array]
+    scatter: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Cause:
+    """One effect beside the fit, at the size at which its change was computed."""
+
+    left: Array  # the change of all readings that the fit cannot absorb, scaled, shape (n,)
+    moves: Array  # of the coefficients by the part that it absorbs, shape (coefficients,)
+    unseen: (
+        Array  # their standard deviations from the part of its form that no free decay shows, of that shape
+    )
+    least: float  # multiple of the size that is allowed
+    greatest: float  # multiple of the size that is allowed
+    by_chance: float  # χ² by which the numbers of the runs' own may lower it
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A set of effects added by one Gauss–Newton step."""
+
+    sizes: Array  # multiples of the causes' sizes, 0 outside the set, shape (causes,)
+    drop: float  # of χ², less what the runs' own numbers gain by chance
+    moves: Array  # of the coefficients, shape (coefficients,)
+    noise: Array  # variances of these due to the noise, of that shape
+    forms: Array  # variances of these due to the effects' forms, of that shape
+
+
+def alone(fit: Fit) -> Beside:
+    """A fit with no set of small causes added."""
+    formal = _formal(fit, _gradients(fit))[None, :]
+    return Beside(
+        np.ones(1), np.zeros_like(formal), formal, np.zeros_like(formal), fit.residuals, 0.0 * formal[0]
+    )
+
+
+def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
+    """Add sets of effects that a fit does not have, up to three at a time, by one Gauss–Newton step.
+
+    An effect that acts but is not named changes the coefficients, because the fit absorbs a part of it. The other
+    part is in the residuals and gives its size. A set has the weight exp(−(χ²/φ + price)/2). The price is
+    `NEEDLESS_CHI2` for each effect. φ is the dispersion of what the best set leaves beyond chance, over the six
+    effective degrees of freedom that the error of a real model has (decisions 0007 and 0028). An effect
+    that the readings do not show therefore has no part in the average, however far it could move a coefficient.
+
+    Args:
+        fit: with or without effects.
+        kinds: the effects that may act beside those of the fit; none are tried where the fit misses the motion.
+    """
+    gradients = _gradients(fit)
+    present = {kind.name for kind in fit.problem.effects}
+    others = [kind for kind in kinds if kind.fitted and kind.name not in present]
+    _, _, solutions = normal_equations(fit.jacobian, fit.residuals)
+    directions = fit.covariance @ gradients.T
+    influence = [  # what a unit of every scaled residual adds to the coefficients, by run
+        (common - release @ solution[:, :-1]) @ directions
+        for (common, release), solution in zip(fit.jacobian, solutions, strict=True)
+    ]
+    causes = [] if misses_motion(fit) else _causes(fit, others, influence)
+    if not causes:
+        return replace(alone(fit), scatter=_scatter(fit, influence, fit.residuals))
+    left = np.array([cause.left for cause in causes])
+    gram, score = left @ left.T, left @ np.concatenate(fit.residuals)
+    formal = _formal(fit, gradients)
+    zero = np.zeros(formal.size)
+    found = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
+    tried = np.argsort(-(score**2) / np.maximum(np.diag(gram), 1e-300), kind="stable")[:_TRIED].tolist()
+    sets = [list(chosen) for size in range(1, _MOST + 1) for chosen in combinations(tried, size)]
+    found += [step for chosen in sets if (step := _step(gram, score, causes, chosen)) is not None]
+    excess = fit.total - fit.count - np.array([step.drop for step in found])
+    price = NEEDLESS_CHI2 * np.array([np.count_nonzero(step.sizes) for step in found])
+    best = float(excess[np.argmin(excess + price)])
+    beyond = max(best - CHANCE_STDS * math.sqrt(2.0 * fit.count), 0.0)
+    odds = -0.5 * (excess / (1.0 + beyond / _DEGREES) + price)
+    weights = np.exp(odds - odds.max())
+    weights /= weights.sum()
+    taken = np.split(
+        (weights @ np.array([step.sizes for step in found])) @ left,
+        np.cumsum([residual.size for residual in fit.residuals])[:-1],
+    )
+    remaining = [residual - part for residual, part in zip(fit.residuals, taken, strict=True)]
+    return Beside(
+        weights,
+        np.array([step.moves for step in found]),
+        np.array([formal + step.noise for step in found]),
+        np.array([step.forms for step in found]),
+        remaining,
+        _scatter(fit, influence, remaining),
+    )
+
+
+def _gradients(fit: Fit) -> Array:
+    """Derivatives of the coefficients with respect to the common parameters, shape (coefficients, common).
+
+    Zero for a coefficient that a model of one's own holds.
+    """
+    names, common = fit.problem.names, fit.point.common
+    held = np.zeros(len(names))
+    composed = {"omega_n", "zeta"}
+    return np.array(
+        [
+            coefficient_gradient(names, common, name) if name in names or name in composed else held
+            for name in coefficient_names(fit.problem)
+        ]
+    )
+
+
+def _formal(fit: Fit, gradients: Array) -> Array:
+    """Variances of the coefficients from the fit's covariance, to first order, shape (coefficients,)."""
+    found: Array = np.maximum(np.einsum("ci,ij,cj->c", gradients, fit.covariance, gradients), 0.0)
+    return found
+
+
+def _step(gram: Array, score: Array, causes: Sequence[_Cause], chosen: list[int]) -> _Step | None:
+    """Add the effects of some places; None where they change the readings alike, or a size would leave its range.
+
+    ``gram`` holds products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
+    """
+    own = gram[np.ix_(chosen, chosen)]
+    scale = np.sqrt(np.diag(own))
+    alike = own / np.outer(scale, scale)
+    if np.linalg.eigvalsh(alike)[0] < _DISTINCT:
+        return None
+    inverse = np.linalg.inv(alike) / np.outer(scale, scale)
+    size = inverse @ score[chosen]
+    inside = [causes[i] for i in chosen]
+    if any(not cause.least <= one <= cause.greatest for one, cause in zip(size, inside, strict=True)):
+        return None
+    moves = np.array([cause.moves for cause in inside])
+    unseen = np.array([cause.unseen for cause in inside])
+    sizes = np.zeros(len(causes))
+    sizes[chosen] = size
+    return _Step(
+        sizes,
+        float(score[chosen] @ size) - sum(cause.by_chance for cause in inside),
+        size @ moves,
+        np.einsum("ic,ij,jc->c", moves, inverse, moves),
+        size**2 @ ((FORM_CHANGE_STD * moves) ** 2 + unseen**2),
+    )
+
+
+def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
+    """Standard deviations from the scatter of the runs; 0 where chance explains what is left."""
+    names, runs = coefficient_names(fit.problem), fit.problem.data.runs
+    excess = sum(float(residual @ residual) for residual in residuals) - fit.count
+    if excess <= CHANCE_STDS * math.sqrt(2.0 * fit.count):
+        return np.zeros(len(names))
+    windy = sum(run.wind_on for run in runs)
+    informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in names])
+    parts = [residual @ own for residual, own in zip(residuals, influence, strict=True)]
+    return scatter_of_runs(np.array(parts), informative_runs)
+
+
+def _causes(fit: Fit, kinds: Sequence[type[Effect]], influence: list[Array]) -> list[_Cause]:
+    """The effects that the runs can show, each from its most promising starting point.
+
+    Not every effect is linear in its size, so each is taken at about the size that its own step gives.
+    """
+    found, residuals = [], np.concatenate(fit.residuals)
+    for kind in kinds:
+        with suppress(np.linalg.LinAlgError):
+            start = next(iter(starting_points(fit, kind)), None)
+            cause = None if start is None else _cause(fit, start, influence)
+            for _ in range(_SECANTS):
+                if start is None or cause is None or start.scaled is None:
+                    break
+                size = float(cause.left @ residuals) / float(cause.left @ cause.left)
+                if not cause.least < size < cause.greatest or size <= 0.0 or abs(size - 1.0) < _SETTLED:
+                    break
+                common = start.point.common.copy()
+                common[start.scaled] *= size
+                start = replace(start, point=replace(start.point, common=common))
+                cause = _cause(fit, start, influence)
+            found += [] if cause is None else [cause]
+    return found
+
+
+def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | None:
+    runs, moved = fit.problem.data.runs, start.problem.predict([start.point])[0]
+    change = [
+        run.scaled(m - run.reading) + residual
+        for run, m, residual in zip(runs, moved, fit.residuals, strict=True)
+    ]
+    if not all(np.all(np.isfinite(c)) for c in change):
+        return None
+    left = np.concatenate(project_out(fit, change))
+    if not left.any():
+        return None
+    moves = -sum((c @ i for c, i in zip(change, influence, strict=True)), np.zeros(influence[0].shape[1]))
+    own = start.point.release.shape[1] - fit.point.release.shape[1]
+    least, greatest = 0.0, 1.0
+    if own:
+        least, greatest = 1.0 / _OWN_SIZE, _OWN_SIZE
+    elif start.scaled is not None:  # its parameter's range
+        value = start.point.common[start.scaled]
+        least, greatest = sorted(bound[start.scaled] / value for bound in start.problem.bounds)
+    unseen = np.zeros(moves.size)
+    if "cn_beta" in fit.problem.names:  # Cnβ and Cnr come last
+        effect = start.problem.effects_at(start.point.common)[-1]
+        unseen[-2:] = effect.unseen_form(fit.value("cn_beta"), wind_on_runs(fit))
+    return _Cause(left, moves, unseen, least, greatest, OWN_EVIDENCE * own * len(runs))
