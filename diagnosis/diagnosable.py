@@ -248,6 +248,7 @@ def _by_frequency(runs: Sequence[Run]) -> list[list[Run]]:
 
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
+_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
 _NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
@@ -280,9 +281,13 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
     for run in driven:
         assert run.drive is not None
         why = ""
-        if not run.drive.on_body:
-            why = "is driven by the motion of the spring's root"
-        elif run.spring_stiffness == 0.0 and run.wind_on:
+        if run.spring_stiffness == 0.0 and not run.drive.on_body:
+            raise TunnelError(
+                "the motion of the root acts through the spring, and spring_stiffness = 0 states none",
+                where=f"{campaign.name}, run '{run.id}'",
+                remedy="state the spring's stiffness, or name the input moment_nm or drive",
+            )
+        if run.spring_stiffness == 0.0 and run.wind_on:
             why = "is driven and has no spring, and the wind blows"
         elif own_model:
             why = "is driven, and a model of your own is given"
@@ -304,7 +309,8 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
                 remedy="leave the run out",
             )
     _refuse_beside_springs(campaign)
-    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
+    on_body = [run.drive for run in driven if run.drive is not None and run.drive.on_body]
+    mixed = {drive.column == "moment_nm" or drive.gain is not None for drive in on_body}
     if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
         raise TunnelError(
             "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
@@ -370,6 +376,9 @@ def kinds_for(
         return tuple(kind for kind in kinds if not kind.driven), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
     gone = {_NOT_TRIED: [kind for kind in kinds if kind not in kept]}
+    if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
+        gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
+        kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
     if campaign.unrestrained:
         gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
         gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]

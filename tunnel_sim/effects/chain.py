@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,11 +43,13 @@ class EffectChain:
         return cls(stated, tuple(effects), drawn)
 
     def physics(self) -> RunSettings:
-        """The physics of the run with the effects."""
+        """The physics of the run with the effects; a spring whose root moves pulls with its true stiffness."""
         run = self.stated
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             run = effect.on_run(run, self.stated, drawn)
-        return run
+        if run.drive is None or run.drive.on_body:
+            return run
+        return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
 
     @property
     def skips(self) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import islice
 from math import isclose
 from typing import Any
@@ -74,20 +73,12 @@ def simulate_campaigns(
             f"the plans have {len(rates)} different sample rates", remedy="simulate each rate separately"
         )
     drawn = [_draw(plan) for plan in plans]
-    true = [_true_run(chain) for runs in drawn for _, chain in runs]
+    true = [chain.physics() for runs in drawn for _, chain in runs]
     motions = iter(simulate_motions(rig, true, *rates, nthread=nthread, progress=progress))
     return [
         _campaign(plan, rig, list(islice(motions, len(runs))), runs)
         for plan, runs in zip(plans, drawn, strict=True)
     ]
-
-
-def _true_run(chain: EffectChain) -> RunSettings:
-    """The physics of a run with its effects; a spring whose root moves pulls with its true stiffness."""
-    run = chain.physics()
-    if run.drive is None or run.drive.on_body:
-        return run
-    return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
 
 
 _Drawn = list[tuple[np.random.Generator, EffectChain]]  # of every run, in the plan's order
@@ -147,7 +138,6 @@ def run_settings(
         moment = DriveMoment(
             np.arange(given.values.size) / sample_rate,
             given.values,
-            scale=1.0 if given.on_body else condition.spring_stiffness,
             held=given.hold == "zero",
             on_body=given.on_body,
         )
@@ -239,9 +229,9 @@ def _check_driven(effect: Effect, plan: CampaignPlan) -> None:
             where=f"effect {effect.name}",
             remedy="leave out the effect or [drive]",
         )
-    if (effect.channel, effect.condition) == ("stiffness", "always") and not all(d.on_body for d in drives):
+    if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
         raise TunnelError(
-            "changes the spring, which is not simulated where its root moves",
+            "is a loss in the spring, which is not simulated where its root moves",
             where=f"effect {effect.name}",
             remedy="leave out the effect, or drive the body by amplitudes_nm",
         )
