@@ -106,7 +106,8 @@ def make(
     with bar("writing campaigns", count) as progress:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, key=key,
-            mixture=Mixture(textbook, rare, variety, small, driven=driven), progress=progress, show_steps=console(stderr=True).is_terminal,
+            mixture=Mixture(textbook, rare, variety, small, driven=driven), progress=progress,
+            show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
     say(f"Key sha256 {read_document(out / SEAL, '')['key_sha256']}, in {out / SEAL}")
