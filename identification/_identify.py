@@ -74,7 +74,7 @@ def _of_all_runs(campaign: Campaign, examined: Examined, estimate: Estimate) -> 
     )
 
 
-DRIVEN_ESTIMATORS = ("output_error", "filter_error")
+DRIVEN_ESTIMATORS = ("output_error", "filter_error", "frequency_response")
 """Names of the estimators that take the input of driven runs."""
 
 

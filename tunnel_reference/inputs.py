@@ -149,7 +149,8 @@ class Inputs:
         delay = [np.broadcast_to(0.0 if c.drive is None else c.drive.delay, (c.runs,)) for c in conditions]
         on_body = np.repeat([c.drive is None or c.drive.on_body for c in conditions], runs)
         return cls(
-            np.concatenate(columns, axis=1), 1.0 - np.concatenate(held), np.concatenate(delay), on_body,
+            np.concatenate(columns, axis=1), (1.0 - np.concatenate(held)).astype(np.float64),
+            np.concatenate(delay), on_body,
             conditions[0].sample_rate,
         )  # fmt: skip
 
