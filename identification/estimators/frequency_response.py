@@ -44,7 +44,7 @@ class FrequencyResponse(RunByRun):
 
     Args:
         segments: lengths of a segment in the record, where the input is not periodic; segments overlap by half.
-        least_coherence: of reading and model at a line that is used, from 0 to 1.
+        least_coherence: of reading and model at a line that is used, a share of the power.
     """
 
     name = "frequency_response"

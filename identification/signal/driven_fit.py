@@ -260,7 +260,16 @@ def normal_equations(
 
 
 def linearised(run: Run, link: Array, parameters: Array, own: Array) -> tuple[Array, Array]:
-    """Residual and Jacobian of one run: φ, zero or constant acceleration, initial angle, initial rate."""
+    """Residual and Jacobian of one run.
+
+    Args:
+        link: (a, k, g) = L φ, shape (3, p).
+        parameters: φ, shape (p,), SI.
+        own: zero (rad) or constant acceleration (rad/s²), initial angle (rad) and rate (rad/s), shape (3,).
+
+    Returns:
+        Residual in rad, shape (n,), and derivatives of the model with respect to φ and ``own``, shape (n, p + 3).
+    """
     time = run.record.time_s - run.record.time_s[0]
     rate, stiffness, gain = (float(value) for value in link @ parameters)
     constant, angle, initial = own.tolist()
