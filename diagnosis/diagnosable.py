@@ -224,6 +224,7 @@ def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
 
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
+_MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
 _NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
@@ -257,9 +258,13 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
         why = ""
-        if not run.drive.on_body:
-            why = "is driven by the motion of the spring's root"
-        elif run.spring_stiffness == 0.0 and run.wind_on:
+        if run.spring_stiffness == 0.0 and not run.drive.on_body:
+            raise TunnelError(
+                "the motion of the root acts through the spring, and spring_stiffness = 0 states none",
+                where=where,
+                remedy="state the spring's stiffness, or name the input moment_nm or drive",
+            )
+        if run.spring_stiffness == 0.0 and run.wind_on:
             why = "is driven and has no spring, and the wind blows"
         elif own_model:
             why = "is driven, and a model of your own is given"
@@ -277,6 +282,14 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
         if why:
             what = f"the run {why}, which is not diagnosed yet"
             raise TunnelError(what, where=where, remedy="leave the run out")
+    on_body = [run.drive for run in driven if run.drive is not None and run.drive.on_body]
+    mixed = {drive.column == "moment_nm" or drive.gain is not None for drive in on_body}
+    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
+        raise TunnelError(
+            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
+            where=campaign.name,
+            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+        )
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -342,6 +355,9 @@ def kinds_for(
         return tuple(kind for kind in kinds if not kind.driven), ()
     kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
     gone = {_NOT_TRIED: [kind for kind in kinds if kind not in kept]}
+    if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
+        gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
+        kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
     if campaign.unrestrained:
         gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
         gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]

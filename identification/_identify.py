@@ -66,7 +66,7 @@ def identify(
     return estimate
 
 
-DRIVEN_ESTIMATORS = ("output_error", "filter_error")
+DRIVEN_ESTIMATORS = ("output_error", "filter_error", "frequency_response")
 """Names of the estimators that take the input of driven runs."""
 
 

@@ -5,6 +5,6 @@ integrator (all runs of many campaigns advance together) and friction law (stick
 within the step). For every family of effects it has further forms besides the textbook form.
 
 ``conditions`` defines a campaign, ``integrator`` integrates it, ``moments`` and ``readings`` contain the laws,
-``forms`` and ``outside`` list them, ``severity`` scales them relative to the noise, ``draw`` draws campaigns and
-``make`` makes sets of them for ``tunnel blind make``.
+``inputs`` the inputs of driven runs, ``forms`` and ``outside`` list the effects, ``severity`` scales them relative
+to the noise, ``draw`` draws campaigns and ``make`` makes sets of them for ``tunnel blind make``.
 """

@@ -43,6 +43,7 @@ class Form:
         signs: possible signs of the severity parameter.
         draw: draws secondary parameters, including random seeds.
         limits: least and greatest magnitude of the severity parameter.
+        driven: whether it acts on driven runs only.
     """
 
     family: str
@@ -54,6 +55,7 @@ class Form:
     signs: tuple[int, ...] = (1,)
     draw: Draw = nothing
     limits: tuple[float, float] = (1e-9, 1e9)
+    driven: bool = False
 
 
 def spread(value: float | Array, conditions: Conditions) -> Array:
@@ -144,6 +146,9 @@ LINEAR_IN_A_RECORD = frozenset(
     }
 )
 """One record of these is another damped oscillation: what it shows is its own decay, not that of the stated rig."""
+
+NOT_DRIVEN = frozenset({"second_mode", "dropped_samples", ROD})
+"""Families that are not drawn for driven runs, on which the diagnosis does not try them."""
 
 LOST_SAMPLES: Mapping[str, int] = {"dropped_samples/one_instant": 1, "dropped_samples/three_instants": 3}
 """Least number of samples that a form loses, by family and name."""

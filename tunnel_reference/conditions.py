@@ -36,6 +36,39 @@ class Rod:
 
 
 @dataclass(frozen=True, eq=False)
+class Input:
+    """What drives the runs of a campaign; zero in its free decays.
+
+    Args:
+        column: ``moment_nm``, ``drive`` or ``base_rad``, the angle of the spring's root.
+        values: at the samples, N m, units or rad, shape (samples, runs).
+        held: whether they are kept between samples, shape (runs,); else they are linear.
+        peak: greatest angle of the linear rig's response, rad, shape (runs,); 0 of free decays.
+        gain: N m per unit of a ``drive``; 1 of other columns.
+        stated: whether the campaign states the gain.
+        delay: time by which the input acts later than its samples say, s, shape (runs,) or (1,).
+    """
+
+    column: str
+    values: Array
+    held: NDArray[np.bool_]
+    peak: Array
+    gain: float = 1.0
+    stated: bool = False
+    delay: Array = field(default_factory=lambda: np.zeros(1))
+
+    @property
+    def driven(self) -> NDArray[np.bool_]:
+        """Whether a run is driven, shape (runs,)."""
+        return self.peak > 0.0
+
+    @property
+    def on_body(self) -> bool:
+        """Whether it is a moment on the body; else it moves the spring's root."""
+        return self.column != "base_rad"
+
+
+@dataclass(frozen=True, eq=False)
 class Conditions:
     """One campaign's runs and truth; arrays have shape (runs,).
 
@@ -65,6 +98,8 @@ class Conditions:
         stamp_step: step to which the written time stamps are rounded, s; 0: not rounded.
         time_scale: time as written over time as simulated. All other times here are as simulated.
         moment_scale: moments as written over moments as simulated. All other moments here are as simulated.
+        drive: the input of driven runs; None where all runs are free decays.
+        start_rate: of the motion, rad/s.
     """
 
     spring_stiffness: Array
@@ -92,6 +127,8 @@ class Conditions:
     stamp_step: float = 0.0
     time_scale: float = 1.0
     moment_scale: float = 1.0
+    drive: Input | None = None
+    start_rate: Array = field(default_factory=lambda: np.zeros(1))
 
     @property
     def runs(self) -> int:
@@ -111,6 +148,12 @@ class Conditions:
             return even
         late = np.random.default_rng(self.clock_seed).random(self.samples)
         return even + late * self.clock_jitter / self.sample_rate
+
+    @property
+    def reach(self) -> float:
+        """Greatest angle of the runs, about, rad: that of the release or of the response to the input."""
+        peak = 0.0 if self.drive is None else float(np.max(self.drive.peak))
+        return max(float(np.max(np.abs(self.start_angle))), peak)
 
     @property
     def length_scale(self) -> float:

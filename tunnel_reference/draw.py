@@ -9,7 +9,8 @@ import numpy as np
 
 from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.forms import FAMILIES, forms_of
+from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
+from tunnel_reference.inputs import draw_inputs
 from tunnel_reference.outside import OUTSIDE_FORMS
 from tunnel_reference.outside_laws import LAW_FORMS
 
@@ -150,6 +151,7 @@ class Mixture:
         variety: probability of another scale, of few runs, of coloured noise and of uneven time stamps, each.
         small: probability of a small effect beside those that matter, and of a second one beside the first.
         certain: circumstances that every campaign has, of `tunnel_reference.draw.CIRCUMSTANCES`.
+        driven: whether all runs are driven, or some.
     """
 
     textbook: float = 0.5
@@ -157,6 +159,12 @@ class Mixture:
     variety: float = 0.25
     small: float = 0.25
     certain: tuple[str, ...] = ()
+    driven: bool = False
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The families that are drawn."""
+        return DRIVEN_FAMILIES if self.driven else FAMILIES
 
 
 def draw_campaign(
@@ -176,8 +184,11 @@ def draw_campaign(
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     mixture = mixture or Mixture()
     number = NUMBERS.get(kind, 0)
-    names = draw_families(rng, number, families)
-    small = draw_families(rng, number + _small_number(rng, mixture.small), names)[number:] if names else ()
+    known = mixture.families
+    names = draw_families(rng, number, families, known)
+    small = (
+        draw_families(rng, number + _small_number(rng, mixture.small), names, known)[number:] if names else ()
+    )
     conditions = draw_circumstances(
         rng,
         draw_conditions(rng),
@@ -185,6 +196,12 @@ def draw_campaign(
         mains="mains_hum" in (*names, *small),
         certain=mixture.certain,
     )
+    if mixture.driven:
+        by_root = "structural_damping" not in (
+            *names,
+            *small,
+        )  # whose law is that of a spring with a fixed root
+        conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
     effects = tuple(
         _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)
         for name in (*names, *small)
@@ -202,9 +219,11 @@ def redraw(draw: CampaignDraw) -> CampaignDraw:
     return draw_campaign(rng, kind=draw.kind, mixture=draw.mixture, families=mattering[:1])
 
 
-def draw_families(rng: np.random.Generator, number: int, first: Sequence[str] = ()) -> tuple[str, ...]:
+def draw_families(
+    rng: np.random.Generator, number: int, first: Sequence[str] = (), known: Sequence[str] = FAMILIES
+) -> tuple[str, ...]:
     """Different families, those after the first equally likely."""
-    others = [name for name in FAMILIES if name not in first]
+    others = [name for name in known if name not in first]
     drawn = rng.choice(np.array(others), size=max(number - len(first), 0), replace=False)
     return (*first, *(str(name) for name in drawn))[:number]
 

@@ -6,7 +6,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 import tunnel_reference
-from tunnel_reference.catalogue import Form
+from tunnel_reference.catalogue import NOT_DRIVEN, Form
 
 
 def _found() -> tuple[Form, ...]:
@@ -17,7 +17,9 @@ def _found() -> tuple[Form, ...]:
 
 
 FORMS: tuple[Form, ...] = _found()
-FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS}))
+FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS if not form.driven}))
+DRIVEN_FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS} - NOT_DRIVEN))
+"""Of driven runs."""
 
 
 def forms_of(family: str) -> tuple[Form, ...]:

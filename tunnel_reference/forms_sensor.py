@@ -95,8 +95,8 @@ _HUM = (
 
 
 def _limit(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
-    """L = (1 − p) times the largest release angle."""
-    limit = (1.0 - p) * float(np.max(np.abs(c.start_angle)))
+    """L = (1 − p) times the largest angle."""
+    limit = (1.0 - p) * c.reach
     return {"limit": limit, "lower": e.get("lower", 1.0), "knee": e.get("knee", 0.1)}
 
 

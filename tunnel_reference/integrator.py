@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.inputs import Inputs
 
 Params = Mapping[str, Array]
 Places = NDArray[np.intp]
@@ -49,6 +50,7 @@ class Stage:
         speed_ratio: V(t)/V; changed by laws.
         air_angle: the angle on which Ka acts, rad; changed by laws.
         spring_angle: the angle on which Kr acts, rad; changed by laws.
+        deflection: of the spring: θ less the angle of its root, rad.
         top: moment on the upper end, N m; changed by laws.
         body: moment on the body, N m; changed by laws.
         level: friction level at the upper end, N m; changed by laws.
@@ -65,6 +67,7 @@ class Stage:
     speed_ratio: Array
     air_angle: Array
     spring_angle: Array
+    deflection: Array
     top: Array
     body: Array
     level: Array
@@ -172,8 +175,11 @@ class _Batch:
         self.inertia = np.repeat([c.yaw_inertia for c in conditions], runs)
         self.damping = np.repeat([c.mechanical_damping for c in conditions], runs)
         self.release = np.concatenate([c.start_angle for c in conditions])
+        self.rate = np.concatenate([np.broadcast_to(c.start_rate, (c.runs,)) for c in conditions])
+        self.inputs = Inputs.of(conditions)
+        self.middle = 0.0  # of the step
         self.ones = np.ones(self.size)
-        self.sign = np.zeros(self.size)
+        self.sign = np.sign(self.rate)
         self.moving = np.ones(self.size)
         self._rod(conditions, runs)
         self.state = self._initial_state()
@@ -196,13 +202,13 @@ class _Batch:
 
     def _initial_state(self) -> Array:
         """Body angle and rate, (angle and rate of the upper end,) and the states of the laws, in one vector."""
-        blocks = [self.release.copy(), np.zeros(self.size)]
+        blocks = [self.release.copy(), self.rate.copy()]
         if self.flexible:
             series = self.stiffness / (self.stiffness + self.rod_stiffness)
             blocks[0] = np.where(self.held_body, self.release, self._held_at_top())
             blocks += [
                 np.where(self.held_body, self.release * (1.0 - series), self.release),
-                np.zeros(self.size),
+                self.rate.copy(),
             ]
         position = len(blocks) * self.size
         for group in self.groups:
@@ -220,9 +226,10 @@ class _Batch:
         n = self.size
         beta, rate = state[:n], state[n : 2 * n]
         theta, omega = (state[2 * n : 3 * n], state[3 * n : 4 * n]) if self.flexible else (beta, rate)
+        deflection = theta if self.inputs is None else theta - self.inputs.root(time, self.middle)
         return Stage(
             time, beta, rate, theta, omega, self.stiffness, self.air_stiffness, self.air_damping,
-            self.ones.copy(), beta.copy(), theta.copy(), self.ones, self.ones, np.zeros(n),
+            self.ones.copy(), beta.copy(), deflection.copy(), deflection, self.ones, self.ones, np.zeros(n),
         )  # fmt: skip
 
     def derivative(self, time: float, state: Array) -> Array:
@@ -235,6 +242,8 @@ class _Batch:
         stage.body = stage.speed_ratio * (
             stage.speed_ratio * self.air_stiffness * stage.air_angle + self.air_damping * stage.rate
         )
+        if self.inputs is not None:
+            stage.body = stage.body + self.inputs.moment(time, self.middle)
         if self.flexible:
             twist = stage.theta - stage.beta
             rod = self.rod_stiffness * twist * (1.0 + self.rod_hardening * twist * twist)
@@ -264,12 +273,14 @@ class _Batch:
 
     def start_friction(self) -> None:
         """Set the sign of friction at rest: opposed to the other moments, or sticking."""
-        if self.dry.size:
+        resting = self.dry[self.rate[self.dry] == 0.0]
+        if resting.size:
             self.derivative(0.0, self.state)
-            self._leave_rest(self.dry)
+            self._leave_rest(resting)
 
     def step(self, time: float, h: float) -> None:
         """Advance by one RK4 step, then correct the rows with friction whose rate changed sign."""
+        self.middle = time + h / 2
         before = self.state
         k1 = self.derivative(time, before)
         k2 = self.derivative(time + h / 2, before + (h / 2) * k1)
@@ -326,7 +337,7 @@ class _Batch:
 def integrate(
     conditions: Sequence[Conditions], terms: Sequence[Sequence[Term]], *, substeps: int = 10
 ) -> list[Motion]:
-    """Integrate campaigns together from rest at their start angles.
+    """Integrate campaigns together from their start angles and rates.
 
     Args:
         conditions: one per campaign; all with or all without a flexible rod, equal sample rates.

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from tunnel_reference.conditions import FRONTAL_AREA, NOMINAL_INERTIA, REFERENCE_LENGTH, WIDTH
+from tunnel_reference.conditions import (
+    FRONTAL_AREA,
+    NOMINAL_INERTIA,
+    REFERENCE_LENGTH,
+    WIDTH,
+    Conditions,
+    Input,
+)
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
-from tunnel_reference.forms import FAMILIES
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Record
 
@@ -43,7 +50,9 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
     order_seed, *seeds = root.spawn(count + 1)
     order = np.random.default_rng(order_seed)
     kinds = plan_kinds(count, shares)
-    firsts = {kind: _in_turn(order, kinds.count(kind)) for kind in NUMBERS if kind != "none"}
+    firsts = {
+        kind: _in_turn(order, kinds.count(kind), mixture.families) for kind in NUMBERS if kind != "none"
+    }
     draws = []
     for kind, child in zip(kinds, seeds, strict=True):
         rng = np.random.default_rng(child)
@@ -52,10 +61,10 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
     return [draws[i] for i in order.permutation(count)]
 
 
-def _in_turn(rng: np.random.Generator, number: int) -> list[str]:
+def _in_turn(rng: np.random.Generator, number: int, families: Sequence[str]) -> list[str]:
     """Families in random order; their frequencies differ by at most one."""
-    rounds = -(-number // len(FAMILIES))
-    names = [str(name) for _ in range(rounds) for name in rng.permutation(np.array(FAMILIES))]
+    rounds = -(-number // len(families))
+    names = [str(name) for _ in range(rounds) for name in rng.permutation(np.array(families))]
     return names[:number]
 
 
@@ -73,6 +82,9 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
     time = np.round(c.time, 9) if c.stamp_step == 0.0 else np.round(c.time / c.stamp_step) * c.stamp_step
     time = np.round(time * c.time_scale, 11)
     length, speed = c.length_scale, c.length_scale / c.time_scale
+    drives = [
+        None if c.drive is None or not c.drive.driven[r] else _drive(c, c.drive, r) for r in range(c.runs)
+    ]
     runs = tuple(
         Run(
             id=f"r{number + 1:02d}",
@@ -80,7 +92,8 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
             wind_speed=float(c.wind_speed[number]) * speed,
             spring_stiffness=float(c.spring_stiffness[number]) * c.moment_scale,
             air_density=round(c.air_density, 4),
-            release_angle=float(c.release_angle[number]),
+            release_angle=float(c.release_angle[number]) if drives[number] is None else None,
+            drive=drives[number],
         )
         for number in range(c.runs)
     )
@@ -95,6 +108,15 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
         sensor=SensorProperties(c.sample_rate / c.time_scale, c.resolution, c.stated_noise),
         runs=runs,
     )
+
+
+def _drive(c: Conditions, given: Input, run: int) -> Drive:
+    """The input of a run, in the scales of its rig."""
+    hold: Hold = "zero" if given.held[run] else "linear"
+    column = cast(InputColumn, given.column)
+    scale = c.moment_scale if column == "moment_nm" else 1.0
+    gain = given.gain * c.moment_scale if column == "drive" and given.stated else None
+    return Drive(column, given.values[:, run] * scale, hold, gain)
 
 
 def truth_of(simulated: Simulated) -> dict[str, Any]:
@@ -124,6 +146,13 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
         "scale": {"time": c.time_scale, "moment": c.moment_scale},
         "few_runs": c.runs < FEW_RUNS,
         "coloured_share": c.coloured_share,
+        "driven": None
+        if c.drive is None
+        else {
+            "column": c.drive.column,
+            "runs": int(np.sum(c.drive.driven)),
+            "gain": c.drive.gain * c.moment_scale,
+        },
         "stamps": "jittered" if c.clock_jitter else "rounded" if c.stamp_step else "even",
         "severity": simulated.excess,
         "run_severity": [float(v) for v in simulated.run_excess],

@@ -18,6 +18,7 @@ import numpy as np
 from tunnel_reference.catalogue import Bound
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.draw import CampaignDraw, EffectDraw, redraw, with_defaults
+from tunnel_reference.driven_fit import fit_driven
 from tunnel_reference.integrator import Motion, Term, integrate
 from tunnel_reference.nominal_fit import fit_nominal
 from tunnel_reference.readings import ReadingTerm, read_motion
@@ -94,7 +95,7 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
     sensor = [t for t in terms if isinstance(t, ReadingTerm)]
     readings = read_motion(conditions, motion, sensor, np.random.default_rng(draw.seed))
     readings = readings[: draw.conditions.samples]  # a motion may outlast the record
-    fit = fit_nominal(draw.conditions, readings)
+    fit = (fit_nominal if conditions.drive is None else fit_driven)(draw.conditions, readings)
     power = fit.residual_power / conditions.noise_power
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
 

@@ -148,6 +148,7 @@ def make_blind(
                 "rare": mixture.rare,
                 "variety": mixture.variety,
                 "small": mixture.small,
+                "driven": mixture.driven,
             },
             "truths": truths,
         }

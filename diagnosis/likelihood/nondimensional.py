@@ -203,6 +203,8 @@ def _run(run: Run, change: Similarity) -> Run:
 
 def _drive(drive: Drive, change: Similarity) -> Drive:
     """An input, whose own times are those of its record."""
+    if not drive.on_body:
+        return drive
     if drive.column == "drive":
         return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
     return dataclasses.replace(drive, values=drive.values * change.similar(1.0, "N m"))

@@ -92,17 +92,20 @@ def prepare(
 def _driven(data: RunData, run: Run, *, normalised: bool) -> RunData:
     """A driven run with its input.
 
-    Per unit inertia, a known moment has an unknown gain too: one over the inertia.
+    Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's root
+    acts by the spring's stiffness.
     """
     assert run.drive is not None
-    known = run.drive.column == "moment_nm" or run.drive.gain is not None
+    known = run.drive.column != "drive" or run.drive.gain is not None
     moment = DriveMoment(
         run.record.time_s - run.record.time_s[0],
         run.drive.values,
         scale=1.0 if run.drive.gain is None else run.drive.gain,
         held=run.drive.hold == "zero",
+        on_body=run.drive.on_body,
     )
-    return dataclasses.replace(data, drive=moment, gain_free=normalised or not known)
+    free = run.drive.on_body and (normalised or not known)
+    return dataclasses.replace(data, drive=moment, gain_free=free)
 
 
 def without_start(data: Data) -> Data:

@@ -40,10 +40,15 @@ SUMMARIES: Mapping[str, str] = {
     "bayesian": "posterior means and 95 % intervals that are valid for records of one to three cycles",
     "neural_posterior": "posterior by a trained network: robust to unnamed effects; refuses what is unlike "
     "its training",
+    "frequency_response": "response over input, line by line where both are coherent: for driven runs only",
 }
 """Method and purpose of each estimator by name, one line for the help of the command line."""
 
-ALL_ESTIMATORS: tuple[str, ...] = tuple(SUMMARIES)
+DRIVEN_ONLY: tuple[str, ...] = ("frequency_response",)
+"""Those that do not take free decays."""
+
+ALL_ESTIMATORS: tuple[str, ...] = tuple(name for name in SUMMARIES if name not in DRIVEN_ONLY)
+"""Those that take free decays."""
 
 
 ENTRY_POINTS = "tunnel.estimators"
@@ -53,7 +58,7 @@ arguments."""
 
 def known_estimators() -> tuple[str, ...]:
     """The names of all estimators: the packaged ones, then those that installed packages add."""
-    return (*ALL_ESTIMATORS, *(name for name in added_to(ENTRY_POINTS) if name not in ALL_ESTIMATORS))
+    return (*SUMMARIES, *(name for name in added_to(ENTRY_POINTS) if name not in SUMMARIES))
 
 
 def make_estimator(name: str) -> Estimator:

@@ -80,19 +80,19 @@ class FilterError(RunByRun):
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
         deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
-        known = None if run.drive is None else _known_input(run.drive, bare.reading, factor)
+        known = None if run.drive is None else _known_input(run, run.drive, bare.reading, factor)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
 
 
-def _known_input(drive: Drive, reading: Reading, factor: int) -> KnownInput:
+def _known_input(run: Run, drive: Drive, reading: Reading, factor: int) -> KnownInput:
     """The response to the input, in the means of the blocks."""
 
     def response(decay: Decay) -> Array:
         motion = Reading(reading.time, _driven_part(reading, drive, decay))
         return mean_of_blocks(even_reading(motion).yaw, factor)
 
-    return KnownInput(response, by_root=not drive.on_body)
+    return KnownInput(response, by_root=run.driven_by_stiffness)
 
 
 def _driven_part(reading: Reading, drive: Drive, decay: Decay) -> Array:
@@ -104,7 +104,7 @@ def _driven_part(reading: Reading, drive: Drive, decay: Decay) -> Array:
 def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float) -> Found:
     decay = found.model.decay
     reading, drive = bare.reading, run.drive
-    gain = decay.stiffness if drive is not None and not drive.on_body else found.innovations.gain
+    gain = decay.stiffness if run.driven_by_stiffness else found.innovations.gain
     if drive is not None:
         reading = Reading(reading.time, reading.yaw - gain * _driven_part(reading, drive, decay))
     projected = project_run(reading, decay)
@@ -129,7 +129,7 @@ def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit
     estimate = replace(estimate, process_noise=process_noise)
     if drive is None:
         return RunDecay(estimate, decay, covariance[:2, :2])
-    size, weight = 3 if drive.on_body else 2, np.zeros((3, 3))
+    size, weight = 2 if run.driven_by_stiffness else 3, np.zeros((3, 3))
     weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
     gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
     return RunDecay(estimate, decay, covariance[:2, :2], gained)

@@ -100,8 +100,7 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     reading = Reading.from_record(run.record)
     drive, drifts = run.drive, run.unrestrained
     assert drive is not None
-    # the root's motion acts through the spring: its gain is k
-    places = [0, 2] if drifts else [0, 1] if not drive.on_body else [0, 1, 2]
+    places = [0, 2] if drifts else [0, 1] if run.driven_by_stiffness else [0, 1, 2]
     if reading.time.size < _LEAST_SAMPLES * (len(places) + _OWN):
         return _failed(run, reading, Status.NOT_DETERMINED)
     start = driven_start(reading.time, reading.yaw, drive.values, sprung=not drifts)
@@ -177,7 +176,7 @@ def fit_with_inputs(
     parameters, own = start.astype(np.float64), np.zeros((len(runs), _OWN))
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
         with np.errstate(all="ignore"):  # a start far off may overflow
-            residual, jacobian = _linearised(run, link, parameters, own[i])
+            residual, jacobian = linearised(run, link, parameters, own[i])
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return InputFit(parameters, own, [], np.zeros((0, 0)), False)
         own[i] = np.linalg.lstsq(jacobian[:, -_OWN:], residual, rcond=None)[0]
@@ -248,7 +247,7 @@ def normal_equations(
     normal = np.zeros((shared + width * len(runs),) * 2)
     gradient, residuals = np.zeros(len(normal)), []
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
-        residual, jacobian = _linearised(run, link, parameters, own[i])
+        residual, jacobian = linearised(run, link, parameters, own[i])
         if filters is not None:
             from scipy.signal import lfilter  # only here: slow to load
 
@@ -260,8 +259,17 @@ def normal_equations(
     return residuals, normal, gradient
 
 
-def _linearised(run: Run, link: Array, parameters: Array, own: Array) -> tuple[Array, Array]:
-    """Residual and Jacobian of one run: φ, zero or constant acceleration, initial angle, initial rate."""
+def linearised(run: Run, link: Array, parameters: Array, own: Array) -> tuple[Array, Array]:
+    """Residual and Jacobian of one run.
+
+    Args:
+        link: (a, k, g) = L φ, shape (3, p).
+        parameters: φ, shape (p,), SI.
+        own: zero (rad) or constant acceleration (rad/s²), initial angle (rad) and rate (rad/s), shape (3,).
+
+    Returns:
+        Residual in rad, shape (n,), and derivatives of the model with respect to φ and ``own``, shape (n, p + 3).
+    """
     time = run.record.time_s - run.record.time_s[0]
     rate, stiffness, gain = (float(value) for value in link @ parameters)
     constant, angle, initial = own.tolist()

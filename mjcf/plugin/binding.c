@@ -88,10 +88,10 @@ static mjtNum air_moment(const mjModel* m, const mjData* d, const vwt_ids* self,
   return vwt_air_moment(p, &air);
 }
 
-// The mechanism's moment, with the moment stated as an expression.
+// The mechanism's moment, with the moment stated as an expression; the spring's root is at an angle of `root`.
 static mjtNum mechanism_moment(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
-                               const vwt_motion* at) {
-  const mjtNum built_in = vwt_mechanism_moment(p, at->angle, at->rate);
+                               const vwt_motion* at, mjtNum root) {
+  const mjtNum built_in = vwt_mechanism_moment(p, at->angle, at->angle - root, at->rate);
   if (self->program < 0) {
     return built_in;
   }
@@ -114,9 +114,12 @@ static mjtNum drive_at(const mjModel* m, const vwt_ids* self, const vwt_state* s
 
 static vwt_moments moments_at(const mjModel* m, const mjData* d, const vwt_ids* self, const vwt_parameters* p,
                               const vwt_state* state, const vwt_motion* at) {
-  vwt_moments law = {air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at)};
+  const mjtNum drive = self->drive < 0 ? 0 : drive_at(m, self, state, at->time);
+  const int on_end = given(m, self->drive_on_end);
+  const mjtNum root = on_end && drive != 0 && p->spring_stiffness > 0 ? drive / p->spring_stiffness : 0;
+  vwt_moments law = {air_moment(m, d, self, p, state, at), mechanism_moment(m, d, self, p, at, root)};
   if (self->drive >= 0) {
-    *(given(m, self->drive_on_end) ? &law.mechanism : &law.air) += drive_at(m, self, state, at->time);
+    *(on_end ? &law.mechanism : &law.air) += drive;
   }
   return law;
 }

@@ -47,6 +47,12 @@ static double drive_at(const Step* s, double time, int on_end) {
   return s->moment + s->moment_slope * (time - s->moment_from);
 }
 
+// The angle of the spring's root, rad, which a drive on the rod's upper end moves.
+static double root_at(const Step* s, double time) {
+  const double moment = drive_at(s, time, 1);
+  return moment != 0 && s->p->spring_stiffness > 0 ? moment / s->p->spring_stiffness : 0;
+}
+
 static double air_at(const Step* s, double duration, const Motion* y) {
   const double time = s->start + duration;
   const vwt_air_state air = {
@@ -75,8 +81,8 @@ static double stated_moment(const Step* s, double time, const Motion* y) {
 // Moments on the rod's upper end except friction; with a rigid rod they include the aerodynamic moment.
 static double other_moment(const Step* s, double air, double time, const Motion* y) {
   const vwt_parameters* p = s->p;
-  const double mechanism = vwt_mechanism_moment(p, y->angle, y->rate) + stated_moment(s, time, y) +
-                           drive_at(s, time, 1) - p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
+  const double mechanism = vwt_mechanism_moment(p, y->angle, y->angle - root_at(s, time), y->rate) +
+                           stated_moment(s, time, y) + drive_at(s, time, 1) - p->spring_stiffness * y->angle - p->mechanical_damping * y->rate;
   if (s->run->twist_stiffness > 0) {
     return mechanism + s->run->twist_stiffness * y->twist + s->run->twist_damping * y->twist_rate;
   }

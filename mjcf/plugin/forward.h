@@ -29,7 +29,7 @@
   NUMBER(moment_scale)     /* N m per unit */                                       \
   NUMBER(moment_delay)     /* s, by which the drive acts later than its samples */  \
   NUMBER(moment_held)      /* 1: constant from one sample to the next; 0: linear */ \
-  NUMBER(moment_on_end)    /* 1: acts on the rod's upper end; 0: on the body */     \
+  NUMBER(moment_on_end)    /* 1: moves the spring's root; 0: acts on the body */    \
   POINTER(program)         /* of the moment by expression, program_count elements */ \
   NUMBER(program_count)    /* 0: none */                                            \
   NUMBER(angle)            /* rad, of the rod's upper end at time 0 */              \

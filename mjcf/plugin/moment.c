@@ -63,7 +63,7 @@ double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s) {
   return moment + scale * s->forcing;
 }
 
-double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) {
+double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflection, double rate) {
   const double spring = p->spring_stiffness;
   double moment = 0;
   if (p->quadratic_damping != 0) {
@@ -74,15 +74,16 @@ double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate) 
     moment -= p->loss_factor * sqrt(spring * p->yaw_inertia) * rate;  // eta Kr/wn, wn of the rig at rest
   }
   if (p->stiffness_cubic != 0) {
-    const double cube = vwt_power_of_angle(fabs(angle), 3, p->stiffness_cubic_exponent);
-    moment -= spring * p->stiffness_cubic * copysign(cube, angle);
+    const double cube = vwt_power_of_angle(fabs(deflection), 3, p->stiffness_cubic_exponent);
+    moment -= spring * p->stiffness_cubic * copysign(cube, deflection);
   }
   if (p->stiffness_quadratic != 0) {
-    moment -= spring * p->stiffness_quadratic * vwt_power_of_angle(fabs(angle), 2, p->stiffness_quadratic_exponent);
+    const double square = vwt_power_of_angle(fabs(deflection), 2, p->stiffness_quadratic_exponent);
+    moment -= spring * p->stiffness_quadratic * square;
   }
   if (p->free_play > 0) {  // cancels the linear spring inside the dead zone
-    const double held = angle > p->free_play ? p->free_play : angle < -p->free_play ? -p->free_play : angle;
-    moment += spring * held;
+    const double gap = p->free_play;
+    moment += spring * (deflection > gap ? gap : deflection < -gap ? -gap : deflection);
   }
   if (p->gravity_stiffness != 0) {
     moment -= p->gravity_stiffness * sin(angle - p->gravity_angle);

@@ -90,8 +90,8 @@ double vwt_power_of_rate(double x, double exponent);
 double vwt_air_moment(const vwt_parameters* p, const vwt_air_state* s);
 
 // Moment of the mechanism on the rod's upper end, N m, without friction and without the linear terms
-// -spring_stiffness*angle - mechanical_damping*rate.
-double vwt_mechanism_moment(const vwt_parameters* p, double angle, double rate);
+// -spring_stiffness*deflection - mechanical_damping*rate. The spring's deflection is the angle less that of its root.
+double vwt_mechanism_moment(const vwt_parameters* p, double angle, double deflection, double rate);
 
 // Coulomb friction in a step of `duration` s, N m, as the constant moment with the same impulse. It opposes the rate.
 // Where the rate would pass zero within the step, friction reverses there or sticks, depending on the other moments.

@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from identification.signal.driven import driven_rows
 from tunnel_sim.engine.model import build_model
@@ -78,6 +79,29 @@ def test_the_model_is_of_fourth_order_for_an_input_with_kinks(hold: str, on_body
 def test_model_and_compiled_integrator_agree_with_a_flexible_rod(hold: str, on_body: bool) -> None:
     twisted = replace(driven(SMOOTH, steps=40, hold=hold, on_body=on_body), rod_twist=RodTwist(0.002, 0.1))
     assert np.max(np.abs(angle(twisted) - forward_motion(RIG, twisted, RATE).angle)) < 1e-9
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+def test_a_spring_whose_root_moves_acts_by_its_deflection(hold: str) -> None:
+    count, cubic, quadratic = 100, 3.0, 0.8
+    root = 0.3 * SMOOTH[:count] / np.max(np.abs(SMOOTH[:count]))
+    expected, state = np.zeros(count), np.zeros(2)
+    for i in range(count - 1):  # SciPy, from kink to kink
+        start, after = root[i], root[i] if hold == "zero" else root[i + 1]
+
+        def slope(t: float, y: Array, start: float = start, after: float = after) -> list[float]:
+            bent = y[0] - start - (after - start) * t * RATE
+            spring = bent + cubic * bent**3 + quadratic * bent**2
+            return [y[1], (-SPRING * spring - DAMPING * y[1]) / INERTIA]
+
+        state = solve_ivp(slope, (0.0, 1.0 / RATE), state, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+        expected[i + 1] = state[0]
+    run = driven(SPRING * root, steps=20, hold=hold, on_body=False)
+    run = run.with_parameters({"stiffness_cubic": cubic, "stiffness_quadratic": quadratic})
+    for found in (angle(run), forward_motion(RIG, run, RATE).angle):
+        assert np.max(np.abs(found - expected)) < 1e-8
+    fixed = replace(run, drive=replace(run.drive, on_body=True))  # the same moment, without a moving root
+    assert np.max(np.abs(angle(fixed) - expected)) > 1e-3
 
 
 def test_friction_holds_a_body_at_rest_until_the_moment_exceeds_it() -> None:

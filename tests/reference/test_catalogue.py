@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from tests.reference.effect_cases import ON_DRIVEN_RUNS, VOCABULARY
 from tests.reference.rigs import rig
 from tunnel_reference.air_moments import turbulence
 from tunnel_reference.catalogue import Group
+from tunnel_reference.conditions import Input
 from tunnel_reference.draw import KINDS, NUMBERS, CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
 from tunnel_reference.nominal_fit import fit_nominal
@@ -23,6 +26,8 @@ def drawn(form, value, sign=1, seed=3, **changes):
     c = rig(
         stiffness=(21.02, 67.98, 21.02, 67.98), speed=(0.0, 0.0, 25.0, 25.0), angle=(0.35,) * 4, **changes
     )
+    moment = 0.3 * np.sin(15.0 * c.time)[:, None] * np.ones(4) if form.driven else np.zeros((c.samples, 4))
+    c = replace(c, drive=Input("moment_nm", moment, np.full(4, False), np.full(4, 0.1))) if form.driven else c
     extra = {k: float(v) for k, v in form.draw(np.random.default_rng(seed), c).items()}
     return CampaignDraw("single", c, (EffectDraw(form, extra, sign, 1.0, value),), seed)
 
@@ -44,8 +49,12 @@ def motions():
         drawn(f, min(10 * f.start, f.limits[1] / 2), f.signs[-1], duration=0.75, resolution=1e-9)
         for f in ALL_FORMS
     ]
-    plain = CampaignDraw("none", draws[0].conditions, (), 3)
-    return draws, simulate_motions([*draws, plain], fine=False)
+    plain = [CampaignDraw("none", draw.conditions, (), 3) for draw in draws]
+    of = {
+        driven: next(p for p in plain if (p.conditions.drive is not None) == driven)
+        for driven in (False, True)
+    }
+    return draws, simulate_motions([*draws, *of.values()], fine=False)
 
 
 @pytest.mark.parametrize("number", range(len(ALL_FORMS)), ids=[f"{f.family}-{f.name}" for f in ALL_FORMS])
@@ -54,7 +63,7 @@ def test_every_form_changes_the_reading_and_only_where_it_acts(number, motions):
     draw = draws[number]
     plain = CampaignDraw("none", draw.conditions, (), draw.seed)
     reading = read_and_fit(draw, results[number]).readings
-    nominal = read_and_fit(plain, results[-1]).readings
+    nominal = read_and_fit(plain, results[-1 if draw.conditions.drive else -2]).readings
     changed = np.max(np.abs(reading - nominal), axis=0) > 1e-5
     assert changed.any()
     if VOCABULARY.get(draw.effects[0].form.family, ("", ""))[1] == "wind_on":

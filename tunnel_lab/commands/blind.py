@@ -73,6 +73,9 @@ def make(
     small: Annotated[
         float, Option("--small", min=0, max=1, help="Share with a small effect beside those that matter.")
     ] = 0.25,
+    driven: Annotated[
+        bool, typer.Option("--driven", help="Drive the runs, all or some, by known moments or other inputs.")
+    ] = False,
     key: KeyFile = None,
 ) -> None:
     """Make a set: campaigns without truth, the sealed key, and its published hash.
@@ -100,8 +103,9 @@ def make(
     refuse_unwritable_files(key)
     with bar("writing campaigns", count) as progress:
         where = make_blind(
-            out, count=count, seed=seed, shares=shares, mixture=Mixture(textbook, rare, variety, small), key=key,
-            progress=progress, show_steps=console(stderr=True).is_terminal,
+            out, count=count, seed=seed, shares=shares, key=key,
+            mixture=Mixture(textbook, rare, variety, small, driven=driven), progress=progress,
+            show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")
     say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")

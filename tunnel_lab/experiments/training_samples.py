@@ -264,7 +264,7 @@ def at_low_rate(c: Conditions) -> Conditions:
 
 def sizes_at_unit_excess(seed: int) -> dict[str, float]:
     """The magnitude at which each common form has about the unit excess, in one campaign."""
-    forms = [form for form in FORMS if form.group is not Group.RARE]
+    forms = [form for form in FORMS if form.group is not Group.RARE and not form.driven]
     root = np.random.SeedSequence(seed)
     draws = []
     for form, child in zip(forms, root.spawn(len(forms)), strict=True):

@@ -9,7 +9,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
@@ -283,11 +283,13 @@ class EffectChain:
         return cls(stated, tuple(effects), drawn)
 
     def physics(self) -> RunSettings:
-        """The physics of the run with the effects."""
+        """The physics of the run with the effects; a spring whose root moves pulls with its true stiffness."""
         run = self.stated
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             run = effect.on_run(run, self.stated, drawn)
-        return run
+        if run.drive is None or run.drive.on_body:
+            return run
+        return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
 
     @property
     def skips(self) -> bool:

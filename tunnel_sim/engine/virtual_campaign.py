@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import islice
 from math import isclose
 from typing import Any
@@ -57,12 +56,7 @@ def simulate_campaigns(
             rng = np.random.default_rng(seed)
             stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
             drawn.append((rng, EffectChain.draw(stated, effects, rng)))
-    true = []
-    for _, chain in drawn:
-        run = chain.physics()
-        if run.drive is not None and not run.drive.on_body:  # its spring pulls with its true stiffness
-            run = replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
-        true.append(run)
+    true = [chain.physics() for _, chain in drawn]
     motions = simulate_motions(rig, true, *rates, nthread=nthread, progress=progress)
     simulated = zip(motions, drawn, strict=True)
     campaigns = []
@@ -103,7 +97,6 @@ def run_settings(truth: Truth, condition: Condition, *, sample_rate: float | Non
         moment = DriveMoment(
             np.arange(given.values.size) / sample_rate,
             given.values,
-            scale=1.0 if given.on_body else condition.spring_stiffness,
             held=given.hold == "zero",
             on_body=given.on_body,
         )
@@ -152,10 +145,8 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         if effect.skips and drives:
             what = "leaves samples out, which is not simulated for driven runs"
             raise TunnelError(what, where=where, remedy="leave out the effect or [drive]")
-        if (effect.channel, effect.condition) == ("stiffness", "always") and not all(
-            d.on_body for d in drives
-        ):
-            what = "changes the spring, which is not simulated where its root moves"
+        if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
+            what = "is a loss in the spring, which is not simulated where its root moves"
             remedy = "leave out the effect, or drive the body by amplitudes_nm"
             raise TunnelError(what, where=where, remedy=remedy)
     known = known_effects()

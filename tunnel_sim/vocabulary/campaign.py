@@ -115,6 +115,11 @@ class Run:
         known = {"moment_nm": 1.0, "drive": self.drive.gain, "base_rad": self.spring_stiffness}
         return known[self.drive.column]
 
+    @property
+    def driven_by_stiffness(self) -> bool:
+        """Whether the gain of the input per unit inertia is k: the root moves, and the air adds no stiffness."""
+        return self.drive is not None and not self.drive.on_body and not self.wind_on
+
     def to_xarray(self) -> Dataset:
         """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes."""
         try:

@@ -77,12 +77,39 @@ def test_cubic_stiffness_is_named() -> None:
     assert "along the decay" not in found.where.words
 
 
-def test_a_moving_root_is_refused_in_one_line() -> None:
+def test_the_cubic_stiffness_of_a_spring_whose_root_moves_is_named() -> None:
+    """The spring pulls by its deflection; SciPy's solution has the cube of it."""
+    runs, held = [], [0.03, 0.05]
+    for seed, size in enumerate(held):
+        run = driven_run(f"r{seed}", seed, 0.0)
+        assert run.drive is not None
+        root = size / float(np.max(np.abs(run.drive.values))) * run.drive.values
+
+        def slope(t: float, y: np.ndarray, root: np.ndarray = root) -> list[float]:
+            bent = y[0] - np.interp(t, TIME, root)
+            return [y[1], (-SPRING * (bent + 2.0 * bent**3) - DAMPING * y[1]) / INERTIA]
+
+        angle = solve_ivp(
+            slope, (0.0, TIME[-1]), [0.0, 0.1], "RK45", TIME, rtol=1e-7, atol=1e-9, max_step=0.02
+        ).y[0]
+        noise = NOISE * np.random.default_rng(seed).standard_normal(TIME.size)
+        runs.append(replace(run, record=Record(TIME, angle + noise), drive=Drive("base_rad", root)))
+    kinds = [
+        effect_class(n) for n in ("cubic_stiffness", "structural_damping", "coulomb_friction", "input_delay")
+    ]
+    found = diagnose(replace(campaign(0.0), runs=tuple(runs)), kinds=kinds)
+    assert found.causes == ("cubic_stiffness",)
+    size = found.candidates[0].parameters["coefficient"]
+    assert abs(size.value - 2.0) < 4.0 * size.std
+    assert any("its loss depends on that motion" in said for said in found.cautions)
+
+
+def test_a_moving_root_without_a_spring_is_refused_in_one_line() -> None:
     given = campaign(0.0)
     run = given.runs[0]
     assert run.drive is not None
-    moving = replace(run, drive=Drive("base_rad", run.drive.values))
-    with pytest.raises(TunnelError, match="spring's root"):
+    moving = replace(run, drive=Drive("base_rad", run.drive.values), spring_stiffness=0.0)
+    with pytest.raises(TunnelError, match="spring_stiffness = 0 states none"):
         diagnose(replace(given, runs=(moving,)))
 
 

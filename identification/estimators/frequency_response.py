@@ -1,0 +1,186 @@
+"""Frequency response: the reading over the input, line by line, and a second-order system fitted to it.
+
+The response at a line is the cross spectrum of input and reading over the power of the input, Ĥ1 (Bendat and
+Piersol, Random Data, 4th ed. (2010), ch. 6, doi 10.1002/9781118032428). Of an input that is periodic in the record
+it is taken at the lines of its Fourier transform, of others from segments with Hann windows (Welch, IEEE Trans.
+Audio Electroacoust. 15 (1967) 70–73, doi 10.1109/TAU.1967.1161901). These are shorter than the memory of a lightly
+damped rig, so that leakage would flatten the resonance. The model's response therefore goes through the same
+windows, with its initial state. Lines at which reading and model are not coherent are left out. The least-squares
+residual of the record judges the model and gives the noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.campaign.combination import Found, RunByRun, RunDecay
+from identification.estimate import Estimate, Status
+from identification.signal.decay_fit import Reading, project_run
+from identification.signal.driven import driven_rows, driven_start
+from identification.signal.driven_fit import Gained, driven_run, linearised
+from identification.signal.free_decay import Decay
+from identification.signal.run_fit import describe_run
+from identification.statistics import inverse
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+_EXCITED = 1e-3  # of the input's greatest line, in power, from which a line counts as excited on purpose
+_BETWEEN = 1e-6  # share of the input's power beside these lines, below which it is periodic in the record
+_LEAST = 1e-8  # of the input's greatest line, in power: weaker ones are rounding
+_FEWEST = 6  # lines: the real and imaginary parts of five unknowns, and some that judge
+_STEPS = 30
+_SETTLED = 1e-10  # relative change of the coefficients or of the sum of squares
+
+
+@dataclass(frozen=True)
+class FrequencyResponse(RunByRun):
+    """A second-order response fitted to Ĥ1 of driven runs.
+
+    Args:
+        segments: lengths of a segment in the record, where the input is not periodic; segments overlap by half.
+        least_coherence: of reading and model at a line that is used, a share of the power.
+    """
+
+    name = "frequency_response"
+    segments: int = 4
+    least_coherence: float = 0.5
+
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign from the runs.
+
+        Raises:
+            TunnelError: for a free decay, a body without a spring, uneven samples, or wind without density.
+        """
+        for run in campaign.runs:
+            why = "is a free decay, which has no frequency response" if run.drive is None else ""
+            why = "has no spring, and so no resonance" if run.unrestrained else why
+            why = why if run.record.uniform else "has uneven samples, which a Fourier transform does not take"
+            if why:
+                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
+                raise TunnelError(f"the run {why}", where=where, remedy=remedy)
+        return super().estimate(campaign)
+
+    def _run(self, run: Run, sensor: SensorProperties) -> Found:
+        bare, drive = driven_run(run, sensor), run.drive
+        if bare.fit is None or bare.noise is None or drive is None:
+            return RunDecay(bare.estimate)
+        reading = bare.reading
+        start = driven_start(reading.time, reading.yaw, drive.values)
+        places = [0, 1] if run.driven_by_stiffness else [0, 1, 2]
+        link = np.eye(3)[:, places]
+        link[2, 1] = 1.0 if run.driven_by_stiffness else 0.0
+        lines = _Lines.of(drive.values, self.segments)
+        found = None if start is None else _fitted(run, link, np.array(start)[places], lines)
+        if found is not None:
+            left, seen = (np.sum(np.abs(lines.spectra(y)) ** 2, axis=0) for y in (found[1], reading.yaw))
+            kept = left <= (1.0 - self.least_coherence) * seen
+            lines = replace(lines, used=lines.used[kept], moved=lines.moved[:, kept], power=lines.power[kept])
+            found = _fitted(run, link, found[0], lines)
+        if found is None:
+            return Status.NOT_DETERMINED
+        coefficients, gains = link @ found[0], found[2][: len(places)]
+        decay = Decay(float(coefficients[0]), float(coefficients[1]))
+        if not decay.stiffness > 0.0:
+            return Status.NOT_CONVERGED
+        held = drive.hold == "zero"
+        response = driven_rows(reading.time, drive.values, decay.rate, decay.stiffness, held=held)[0]
+        free = Reading(reading.time, reading.yaw - coefficients[2] * response)
+        projected = project_run(free, decay)
+        if projected is None:
+            return Status.NOT_CONVERGED
+        variance = bare.noise.std**2 * bare.noise.slow_ratio
+        covariance = gains @ gains.T * variance
+        estimate = describe_run(run, free, *projected, covariance[:2, :2], variance, noise=bare.noise)
+        weight = np.zeros((3, 3))
+        weight[np.ix_(places, places)] = inverse(covariance)
+        return RunDecay(estimate, decay, covariance[:2, :2], Gained(coefficients, weight))
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """How a record becomes the response at some lines: a linear map, whatever the record.
+
+    Args:
+        window: shape (length,).
+        starts: first sample of every segment, shape (s,).
+        used: numbers of the lines, shape (k,).
+        moved: conjugate spectrum of the input over its power, shape (s, k).
+        power: of the input, shape (k,).
+    """
+
+    window: Array
+    starts: NDArray[np.intp]
+    used: NDArray[np.intp]
+    moved: NDArray[np.complex128]
+    power: Array
+
+    @classmethod
+    def of(cls, values: Array, segments: int) -> Self:
+        """The lines that an input excites, shape (n,)."""
+        whole = np.abs(np.fft.rfft(values - values.mean())) ** 2
+        periodic = float(whole[whole < _EXCITED * whole.max()].sum()) < _BETWEEN * float(whole.sum())
+        length = values.size if periodic else values.size // segments
+        window = np.ones(length) if periodic else np.hanning(length + 1)[:-1]
+        starts = np.arange(0, values.size - length + 1, max(length // 2, 1))
+        none = np.zeros((0, 0), np.complex128)
+        spectrum = cls(window, starts, np.arange(length // 2 + 1), none, whole).spectra(values)
+        power = np.sum(np.abs(spectrum) ** 2, axis=0)
+        used = np.flatnonzero(power > _LEAST * power.max())
+        return cls(window, starts, used, spectrum[:, used].conj() / power[used], power[used])
+
+    def spectra(self, values: Array) -> NDArray[np.complex128]:
+        """Spectra of records, shape (..., n), in all segments: shape (..., s, k)."""
+        pieces = values[..., self.starts[:, None] + np.arange(self.window.size)]
+        pieces = (pieces - pieces.mean(axis=-1, keepdims=True)) * self.window
+        return np.asarray(np.fft.rfft(pieces)[..., self.used])
+
+    def weighted(self, values: Array) -> Array:
+        """Ĥ1 of records, shape (..., n), with errors of equal size: real, then imaginary parts, (..., 2k)."""
+        found = np.sum(self.spectra(values) * self.moved, axis=-2) * np.sqrt(self.power)
+        return np.concatenate([found.real, found.imag], axis=-1)
+
+    def adjoint(self, rows: Array) -> Array:
+        """Of rows over the weighted responses, shape (p, 2k), the rows over the samples, shape (p, n)."""
+        real, imaginary = np.split(rows * np.tile(np.sqrt(self.power), 2), 2, axis=1)
+        size = self.window.size
+        out = np.zeros((len(rows), int(self.starts[-1]) + size))
+        for start, moved in zip(self.starts, self.moved, strict=True):
+            sparse = np.zeros((len(rows), size), np.complex128)
+            sparse[:, self.used] = (real - 1j * imaginary) * moved
+            piece = np.fft.fft(sparse).real * self.window
+            out[:, start : start + size] += piece - piece.mean(axis=1, keepdims=True)
+        return out
+
+
+def _fitted(run: Run, link: Array, start: Array, lines: _Lines) -> tuple[Array, Array, Array] | None:
+    """Coefficients, the record's residual (rad), and weights of its samples in them; None where undetermined."""
+    if lines.used.size < _FEWEST:
+        return None
+    parameters, own, last = start, np.zeros(3), np.inf
+    step = np.zeros(start.size + 2)
+    for _ in range(_STEPS):
+        with np.errstate(all="ignore"):  # a trial far off may overflow; it is taken back then
+            residual, jacobian = linearised(run, link, parameters, own)
+            left = lines.weighted(residual)
+            cost = float(left @ left)
+        if np.isfinite(cost) and cost <= last * (1.0 + _SETTLED):
+            design = lines.weighted(np.delete(jacobian, start.size, axis=1).T).T  # no line shows the zero
+            size = np.linalg.norm(design, axis=0)
+            if not (np.isfinite(design).all() and size.min() > 0.0):
+                return None
+            solver = np.linalg.pinv(design / size, rcond=1e-10) / size[:, None]
+            kept = parameters, residual - residual.mean(), lines.adjoint(solver)
+            step, last, before = solver @ left, cost, last
+            small = np.abs(step[: start.size]) <= _SETTLED * np.abs(parameters)
+            if small.all() or cost >= before * (1.0 - _SETTLED):
+                return kept
+        else:
+            parameters, own = parameters - step[: start.size], own - np.r_[0.0, step[start.size :]]
+            step = 0.25 * step
+        parameters, own = parameters + step[: start.size], own + np.r_[0.0, step[start.size :]]
+    return None

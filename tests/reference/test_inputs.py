@@ -1,0 +1,137 @@
+"""Driven runs of the reference simulator against an adaptive solver that ends at every kink of the input."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.reference.rigs import rig
+from tunnel_reference import make
+from tunnel_reference import moments as m
+from tunnel_reference.catalogue import NOT_DRIVEN
+from tunnel_reference.conditions import Input
+from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
+from tunnel_reference.driven_fit import fit_driven
+from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES
+from tunnel_reference.inputs import linear_response
+from tunnel_reference.integrator import Phase, Term, integrate
+from tunnel_reference.severity import read_and_fit, simulate_motions
+
+PLAIN = replace(rig(duration=0.5, sample_rate=100.0), start_rate=np.array([0.4, -0.2]))
+
+
+def driven(column, held, *, gain=1.0, delay=0.0):
+    """Random values at every sample, of a size that moves the rig by about 0.1 rad."""
+    values = np.random.default_rng(4).standard_normal((PLAIN.samples, 2))
+    values *= {"moment_nm": 1.0, "drive": 1.0 / gain, "base_rad": 0.05}[column]
+    return replace(
+        PLAIN,
+        drive=Input(column, values, np.full(2, held), np.full(2, 0.1), gain, True, np.full(2, delay)),
+    )
+
+
+def solved(c, run, cubic):
+    """The equation of motion between the kinks of the input, one interval at a time."""
+    given = c.drive
+    values, delay = given.values[:, run] * given.gain, float(given.delay[run])
+
+    def value(t):
+        place = np.clip((t - delay) * c.sample_rate, 0.0, c.samples - 1)
+        return (
+            values[int(place + 1e-9)] if given.held[run] else np.interp(place, np.arange(c.samples), values)
+        )
+
+    def slope(t, y, at):
+        u = value(at) if given.held[run] else value(t)
+        spring = y[0] - (0.0 if given.on_body else u)
+        moment = (u if given.on_body else 0.0) - c.true_stiffness[run] * (spring + cubic * spring**3)
+        moment += c.air_stiffness[run] * y[0] + (c.air_damping[run] - c.mechanical_damping) * y[1]
+        return [y[1], moment / c.yaw_inertia]
+
+    kinks = np.arange(-1, c.samples + 1) / c.sample_rate + delay
+    ends = np.unique(np.round(np.concatenate([c.time, kinks[(kinks > 0.0) & (kinks < c.time[-1])]]), 12))
+    state, out = [c.start_angle[run], float(c.start_rate[run])], {0.0: c.start_angle[run]}
+    for start, end in pairwise(ends):
+        found = solve_ivp(
+            slope, (start, end), state, method="DOP853", args=(0.5 * (start + end),), rtol=1e-11, atol=1e-13
+        )
+        state = found.y[:, -1]
+        out[float(end)] = state[0]
+    return np.array([out[float(round(t, 12))] for t in c.time])
+
+
+@pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad"])
+@pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
+@pytest.mark.parametrize("delay", [0.0, 0.013])
+def test_an_input_acts_as_its_equation_says(column, held, delay):
+    c = driven(column, held, gain=2.5 if column == "drive" else 1.0, delay=delay)
+    cubic = 3.0
+    law = Term(
+        m.polynomial_spring,
+        Phase.MOMENT,
+        {"k2": np.zeros(2), "k3": np.full(2, cubic), "k4": np.zeros(2), "k5": np.zeros(2)},
+    )
+    (motion,) = integrate([c], [[law]], substeps=10)
+    for run in range(2):
+        assert np.max(np.abs(motion.angle[:, run] - solved(c, run, cubic))) < 1e-6
+    (plain,) = integrate([replace(c, drive=None)], [[law]], substeps=10)
+    assert np.max(np.abs(motion.angle - plain.angle)) > 1e-2
+
+
+@pytest.mark.parametrize("column", ["moment_nm", "base_rad"])
+@pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
+def test_the_closed_form_is_the_integrated_linear_response(column, held):
+    c = replace(driven(column, held), start_angle=np.zeros(2), start_rate=np.zeros(2))
+    parameters = np.array([c.yaw_inertia, c.mechanical_damping, c.cn_beta, c.cn_r])
+    (motion,) = integrate([c], [[]], substeps=20)
+    assert np.max(np.abs(linear_response(c, parameters).T - motion.angle)) < 1e-8
+
+
+def test_the_nominal_fit_finds_rig_and_gain_again():
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, duration=4.0)
+    values = np.random.default_rng(1).standard_normal((c.samples, 4)) * 4.0
+    unknown = Input("drive", values, np.full(4, False), np.full(4, 0.1), 0.5)
+    c = replace(c, drive=unknown, zero=0.002, start_rate=np.full(4, 0.5))
+    (motion,) = simulate_motions([CampaignDraw("none", c, (), 0)])
+    other = replace(c, yaw_inertia=0.102, cn_beta=0.4, drive=replace(unknown, gain=0.48))
+    fit = fit_driven(other, motion.angle + c.zero)
+    assert fit.parameters == pytest.approx([0.1, 0.012, 0.45, -0.12], rel=1e-4)
+    assert fit.zero == pytest.approx(0.002, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_driven_draws_drive_some_run_and_keep_the_others(seed):
+    drawn = draw_campaign(np.random.default_rng(seed), kind="single", mixture=Mixture(driven=True))
+    c = drawn.conditions
+    assert c.drive is not None
+    assert c.drive.driven.any()
+    free = ~c.drive.driven
+    assert np.all(c.drive.values[:, free] == 0.0)
+    assert np.all(c.start_rate[free] == 0.0)
+    assert drawn.effects[0].form.family in DRIVEN_FAMILIES
+
+
+def test_driven_families_are_those_that_a_driven_run_can_show():
+    assert set(DRIVEN_FAMILIES) == (set(FAMILIES) | {"input_delay"}) - NOT_DRIVEN
+
+
+@pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad"])
+def test_a_driven_campaign_is_written_in_its_scales(column):
+    c = replace(
+        driven(column, held=True, gain=2.0 if column == "drive" else 1.0), moment_scale=0.02, time_scale=0.1
+    )
+    c = replace(c, drive=replace(c.drive, peak=np.array([0.1, 0.0])))
+    draw = CampaignDraw("none", c, (), 1)
+    written = make.as_campaign(read_and_fit(draw, simulate_motions([draw], fine=False)[0]), "c")
+    first, free = written.runs
+    assert free.drive is None
+    assert free.release_angle == pytest.approx(0.3)
+    assert first.release_angle is None
+    assert (first.drive.column, first.drive.hold) == (column, "zero")
+    scale = first.spring_stiffness if column == "base_rad" else first.input_gain
+    true = c.spring_stiffness[0] if column == "base_rad" else c.drive.gain
+    assert first.drive.values * scale == pytest.approx(c.drive.values[:, 0] * true * 0.02)

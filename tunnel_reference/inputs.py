@@ -1,0 +1,176 @@
+"""The inputs of driven runs: how they are drawn, their value at any time, and the linear rig's response to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_reference.conditions import FRONTAL_AREA, REFERENCE_LENGTH, Array, Conditions, Input
+
+_MIXED = 0.3  # probability that free decays stand beside driven runs
+_FREE = 0.4  # share of such runs then
+_BAND = (0.3, 3.0)  # of the run's own frequency
+_UNKNOWN_GAIN = 0.25
+_BASE = 0.15
+WAVEFORMS = ("multisine", "chirp", "square", "random")
+
+
+def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True) -> Conditions:
+    """Drive all runs of a campaign, or some.
+
+    Args:
+        rng: source of all random numbers.
+        c: of free decays; the rig's frequencies follow from it.
+        by_root: whether the input may be the motion of the spring's root.
+
+    Returns:
+        The conditions with an input whose linear response reaches half of the stated release angle or more, and
+        with initial angles and rates that are small beside it.
+    """
+    kind = rng.random()
+    column = (
+        "base_rad"
+        if by_root and kind < _BASE
+        else "drive"
+        if kind < _BASE + 2.0 * _UNKNOWN_GAIN
+        else "moment_nm"
+    )
+    gain = float(np.exp(rng.uniform(np.log(0.05), np.log(20.0)))) if column == "drive" else 1.0
+    driven = np.ones(c.runs, dtype=np.bool_)
+    if rng.random() < _MIXED:
+        driven = rng.random(c.runs) >= _FREE
+        driven[rng.permutation(c.runs)[:2]] = True, False
+    own = np.sqrt((c.true_stiffness - c.air_stiffness) / c.yaw_inertia) / (2.0 * np.pi)
+    waves = [_waveform(rng, c, float(frequency)) for frequency in own]
+    held = np.full(c.runs, rng.random() < 0.5)
+    peak = np.where(driven, c.release_angle * rng.uniform(0.5, 1.0, c.runs), 0.0)
+    unit = Input(column, np.stack(waves, axis=1), held, peak, gain, bool(rng.random() < 0.5))
+    parameters = np.array([c.yaw_inertia, c.mechanical_damping, c.cn_beta, c.cn_r])
+    reached = np.max(np.abs(linear_response(replace(c, drive=unit), parameters)), axis=1)
+    start = peak * rng.uniform(-0.3, 0.3, c.runs)
+    return replace(
+        c,
+        drive=replace(unit, values=unit.values * (peak / reached)),
+        start_angle=np.where(driven, start, c.start_angle),
+        start_rate=2.0 * np.pi * own * peak * rng.uniform(-0.3, 0.3, c.runs),
+    )
+
+
+def _waveform(rng: np.random.Generator, c: Conditions, frequency: float) -> Array:
+    """One input about a frequency in Hz, of about unit size, shape (samples,)."""
+    kind = WAVEFORMS[int(rng.integers(len(WAVEFORMS)))]
+    time = np.arange(c.samples) / c.sample_rate
+    low, high = _BAND[0] * frequency, _BAND[1] * frequency
+    if kind == "square":
+        return np.sign(np.sin(2.0 * np.pi * frequency * rng.uniform(0.3, 1.2) * time + rng.uniform(0.0, 6.0)))
+    if kind == "chirp":
+        start, end = (low, high) if rng.random() < 0.5 else (high, low)
+        return np.asarray(np.sin(2.0 * np.pi * time * (start + 0.5 * (end - start) * time / c.duration)))
+    lines = np.arange(np.ceil(low * c.duration), np.floor(high * c.duration) + 1.0)
+    phase = rng.uniform(0.0, 2.0 * np.pi, lines.size)
+    size = np.ones(lines.size) if kind == "multisine" else np.abs(rng.standard_normal(lines.size))
+    wave = np.zeros(c.samples)
+    for line, angle, weight in zip(lines, phase, size, strict=True):
+        wave += weight * np.cos(2.0 * np.pi * line / c.duration * time + angle)
+    return np.asarray(wave / np.sqrt(lines.size))
+
+
+def linear_response(c: Conditions, parameters: Array) -> Array:
+    """The nominal rig's response to its input from rest at zero, exact for both holds.
+
+    Args:
+        c: with an input; stiffness and speed are those stated.
+        parameters: Izz, Cr, Cnβ, Cnr, shape (4,).
+
+    Returns:
+        Angles at the samples, rad, shape (runs, samples).
+    """
+    assert c.drive is not None
+    inertia, damping, cn_beta, cn_r = parameters
+    flow = 0.5 * c.air_density * c.wind_speed * FRONTAL_AREA * REFERENCE_LENGTH
+    sigma = (damping - flow * REFERENCE_LENGTH * cn_r) / (2.0 * inertia)
+    square = (c.spring_stiffness - flow * c.wind_speed * cn_beta) / inertia
+    omega = np.sqrt(np.maximum(square - sigma**2, 0.25))
+    pole, h, n = -sigma + 1j * omega, 1.0 / c.sample_rate, c.samples
+    turn = np.exp(pole * h)
+    whole = (turn - 1.0) / pole
+    later = np.where(c.drive.held, 0.0, (turn - 1.0 - pole * h) / (pole**2 * h))
+    size = 2 ** int(np.ceil(np.log2(2 * n)))
+    shift = np.exp(-2j * np.pi * np.arange(size) / size)
+    out = np.empty((c.runs, n))
+    for r in range(c.runs):
+        u = c.drive.values[:, r]
+        # z' = λ z + u from one sample to the next; the sums over all earlier samples by Fourier transforms
+        moved = np.zeros(n, dtype=np.complex128)
+        moved[1:] = (whole[r] - later[r]) * u[:-1] + later[r] * u[1:]
+        powers = (1.0 - turn[r] ** n * shift**n) / (1.0 - turn[r] * shift)
+        z = np.fft.ifft(np.fft.fft(moved, size) * powers)[:n]
+        out[r] = z.imag / omega[r]
+    per = np.ones(c.runs) if c.drive.on_body else c.spring_stiffness
+    return np.asarray(out * (c.drive.gain * per / inertia)[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """The inputs of all runs of a batch, in N m or rad.
+
+    Args:
+        values: shape (samples, rows).
+        linear: 1 where they are linear between samples, 0 where they are held, shape (rows,).
+        delay: s, shape (rows,).
+        on_body: whether they are moments on the body; else angles of the spring's root, shape (rows,).
+        rate: of the samples, Hz.
+    """
+
+    values: Array
+    linear: Array
+    delay: Array
+    on_body: NDArray[np.bool_]
+    rate: float
+
+    @classmethod
+    def of(cls, conditions: Sequence[Conditions]) -> Inputs | None:
+        """The inputs of these campaigns, zero in free decays; None where no run is driven."""
+        if all(c.drive is None for c in conditions):
+            return None
+        runs = [c.runs for c in conditions]
+        longest = max(c.samples for c in conditions)
+        columns = [
+            np.zeros((longest, c.runs))
+            if c.drive is None
+            else c.drive.gain
+            * np.pad(c.drive.values, ((0, longest - len(c.drive.values)), (0, 0)), mode="edge")
+            for c in conditions
+        ]
+        held = [np.zeros(c.runs, np.bool_) if c.drive is None else c.drive.held for c in conditions]
+        delay = [np.broadcast_to(0.0 if c.drive is None else c.drive.delay, (c.runs,)) for c in conditions]
+        on_body = np.repeat([c.drive is None or c.drive.on_body for c in conditions], runs)
+        return cls(
+            np.concatenate(columns, axis=1), (1.0 - np.concatenate(held)).astype(np.float64),
+            np.concatenate(delay), on_body,
+            conditions[0].sample_rate,
+        )  # fmt: skip
+
+    def moment(self, time: float, middle: float) -> Array:
+        """The moment on the bodies at a time within the step about ``middle``, s, N m, shape (rows,)."""
+        return np.where(self.on_body, self._at(time, middle), 0.0)
+
+    def root(self, time: float, middle: float) -> Array | float:
+        """The angle of the springs' roots, rad, shape (rows,); 0 where none moves."""
+        return 0.0 if self.on_body.all() else np.where(self.on_body, 0.0, self._at(time, middle))
+
+    def _at(self, time: float, middle: float) -> Array:
+        """The value; the sample from which it follows is that of the step's middle."""
+        last = len(self.values) - 1
+        if not self.delay.any():
+            k = min(int(middle * self.rate + 1e-9), last)
+            before, after = self.values[k], self.values[min(k + 1, last)]
+            return np.asarray(before + self.linear * (time * self.rate - k) * (after - before))
+        at = np.clip((middle - self.delay) * self.rate, 0.0, last).astype(np.intp)
+        rows = np.arange(at.size)
+        before, after = self.values[at, rows], self.values[np.minimum(at + 1, last), rows]
+        part = np.clip((time - self.delay) * self.rate, 0.0, last) - at
+        return np.asarray(before + self.linear * part * (after - before))
