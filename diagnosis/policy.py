@@ -7,10 +7,35 @@ reason alone, as stated. Numerical constants (grids, iterations, paddings) stand
 
 from __future__ import annotations
 
+# ---- Said once ------------------------------------------------------------------------------------------------
+
+#: Rate at which one question about a campaign is answered falsely: that it has a gap (all tests together), that its
+#: noise is coloured, that its turbulence comes in bursts, belongs to one run or follows the phase of the motion, or
+#: that a term belongs to a formula (all terms of the library together). Convention: one in a thousand.
+FALSE_ALARM_RATE = 1e-3
+#: The same of one place in it: runs, bands and lines that show a gap, all together, and a band in which steady noise
+#: differs between parts of the records and is then left out of its spectrum. Convention: one in a hundred.
+LOCAL_FALSE_ALARM_RATE = 0.01
+#: Share by which two things may differ and still count as one: what two sets change, what a textbook form leaves
+#: open, what a further term or another kind of law closes. Judgement: far below what could be told apart.
+AS_MUCH = 0.02
+#: Share that is too small to speak of: of the largest excess in a run, of the information in a part of the data, of
+#: what is left that a kind closes, of a gap that effects leave where noise that misbehaves could be all of it, of the
+#: record in which a blow acts. Judgement.
+SMALL_PART = 0.1
+#: Share that counts as most of a thing: of the excess in a stated interval, of what laws of single runs close, of a
+#: line that the other half of a run predicts. Judgement: the text says four fifths.
+MOST = 0.8
+#: Share of the runs that must show a hum, and of the bands that must be steady where the colour of the noise is
+#: sought in still air alone. Judgement.
+MOST_RUNS = 0.75
+#: Ratio beyond which one thing is clearly more than another: a reading's step than the stated one, the frequency
+#: with the wind on than with it off (another mode), turbulence in a burst than its limit, the drift of frequency
+#: than that of damping, a run's mean squared residual than its noise. Judgement.
+CLEARLY_MORE = 1.5
+
 # ---- Is there a gap? ------------------------------------------------------------------------------------------
 
-#: Rate at which a campaign without a gap is said to have one, all tests together. Convention: one in a thousand.
-GAP_FALSE_ALARM_RATE = 1e-3
 #: Share of that rate at which the noise itself counts as misbehaving. Judgement: it outweighs any cause.
 NOISE_FALSE_ALARM_SHARE = 0.01
 #: The noise below 60 Hz may exceed the noise measured above it by this share. Judgement: quantisation colours it.
@@ -23,14 +48,6 @@ NOISE_AGREES = 3.0
 NOISE_OF_ITS_OWN = 4.065
 #: Heavier tails than white noise has, by this factor, are accepted. Judgement: sensor noise is not quite normal.
 NOISE_TAILS = 1.15
-#: Rate at which white noise is said to be coloured. Convention: as a gap.
-COLOUR_FALSE_ALARM_RATE = 1e-3
-#: Rate at which steady noise is said to differ between parts of the records in one band, which is then left out of
-#: its spectrum. Convention: one in a hundred, since the spectrum is interpolated there.
-COLOUR_STEADY_RATE = 0.01
-#: Share of the bands that must be steady where the colour is sought in still air alone. Judgement, made on a set
-#: where turbulence had hidden it: few parts are compared there, so that an unsteady band is easily overlooked.
-COLOUR_THROUGHOUT = 0.75
 #: Ratio of the greatest to the smallest motion among the parts of the records from which noise is seen not to
 #: follow the motion. Judgement: power that does would then differ by a factor of four.
 COLOUR_AMPLITUDES = 2.0
@@ -42,30 +59,20 @@ ROUNDED_NOISE = 1.5
 #: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much
 #: again as the noise itself.
 NOISE_EXPLAINS_UP_TO = 1.0
-#: Share of the gap that effects leave at least where noise that misbehaves is all of it. Judgement, made when
-#: skipped samples that closed 98 % of a gap had been taken for noise.
-NOISE_LEAVES = 0.1
 
 # ---- What is read off the records before any fit --------------------------------------------------------------
 
 #: A run shows a hum when removing the line lowers χ² by this much. By chance at one frequency: one run in 1800.
 HUM_RUN_DROP = 15.0
-#: Share of the runs that must show it. Judgement: the mains hum in every run.
-HUM_RUNS = 0.75
 #: Drop of χ² at the hum's line over the largest beside it, all runs together. Judgement: rods and corners ring too.
 HUM_CONTRAST = 4.0
 #: Rate at which a steady hum is said to swell. Judgement.
 SWELL_FALSE_ALARM_RATE = 1e-6
 #: Share of a hum's power that may be left once the line and its harmonics are removed. Judgement.
 HUM_LEFT = 0.02
-#: A reading's step beyond this multiple of the stated resolution is coarser than stated. Judgement.
-COARSER_STEP = 1.5
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
-#: Frequency with the wind on over that with it off, from which a run swings in another mode. Judgement: the air
-#: would have to stiffen the spring by 1.25 times its own stiffness.
-ANOTHER_MODE = 1.5
 #: Share of the readings' power in the residual beyond which a fit misses the motion itself. Judgement.
 GROSS_MISFIT = 0.01
 
@@ -77,9 +84,6 @@ ALWAYS_FITTED = 7
 PREDICTED_SHARE = 0.01
 #: Sets of each size to which another effect is added, and effects fitted to each. Judgement: time against coverage.
 GROWN_FROM, GROWN_BY = 2, 4
-#: Share of the power by which two sets change the nominal prediction, by which they may differ and still count as
-#: one. Judgement: far below what the growth could tell apart.
-SAME_CHANGE = 0.02
 #: Logarithm of the weight that a set may lose when an effect is added, for the growth to go on from it: less than
 #: an effect costs that closes nothing. Judgement: time against coverage; one of two equal causes closes only half.
 GROWTH_LOSS = 2.8
@@ -90,8 +94,8 @@ GROWN_ON = 45_000
 LENGTHENED = 4
 #: Causes named at most. Convention: the vocabulary's one to four, and a small one beside them.
 MOST_CAUSES = 5
-#: Hypotheses whose forms are freed, and the share they must leave open with the textbook form (0008).
-FREED_HYPOTHESES, FREED_FROM = 3, 0.02
+#: Hypotheses whose forms are freed, if they leave more than `AS_MUCH` open with the textbook form (0008).
+FREED_HYPOTHESES = 3
 
 # ---- How answers are weighed (0007) ---------------------------------------------------------------------------
 
@@ -141,25 +145,11 @@ MOMENT_LEFT = 0.25
 #: deviations. Judgement: among 100 to 150 the greatest is below 3.5 by chance; a real spectrum is not first-order,
 #: which adds some. The limit by quarter was 5.5 until it had refused two true answers of tuning campaigns.
 WHITE_INNOVATIONS = 7.0
-#: Rate at which steady turbulence is taken for a burst, all windows of a campaign together: a convention. And the
-#: factor by which real turbulence, which is not quite steady, may exceed that limit: a judgement.
-BURST_FALSE_ALARM_RATE, BURST = 0.001, 1.5
-#: Rate at which a random moment of all runs is taken for one of a single run. Convention.
-ONE_RUN_FALSE_ALARM_RATE = 1e-3
-#: Rate at which a random moment is taken for something that follows the phase of the motion. Convention.
-PHASE_FALSE_ALARM_RATE = 1e-3
 #: χ² that every instant or phase of a run's own may gain by chance. Judgement: it is the best of many tried.
 OWN_EVIDENCE = 10.0
 
 # ---- Where the gap is -----------------------------------------------------------------------------------------
 
-#: Rate at which runs, bands or lines of a campaign without a gap are said to show one, all tests together.
-#: Convention: one in a hundred.
-PLACE_FALSE_ALARM_RATE = 0.01
-#: Runs with a smaller share of the largest excess are not named. Judgement.
-NAMED_RUN_SHARE = 0.1
-#: Share of the excess that a stated interval holds. Judgement: the text says four fifths.
-INTERVAL_SHARE = 0.8
 #: An interval longer than this share of the whole range does not locate anything. Judgement.
 LOCATES_UP_TO = 0.7
 #: Share of the excess that makes a band or a line the place of the gap. Judgement.
@@ -170,19 +160,12 @@ SECOND_HARMONIC_SHARE = 0.05
 SINGLE_RUN_SHARE = 0.85
 #: Share of the excess that fits to single runs leave at most, where the gap lies between runs. Judgement.
 BETWEEN_RUNS_SHARE = 0.2
-#: Half of the missing moment within this share of the record is a blow. Judgement.
-BLOW_SHARE = 0.1
 #: Standard deviations beyond which the missing moment stands out of the noise. Convention.
 CLEAR_MOMENT = 5.0
-#: Ratio of the drifts of frequency and damping beyond which the larger decides the channel. Judgement.
-DRIFT_RATIO = 1.5
 #: Highest frequency of a moment, Hz: the rig's inertia keeps the response to faster ones below any noise. Physics.
 FASTEST_MOMENT = 30.0
 #: Bands with a smaller share of the excess are not listed. Judgement.
 LISTED_BAND_SHARE = 0.05
-#: Mean squared residual of a run, in noise variances, beyond which the intervals of its backbone allow for
-#: coloured residuals. Judgement.
-COLOURED_RUN = 1.5
 #: A line is this many times the median around it. Judgement: the skirt of a resonance is not.
 LINE_CONTRAST = 8.0
 
@@ -208,9 +191,6 @@ FORM_CHANGE_STD = 0.5
 #: What remains is material where it moves a coefficient by this share, or by more than its standard deviation.
 #: Convention: derivatives are quoted to a per cent.
 MATERIAL_SHARE = 0.01
-#: A part of the data with a smaller share of the information on a coefficient is not set against the others.
-#: Judgement: its own estimate would be too uncertain.
-LEAST_HALF = 0.1
 #: A parameter whose standard deviation exceeds this multiple of its value and of its usual size, or whose range
 #: allowed is no wider than chance, is not determined. Judgement: even its order of magnitude is then unknown.
 UNDETERMINED_FACTOR = 10.0
@@ -219,10 +199,6 @@ FEW_RUNS = 3
 #: A caution is given where the stated noise is wrong by this factor. Judgement: rounding to one digit reaches half
 #: of it.
 NOISE_CONTRADICTED = 3.0
-#: A blind case counts as closed from this share of the gap on. Convention.
-BLIND_CLOSED = 0.95
-#: Errors of coefficients in blind tests are counted within this many standard deviations. Convention.
-BLIND_WITHIN = 3.0
 
 #: Share of what one free decay leaves that two may leave, for a second mode to be named. Judgement: the lines must
 #: also be resolved, that is, farther apart than the sum of their half-power widths.
@@ -230,17 +206,7 @@ SECOND_MODE_LEFT = 0.5
 
 # ---- What no effect explains (0023) ---------------------------------------------------------------------------
 
-#: Rate at which chance alone supports a term of a formula, all terms of the library together. Convention.
-LAW_FALSE_RATE = 1e-3
-#: Share of what its kind could close that a further term of a formula must close. Judgement.
-LAW_TERM_SHARE = 0.02
 #: Share of what its kind could close from which a formula needs no further term. Judgement.
 LAW_REACHES = 0.97
 #: Share of what is left within which a simpler kind counts as closing as much. Judgement: that of a basis itself.
 AS_MUCH = 0.02
-#: Share of what laws of single runs close that a law common to all runs must reach. Judgement.
-COMMON_SHARE = 0.8
-#: Share of a line in one half of a run that the other half must predict, for the line to be steady. Judgement.
-LINE_STEADY = 0.8
-#: Share of what is left below which no kind is named. Judgement.
-LEAST_CLOSABLE = 0.1

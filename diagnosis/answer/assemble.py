@@ -18,7 +18,7 @@ from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
 from diagnosis.closure import PatchedModel
-from diagnosis.policy import INTERVAL_SHARE, RIVAL_PROBABILITY
+from diagnosis.policy import MOST, RIVAL_PROBABILITY
 from diagnosis.printing import decision
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
 from diagnosis.search.investigate import Study, located
@@ -50,7 +50,7 @@ def localise(study: Study) -> tuple[Where, Maps]:
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(found, INTERVAL_SHARE) or found.maps.time.interval(),
+        time_s=blow_interval(found, MOST) or found.maps.time.interval(),
         amplitude_rad=found.maps.amplitude.interval(),
         frequency_hz=found.frequency_interval,
     )

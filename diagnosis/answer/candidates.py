@@ -13,7 +13,7 @@ from diagnosis.answer.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.policy import EVEN_SHARE, GAP_FALSE_ALARM_RATE, UNDETERMINED_FACTOR
+from diagnosis.policy import EVEN_SHARE, FALSE_ALARM_RATE, UNDETERMINED_FACTOR
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study
 from diagnosis.search.process_noise import LONGEST_BANDWIDTH
@@ -91,8 +91,8 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
     excess = study.nominal.excess / block
     if not study.causes:
         return (
-            Candidate("none", 1.0 - GAP_FALSE_ALARM_RATE, excess, 0.0),
-            Candidate("unknown", GAP_FALSE_ALARM_RATE, excess, 0.0),
+            Candidate("none", 1.0 - FALSE_ALARM_RATE, excess, 0.0),
+            Candidate("unknown", FALSE_ALARM_RATE, excess, 0.0),
         )
     found = []
     before = max(study.nominal.excess, 1e-9)
@@ -109,7 +109,7 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         name = " + ".join(study.read_off)
         found.append(Candidate(name, 1.0 - EVEN_SHARE, excess, closed, _parameters(study, ())))
         found.append(Candidate("unknown", EVEN_SHARE, whole, 0.0))
-    none = 0.0 if study.read_off else min(study.test.p_value, GAP_FALSE_ALARM_RATE)
+    none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
     found.append(Candidate("none", none, before / block, 0.0))
     total = sum(candidate.probability for candidate in found)
     first, *others = (replace(c, probability=c.probability / total) for c in found)
@@ -127,7 +127,7 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str]) -> dict[str
         kind.name: min(sum(c.probability for c in answers if kind.name in c.effect.split(" + ")), 1.0)
         for kind in known_effects()
     }
-    return found | dict.fromkeys(read_off, 1.0 - GAP_FALSE_ALARM_RATE)
+    return found | dict.fromkeys(read_off, 1.0 - FALSE_ALARM_RATE)
 
 
 def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEstimate]:

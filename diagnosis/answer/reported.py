@@ -11,7 +11,7 @@ from diagnosis.answer.held_out import Base, HeldOut
 from diagnosis.closure import Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Point, Problem, blocks_beyond, campaign_rig, condensed, sample_means
-from diagnosis.policy import CONFIRMATION_TOLERANCE, GAP_FALSE_ALARM_RATE
+from diagnosis.policy import CONFIRMATION_TOLERANCE, FALSE_ALARM_RATE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
 from tunnel_sim.physics.run_settings import released_by_spring_end
@@ -211,7 +211,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         closed=share_closed(before, after) if study.named else 0.0,
         closed_on=HELD_OUT if shown.before_out else FITTED,
         runs=tuple(runs),
-        false_alarm_rate=GAP_FALSE_ALARM_RATE,
+        false_alarm_rate=FALSE_ALARM_RATE,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
         misfit=Misfit(

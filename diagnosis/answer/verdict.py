@@ -13,7 +13,7 @@ from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test
 from diagnosis.noise.rounding import rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.policy import FEW_RUNS, GAP_FALSE_ALARM_RATE, MATERIAL_SHARE, NOISE_CONTRADICTED
+from diagnosis.policy import FALSE_ALARM_RATE, FEW_RUNS, MATERIAL_SHARE, NOISE_CONTRADICTED
 from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
 from diagnosis.result import Confirmation, GapSummary, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
@@ -203,7 +203,7 @@ def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], exces
     else:  # no cause changes the tests of the noise itself: those of the residuals count
         errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
         p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
-    beyond_chance = p_value < GAP_FALSE_ALARM_RATE
+    beyond_chance = p_value < FALSE_ALARM_RATE
     moves, material = {}, []
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None

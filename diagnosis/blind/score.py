@@ -19,7 +19,6 @@ from diagnosis.blind.sets import (
     folder_hash,
     read_hashes,
 )
-from diagnosis.policy import BLIND_CLOSED, BLIND_WITHIN
 from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
 from tunnel_sim.files.reading import as_described, read_json
@@ -28,6 +27,8 @@ from tunnel_sim.vocabulary.errors import TunnelError, shown
 from tunnel_sim.vocabulary.record import Array
 
 BINS = 10
+_CLOSED = 0.95  # of the gap, from which a case counts as closed: a convention
+_WITHIN = 3.0  # standard deviations within which errors of coefficients are counted: a convention
 
 
 @dataclass(frozen=True)
@@ -288,7 +289,7 @@ class Score:
         if not closed:
             return Proportion(0, 0), 0.0, 0.0
         return (
-            Proportion.of([v >= BLIND_CLOSED for v in closed]),
+            Proportion.of([v >= _CLOSED for v in closed]),
             float(np.median(closed)),
             float(np.quantile(closed, 0.05)),
         )
@@ -309,7 +310,7 @@ class Score:
                 for when in ("before", "after"):
                     errors = [e for c in cases if (e := c.error(name, when)) is not None]
                     if errors:
-                        within = Proportion.of([abs(stds) <= BLIND_WITHIN for stds, _ in errors])
+                        within = Proportion.of([abs(stds) <= _WITHIN for stds, _ in errors])
                         median = float(np.median([abs(share) for _, share in errors]))
                         found.append(CoefficientErrors(group, name, when, within, median))
         return found

@@ -23,10 +23,10 @@ from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.policy import (
     CHANCE_STDS,
     COLOUR_AMPLITUDES,
-    COLOUR_FALSE_ALARM_RATE,
-    COLOUR_STEADY_RATE,
-    COLOUR_THROUGHOUT,
+    FALSE_ALARM_RATE,
     FLOOR_TOLERANCE,
+    LOCAL_FALSE_ALARM_RATE,
+    MOST_RUNS,
 )
 from tunnel_sim.vocabulary.record import Array
 
@@ -96,7 +96,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     Args:
         nominal: any fit whose residuals were scaled as white.
         beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
-        throughout: whether the lowest band and `COLOUR_THROUGHOUT` of all must be steady; otherwise any two do.
+        throughout: whether the lowest band and `MOST_RUNS` of all must be steady; otherwise any two do.
 
     Returns:
         The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
@@ -125,14 +125,14 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
     steady = _steady(power, count)
-    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= COLOUR_THROUGHOUT)):
+    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= MOST_RUNS)):
         return None
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
     std = np.sqrt(1.0 / total[steady])
     weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
     departure = float(weight @ (level - float(weight @ level / weight.sum())) ** 2)
-    if departure < float(chdtri(level.size - 1, COLOUR_FALSE_ALARM_RATE)):  # one constant within chance
+    if departure < float(chdtri(level.size - 1, FALSE_ALARM_RATE)):  # one constant within chance
         return None
     centres = np.sqrt(edges[1:] * edges[:-1])[steady]
     lowest_bands = slice(0, _SLOPE_BANDS)
@@ -189,7 +189,7 @@ def _steady(power: Array, count: Array) -> np.ndarray:
     corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
     statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
     freedom = np.sum(count > 0, axis=0) - 1
-    limit = chdtri(np.maximum(freedom, 1), COLOUR_STEADY_RATE)
+    limit = chdtri(np.maximum(freedom, 1), LOCAL_FALSE_ALARM_RATE)
     return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
 
 
@@ -237,7 +237,7 @@ _WHITE = 30.0  # the level's natural logarithm stays within this of that of whit
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    This is decided by a likelihood ratio at `COLOUR_FALSE_ALARM_RATE`. The spectrum is that of white noise and a
+    This is decided by a likelihood ratio at `FALSE_ALARM_RATE`. The spectrum is that of white noise and a
     first-order process, which is a random walk where its corner is zero; the colour's lowest band is the lowest
     corner of stationary noise that counts as seen. It is fitted to the ordinates between the harmonics by Whittle's
     likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
@@ -251,7 +251,7 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     relative = frequency / colour.frequency[0]
     seen = _least_loss(relative, power, 1.0)
     free = min(seen, _least_loss(relative, power, _LOWEST_CORNER))
-    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * COLOUR_FALSE_ALARM_RATE))
+    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * FALSE_ALARM_RATE))
 
 
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:

@@ -19,8 +19,8 @@ from diagnosis.noise.rounding import repeated, rounding_errors, samples, with_ro
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
 from diagnosis.policy import (
     BEYOND_THE_MOTION,
+    FALSE_ALARM_RATE,
     FLOOR_TOLERANCE,
-    GAP_FALSE_ALARM_RATE,
     NOISE_FALSE_ALARM_SHARE,
     NOISE_TAILS,
     ROUNDED_NOISE,
@@ -118,7 +118,7 @@ def gap_test(
             blocks), rad; None where they are white.
 
     Returns:
-        The verdict at `GAP_FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
+        The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
     """
     level, scatter = np.ones(6), np.zeros(6)
     if errors is not None:
@@ -142,7 +142,7 @@ def gap_test(
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
     everything = tests | noisy
-    limit = GAP_FALSE_ALARM_RATE / len(everything)
+    limit = FALSE_ALARM_RATE / len(everything)
     smallest = min(everything.values())
     return GapTest(
         smallest < limit,
@@ -154,7 +154,7 @@ def gap_test(
 
 def _misbehaves(tests: Mapping[str, float]) -> float:
     """The p-value of one of these tests below which the noise itself misbehaves."""
-    return GAP_FALSE_ALARM_RATE * NOISE_FALSE_ALARM_SHARE / len(tests)
+    return FALSE_ALARM_RATE * NOISE_FALSE_ALARM_SHARE / len(tests)
 
 
 def gap_or_colour(

@@ -17,11 +17,10 @@ from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.policy import (
     AS_MUCH,
-    COMMON_SHARE,
-    LEAST_CLOSABLE,
     LINE_CONTRAST,
-    LINE_STEADY,
-    PLACE_FALSE_ALARM_RATE,
+    LOCAL_FALSE_ALARM_RATE,
+    MOST,
+    SMALL_PART,
 )
 from diagnosis.remainder.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.remainder.formula import choose, propose
@@ -90,7 +89,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         words += (
             f" The line is at {with_std(*sizes[:2])} Hz, with an amplitude of {with_std(*sizes[2:])} "
             f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
-            f"{100.0 * PLACE_FALSE_ALARM_RATE:.2g} % of campaigns."
+            f"{100.0 * LOCAL_FALSE_ALARM_RATE:.2g} % of campaigns."
         )
     excess = left.excess / left.problem.data.runs[0].block
     return Closable(excess, ceilings, kind, words, where, shape, law)
@@ -101,9 +100,9 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )
-    if max(of_all.closed, of_one.closed) < LEAST_CLOSABLE:
+    if max(of_all.closed, of_one.closed) < SMALL_PART:
         return "noise"
-    among, best = (common, of_all) if of_all.closed >= COMMON_SHARE * of_one.closed else (single, of_one)
+    among, best = (common, of_all) if of_all.closed >= MOST * of_one.closed else (single, of_one)
     least = best.closed - max(AS_MUCH, best.std)
     return next(kind for kind, one in among.items() if one.ceiling.closed >= least)
 
@@ -123,7 +122,7 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
     sizes = np.array([before[run].size for run in both], np.float64)
     closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-    if closed < LEAST_CLOSABLE:
+    if closed < SMALL_PART:
         return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):
@@ -290,7 +289,7 @@ class SteadyLine:
 def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
 
-    None where chance may explain it, at a rate of `PLACE_FALSE_ALARM_RATE` for all frequencies together, and where
+    None where chance may explain it, at a rate of `LOCAL_FALSE_ALARM_RATE` for all frequencies together, and where
     it is the skirt of something broader or does not keep its phase in a run.
     """
     start, floor = _strongest(unexplained)
@@ -302,7 +301,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
         lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
     )
     frequency = float(found.x)
-    if _steadiness(unexplained, frequency, floor) < LINE_STEADY:
+    if _steadiness(unexplained, frequency, floor) < MOST:
         return None
     drops = _drops(unexplained, frequency)
     whole = float(drops.sum())
@@ -360,7 +359,7 @@ def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
         chance = np.where(count > 0, np.log(chdtrc(2.0 * np.maximum(count, 1.0), power)), 0.0)
     best = int(np.argmin(chance))
     clear = power[best] >= LINE_CONTRAST * 2.0 * count[best]
-    if not clear or chance[best] + np.log(grid.size) > np.log(PLACE_FALSE_ALARM_RATE):
+    if not clear or chance[best] + np.log(grid.size) > np.log(LOCAL_FALSE_ALARM_RATE):
         return None, 1.0
     return float(grid[best]), float(floors[best] / count[best])
 

@@ -17,7 +17,7 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.problem import Point
-from diagnosis.policy import LAW_FALSE_RATE, LAW_REACHES, LAW_TERM_SHARE
+from diagnosis.policy import AS_MUCH, FALSE_ALARM_RATE, LAW_REACHES
 from diagnosis.remainder.ceiling import Normal, Ridge, Unexplained, held_out, total
 from diagnosis.remainder.paths import Ranges
 from tunnel_sim.effects import Effect, known_effects
@@ -192,7 +192,7 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
         closable: drop of χ² on held-out runs that the kind's own basis reaches.
 
     Returns:
-        The formula; None where no term is supported: by chance alone one would be in `LAW_FALSE_RATE` of the
+        The formula; None where no term is supported: by chance alone one would be in `FALSE_ALARM_RATE` of the
         campaigns, and it must predict held-out runs.
     """
     found = _chosen(unexplained, kind, closable)
@@ -255,7 +255,7 @@ def _greedy(
 ) -> tuple[list[int], float]:
     """Terms added as long as each pays on held-out runs."""
     whole = total(parts)
-    threshold = float(chdtri(1, LAW_FALSE_RATE / count))
+    threshold = float(chdtri(1, FALSE_ALARM_RATE / count))
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
@@ -267,7 +267,7 @@ def _greedy(
             some = [_of(part, [*chosen, i]) for part in parts]
             after = held_out(some, unexplained.groups, None)
             tried.append((before - float(after[unexplained.seen].sum()), i))
-        if not tried or max(tried)[0] - gained < max(LAW_TERM_SHARE * closable, threshold):
+        if not tried or max(tried)[0] - gained < max(AS_MUCH * closable, threshold):
             break
         gained, best = max(tried)
         chosen.append(best)

@@ -54,7 +54,7 @@ def grow(
         scale = Scale.of(children, gap)
         if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
             count = policy.FREED_HYPOTHESES if not level[0].effects else 1
-            children = with_forms(children, gap, policy.FREED_FROM * level[0].fit.excess, count)
+            children = with_forms(children, gap, policy.AS_MUCH * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
         going, level = going_on(children, level, gap), []
         for hypothesis in going:  # those that change the readings alike would grow alike
@@ -76,9 +76,9 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
 
 
 def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
-    """Whether two fits differ by less than `SAME_CHANGE` of the power by which they change the nominal one."""
+    """Whether two fits differ by less than `AS_MUCH` of the power by which they change the nominal one."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
-    return apart < policy.SAME_CHANGE * (nominal.total - max(one.total, other.total))
+    return apart < policy.AS_MUCH * (nominal.total - max(one.total, other.total))
 
 
 def going_on(
@@ -282,7 +282,7 @@ def grow_in_stretches(
     while level:
         grown = _longer_sets(level, short, data, able, progress)
         least = min(
-            policy.FREED_FROM * level[0].long.fit.excess, policy.MODEL_ERROR**2 * gap.motion / nominal.count
+            policy.AS_MUCH * level[0].long.fit.excess, policy.MODEL_ERROR**2 * gap.motion / nominal.count
         )
         children = with_forms([child.long for child in grown.values()], gap, least)
         found += children

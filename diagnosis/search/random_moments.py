@@ -20,7 +20,7 @@ from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.policy import MOST_CAUSES, NEEDLESS_CHI2, PHASE_FALSE_ALARM_RATE
+from diagnosis.policy import FALSE_ALARM_RATE, MOST_CAUSES, NEEDLESS_CHI2
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import ProcessNoise, is_steady_noise, random_moments, with_response
@@ -171,7 +171,7 @@ def follows_the_motion(fitted: Fit) -> bool:
     motion = along["damping"] + along["damping of runs"]
     rate = along["frequency"] + along["frequency of runs"]
     larger = max(motion, rate) / max(min(motion, rate), 1e-300)
-    return 2.0 * float(fdtrc(windy, windy, larger)) < PHASE_FALSE_ALARM_RATE
+    return 2.0 * float(fdtrc(windy, windy, larger)) < FALSE_ALARM_RATE
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:

@@ -19,7 +19,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import RunData
 from diagnosis.noise.gap import chance
 from diagnosis.noise.sensor_noise import estimate_variance
-from diagnosis.policy import FLOOR_STD, INTERVAL_SHARE, LINE_CONTRAST, PLACE_FALSE_ALARM_RATE
+from diagnosis.policy import FLOOR_STD, LINE_CONTRAST, LOCAL_FALSE_ALARM_RATE, MOST
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -140,7 +140,7 @@ def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
 
 def bands_beyond_chance(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
     """The bands whose power is beyond chance; all of them where none is."""
-    level = PLACE_FALSE_ALARM_RATE / max(len(bands), 1)
+    level = LOCAL_FALSE_ALARM_RATE / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
     return found or tuple(band.band for band in bands)
 
@@ -176,8 +176,8 @@ class Profile:
     std: Array
 
     def interval(self) -> tuple[float, float] | None:
-        """The shortest interval that holds `INTERVAL_SHARE` of the excess; None where there is no excess."""
-        return shortest_interval(self.edges, self.energy, INTERVAL_SHARE)
+        """The shortest interval that holds `MOST` of the excess; None where there is no excess."""
+        return shortest_interval(self.edges, self.energy, MOST)
 
 
 def profile(
@@ -262,7 +262,7 @@ def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[Resi
         for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
             excess = float(local[index]) - _WIDTH
             unlikely = len(runs) * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
-            if unlikely > PLACE_FALSE_ALARM_RATE or len(found) == _PER_RUN:
+            if unlikely > LOCAL_FALSE_ALARM_RATE or len(found) == _PER_RUN:
                 break
             close = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
             beside = np.concatenate(

@@ -13,15 +13,14 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.policy import (
     BETWEEN_RUNS_SHARE,
-    BLOW_SHARE,
     CLEAR_MOMENT,
+    CLEARLY_MORE,
     DOMINANT_SHARE,
-    DRIFT_RATIO,
     FASTEST_MOMENT,
-    NAMED_RUN_SHARE,
-    PLACE_FALSE_ALARM_RATE,
+    LOCAL_FALSE_ALARM_RATE,
     SECOND_HARMONIC_SHARE,
     SINGLE_RUN_SHARE,
+    SMALL_PART,
 )
 from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval
@@ -84,8 +83,8 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 
 def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
     """The runs beyond chance (1 % over all) that have a tenth or more of the largest excess among them."""
-    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < PLACE_FALSE_ALARM_RATE}
-    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
+    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < LOCAL_FALSE_ALARM_RATE}
+    least = SMALL_PART * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
@@ -98,7 +97,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     undetermined = "whether it needs wind cannot be determined"
     if not off:
         return Finding(None, f"{undetermined}, since the wind is on in every run")
-    if min(run.p_value for run in shown) * len(runs) > PLACE_FALSE_ALARM_RATE:
+    if min(run.p_value for run in shown) * len(runs) > LOCAL_FALSE_ALARM_RATE:
         return Finding(None, f"{undetermined}, since no single run shows it")
     most = max(shown, key=lambda run: run.share)
     if len(shown) >= 3 and most.share > SINGLE_RUN_SHARE and most.id not in off:
@@ -114,7 +113,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     tests += [band.p_value for band in band_excesses(excesses)]
     count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
     show = f"{count}, fitted alone, show{'s' * (len(off) == 1)}"
-    if min(tests) * len(tests) < PLACE_FALSE_ALARM_RATE:
+    if min(tests) * len(tests) < LOCAL_FALSE_ALARM_RATE:
         return Finding("always", f"{show} it too")
     return Finding("wind_on", f"{show} no gap")
 
@@ -134,7 +133,7 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     if interval is None or found.moment_z < CLEAR_MOMENT:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= BLOW_SHARE * length
+    brief = interval[1] - interval[0] <= SMALL_PART * length
     return interval if brief and interval[0] > 0.05 * length else None
 
 
@@ -151,9 +150,9 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, "every run is driven, so that no decay shows it")
     frequency, damping = drift(list(found.maps.backbones))
-    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
+    if frequency > CLEARLY_MORE * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
+    if damping > CLEARLY_MORE * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
     return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
 

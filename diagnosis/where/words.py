@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
-from diagnosis.policy import LISTED_BAND_SHARE, LOCATES_UP_TO, PLACE_FALSE_ALARM_RATE
+from diagnosis.policy import LISTED_BAND_SHARE, LOCAL_FALSE_ALARM_RATE, LOCATES_UP_TO
 from diagnosis.printing import plain
 from diagnosis.result import Where
 from diagnosis.where.place import Finding
@@ -88,7 +88,7 @@ def _runs(where: Where, found: Survey) -> str:
     """Which runs show the gap, and how much more of it is with the wind on or off."""
     count = len(found.maps.runs)
     if not where.runs:
-        rate = 100.0 * PLACE_FALSE_ALARM_RATE
+        rate = 100.0 * LOCAL_FALSE_ALARM_RATE
         return (
             f"No single run is beyond chance (false-alarm rate {rate:.0f} % over all runs); "
             "the gap shows only in all of them together."

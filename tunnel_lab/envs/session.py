@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.policy import GAP_FALSE_ALARM_RATE
+from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import Study, investigate
 from identification.campaign.belief import (
     Belief,
@@ -256,7 +256,7 @@ def probabilities(known: Knowledge) -> Array:
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
     if not known.study.weighed:
-        shares[0], shares[-1] = 1.0 - GAP_FALSE_ALARM_RATE, GAP_FALSE_ALARM_RATE
+        shares[0], shares[-1] = 1.0 - FALSE_ALARM_RATE, FALSE_ALARM_RATE
         return shares
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"

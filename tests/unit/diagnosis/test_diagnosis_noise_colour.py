@@ -13,7 +13,7 @@ from diagnosis.noise import gap
 from diagnosis.noise.colour import _steady, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
-from diagnosis.policy import COLOUR_FALSE_ALARM_RATE
+from diagnosis.policy import FALSE_ALARM_RATE
 from tests.unit.diagnosis.test_diagnosis_process_noise import buffeted
 from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
 from tunnel_sim.effects import effect_class
@@ -95,7 +95,7 @@ def test_coloured_noise_is_taken_for_a_wandering_zero_no_more_often_than_stated(
     trials = 60
     fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
     alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
-    assert alarms <= binom.ppf(1.0 - 1e-4, trials, COLOUR_FALSE_ALARM_RATE)
+    assert alarms <= binom.ppf(1.0 - 1e-4, trials, FALSE_ALARM_RATE)
 
 
 @pytest.mark.parametrize("name", COLOURS)
