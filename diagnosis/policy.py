@@ -13,15 +13,15 @@ from __future__ import annotations
 #: noise is coloured, that its turbulence comes in bursts, belongs to one run or follows the phase of the motion, or
 #: that a term belongs to a formula (all terms of the library together). Convention: one in a thousand.
 FALSE_ALARM_RATE = 1e-3
-#: The same of one place in it: runs, bands and lines that show a gap, all together, and a band in which steady noise
-#: differs between parts of the records and is then left out of its spectrum. Convention: one in a hundred.
+#: The same of one place in it: runs, bands and lines that show a gap, all together, and a band in which steady
+#: noise differs between parts of the records and is left out of its spectrum. Convention: one in a hundred.
 LOCAL_FALSE_ALARM_RATE = 0.01
 #: Share by which two things may differ and still count as one: what two sets change, what a textbook form leaves
 #: open, what a further term or another kind of law closes. Judgement: far below what could be told apart.
 AS_MUCH = 0.02
 #: Share that is too small to speak of: of the largest excess in a run, of the information in a part of the data, of
-#: what is left that a kind closes, of a gap that effects leave where noise that misbehaves could be all of it, of the
-#: record in which a blow acts. Judgement.
+#: what is left that a kind closes, of a gap that effects leave where noise that misbehaves could be all of it,
+#: and of the record in which a blow acts. Judgement.
 SMALL_PART = 0.1
 #: Share that counts as most of a thing: of the excess in a stated interval, of what laws of single runs close, of a
 #: line that the other half of a run predicts. Judgement: the text says four fifths.
