@@ -367,7 +367,8 @@ class Diagnosis:
     def to_frame(self) -> pl.DataFrame:
         """The answer in one table: a row for each size of the gap, parameter and coefficient.
 
-        Its ``part`` is ``gap``, a cause, ``before`` or ``after``.
+        Returns:
+            ``part`` (``gap``, a cause, ``before`` or ``after``), ``quantity``, ``value``, ``std``, ``unit``.
         """
         gap = self.gap
         rows: list[tuple[str, str, float, float | None, str]] = []

@@ -22,18 +22,21 @@ def identify(
     """Identify a campaign's coefficients and each of its runs.
 
     The campaign is examined first (`identification.examination.examine`): the estimate's remarks say what was
-    left out or cut. Values that could not be identified are None; the statuses say why and what to do.
+    left out or cut.
 
     Args:
-        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one
-            file of a data logger.
-        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own settings,
-            such as ``OutputError(cycles_per_window=5)``.
+        campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one file
+            of a data logger.
+        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
+            settings, such as ``OutputError(cycles_per_window=5)``.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
 
+    Returns:
+        The estimate. Values that could not be identified are None; the statuses say why and what to do.
+
     Raises:
-        TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density, records
-        that the examination refuses, and, with ``throw``, when no run could be identified.
+        TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
+            records that the examination refuses, and, with ``throw``, when no run could be identified.
     """
     campaign = as_campaign(campaign)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator

@@ -82,7 +82,11 @@ def paper_springs() -> tuple[SpringRow, ...]:
 
 
 def paper_windows() -> tuple[WindowRow, ...]:
-    """Table III: damping and frequency of one wind-on run, three cycles at a time, in the order of time."""
+    """Table III: damping and frequency of one wind-on run, three cycles at a time.
+
+    Returns:
+        Eight rows, in the order of time.
+    """
     rows = [(int(row["window"]), row) for row in _table("table3-windows.csv")]
     return tuple(
         WindowRow(number, float(row["zeta"]), float(row["omega_n_rad_per_s"]), _SECOND_READING.get(number))
@@ -99,9 +103,13 @@ def paper_derivatives() -> tuple[DerivativeRow, ...]:
 
 
 def measured_campaign(name: str) -> Campaign:
-    """A packaged campaign of :data:`MEASURED_CAMPAIGNS`, angles in radians.
+    """A packaged measured campaign.
 
-    It states no spring stiffness, so only omega_n and zeta can be identified.
+    Args:
+        name: one of :data:`MEASURED_CAMPAIGNS`.
+
+    Returns:
+        The campaign, angles in radians. It states no spring stiffness, so only omega_n and zeta can be identified.
 
     Raises:
         TunnelError: there is no such campaign.

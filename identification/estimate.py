@@ -281,7 +281,10 @@ class Estimate:
 
     @classmethod
     def from_json_dict(cls, data: Mapping[str, Any]) -> Estimate:
-        """The inverse of `to_json_dict`; further keys, such as those of the budget, are ignored.
+        """The inverse of `to_json_dict`.
+
+        Args:
+            data: the document; further keys, such as those of the budget, are ignored.
 
         Raises:
             TunnelError: when it is not an estimate: a key is missing, or a value has the wrong type or is not

@@ -24,7 +24,14 @@ class Estimator(Protocol):
     name: ClassVar[str]
 
     def estimate(self, campaign: Campaign) -> Estimate:
-        """Identify a campaign of at least one run, in its order; a failure is a status, never NaN."""
+        """Identify a campaign; a failure is a status of the estimate, never NaN.
+
+        Args:
+            campaign: at least one run.
+
+        Returns:
+            The estimate, its runs in the campaign's order.
+        """
 
 
 SUMMARIES: Mapping[str, str] = {

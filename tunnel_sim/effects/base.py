@@ -136,47 +136,100 @@ class Effect:
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """Starting values for a fit, the most promising first; empty where a campaign cannot show the effect."""
+        """Starting values for a fit.
+
+        Args:
+            campaign: what the values depend on.
+
+        Returns:
+            Starting values, the most promising first; empty where such a campaign cannot show the effect.
+        """
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
 
     def plausible(self, omega: float) -> bool:
-        """Whether a fitted effect is still what its name means, and not the motion (at omega, rad/s) itself."""
+        """Whether a fitted effect is still what its name means.
+
+        Args:
+            omega: angular frequency of the motion, rad/s.
+
+        Returns:
+            False where its parameters make it part of the motion itself.
+        """
         del omega
         return True
 
     def stands(self, stiffness: float) -> float:
-        """How far from rest (rad) the effect holds a stopped body against a stiffness in N m/rad; 0: not at all."""
+        """How far from rest the effect holds a body that has stopped.
+
+        Args:
+            stiffness: of the restoring moment, N m/rad, or per unit inertia, as the effect's moment is.
+
+        Returns:
+            The greatest such angle, rad; 0 for an effect that holds none.
+        """
         del stiffness
         return 0.0
 
     def moment_density(self, rate: float) -> float:
-        """Spectral intensity of the random moment coefficient at a rate, rad/s, as if it were white, s; else 0."""
+        """Spectral intensity of the effect's random moment, as if it were white.
+
+        Args:
+            rate: angular frequency of the motion, rad/s.
+
+        Returns:
+            q of the moment coefficient with the wind on, ⟨c(t)c(t′)⟩ = q δ(t − t′), s; 0 without a broad spectrum.
+        """
         del rate
         return 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
-        """Standard deviations of Cnβ and Cnr, 1/rad, due to the part of the effect's form that no free decay shows.
+        """Uncertainty of Cnβ and Cnr due to that part of the effect's form which no free decay shows.
 
         Args:
             cn_beta: Cnβ as fitted, 1/rad.
+            runs: the campaign's wind-on runs.
+
+        Returns:
+            Standard deviations of Cnβ and Cnr, 1/rad.
         """
         del cn_beta, runs
         return 0.0, 0.0
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
-        """Draw the random part of the effect in one run, which the hooks get as ``drawn``."""
+        """Draw the random part of the effect in one run.
+
+        Args:
+            rng: the generator of this effect in this run.
+
+        Returns:
+            The value passed to the hooks as ``drawn``.
+        """
         del stated
         return float(rng.uniform(0.0, 2.0 * np.pi)) if self.line else None
 
     def drawn_number(self, drawn: Drawn) -> float:
-        """The phase (rad) or instant (share of the run) that a run drew; without it the effect would do nothing."""
+        """The phase or instant that a run drew; without it the effect would silently do nothing.
+
+        Returns:
+            A phase in rad, or an instant as a share of the run.
+
+        Raises:
+            TunnelError: when no number was drawn.
+        """
         if not isinstance(drawn, float):
             raise self._undrawn()
         return drawn
 
     def drawn_numbers(self, drawn: Drawn) -> Array:
-        """The random numbers that a run drew, shape (n,); without them the effect would silently do nothing."""
+        """The random numbers that a run drew; without them the effect would silently do nothing.
+
+        Returns:
+            The numbers, shape (n,).
+
+        Raises:
+            TunnelError: when none were drawn.
+        """
         if not isinstance(drawn, np.ndarray):
             raise self._undrawn()
         return drawn
@@ -199,13 +252,21 @@ class Effect:
         return dict(zip(self.law_terms, values, strict=False))
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Change the physics of a run, as earlier effects left it; by default, set the terms of the moment law."""
+        """Change the physics of a run; by default, set the effect's terms of the moment law.
+
+        Args:
+            run: as the earlier effects left it.
+        """
         del stated, drawn
         law = self.law()
         return run.with_parameters(law) if law else run
 
     def moment_oracle(self, stated: RunSettings) -> Callable[[float, float, float], float] | None:
-        """The moment, N m, without the hooks, of time (s), angle (rad) and rate (rad/s); None: not stated."""
+        """The moment that the effect adds, computed independently of its hooks, for ``tunnel effects check``.
+
+        Returns:
+            The moment (N m) as a function of time (s), angle (rad) and rate (rad/s); None: not stated.
+        """
         del stated
         return None
 
@@ -213,7 +274,10 @@ class Effect:
         """Change when the motion is read.
 
         Args:
-            time_s: by the time stamps, s, shape (n,); returned are the true times.
+            time_s: by the time stamps, s, shape (n,).
+
+        Returns:
+            The true times, s, shape (n,).
         """
         del stated, drawn
         return time_s
@@ -224,6 +288,9 @@ class Effect:
         Args:
             angle: of the rod's upper end, rad, shape (n,).
             time_s: true times, s, shape (n,).
+
+        Returns:
+            The changed angle, rad, shape (n,).
         """
         del time_s, stated, drawn
         return angle
@@ -231,11 +298,14 @@ class Effect:
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
     ) -> Array | None:
-        """An oscillation that the sensor sees beside the body's, shape (n,), added to the angle or its derivative.
+        """An oscillation that the sensor sees beside the body's.
 
         Args:
             time_s: true times since the release, s, shape (n,).
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+
+        Returns:
+            rad, rad/s or rad/s², shape (n,), which is added to the angle or its derivative; None: none.
         """
         del time_s, stated, drawn, derivative
         return None
@@ -245,7 +315,14 @@ class Effect:
         return sensor
 
     def on_reading(self, reading: Array) -> Array:
-        """Change the reading (rad, shape (n,)) after noise and before quantisation."""
+        """Change the reading after noise and before quantisation.
+
+        Args:
+            reading: rad, shape (n,).
+
+        Returns:
+            The changed reading, rad, shape (n,).
+        """
         return reading
 
     def to_json_dict(self) -> dict[str, Any]:
@@ -266,7 +343,12 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
 
 @dataclass(frozen=True, eq=False)
 class EffectChain:
-    """The effects that act in one run, in their order, and the random part of each in this run."""
+    """The effects that act in one run.
+
+    Args:
+        effects: in the order in which they act.
+        drawn: the random part of each effect in this run.
+    """
 
     stated: RunSettings
     effects: tuple[Effect, ...]
@@ -274,7 +356,13 @@ class EffectChain:
 
     @classmethod
     def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
-        """Draw the random parts of effects, which never changes what is later drawn from ``rng`` itself."""
+        """Draw the random parts of the effects in one run.
+
+        Args:
+            effects: in the order in which they act.
+            rng: parent generator. Each effect draws from generators spawned from it, one for the motion and one
+                for the sensor, so an effect never changes what is later drawn from ``rng`` itself.
+        """
         motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
         drawn = tuple(
             effect.draw(stated, of_sensor if _overrides(effect, *_SEEN) else of_motion)
@@ -297,18 +385,29 @@ class EffectChain:
         return any(effect.skips and not effect.is_null for effect in self.effects)
 
     def true_times(self, time_s: Array) -> Array:
-        """When the motion is read: true times since the release, s, shape (n,), by the time stamps."""
+        """When the motion is read.
+
+        Args:
+            time_s: by the time stamps, s, shape (n,).
+
+        Returns:
+            The true times since the release, s, shape (n,).
+        """
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             time_s = effect.on_time(time_s, self.stated, drawn)
         return time_s
 
     def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
-        """What the sensor sees of a motion before zero and noise: the angle, rad, or its derivative, shape (n,).
+        """What the sensor sees of a motion before its zero and noise.
 
         Args:
             motion: of the rod's upper end, as long as `physics` asks for.
             time_s: of the samples by their time stamps, s, shape (n,); need not be those of the motion.
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+
+        Returns:
+            The angle seen, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the motion's own
+            times.
         """
         from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
 
@@ -323,6 +422,9 @@ class EffectChain:
             angle: of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
             time_s: true times since the release, s, shape (n,).
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
+
+        Returns:
+            The measured angle or its derivative, in the same unit, shape (n,).
         """
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             beside = effect.oscillation(time_s, self.stated, drawn, derivative)
@@ -337,7 +439,14 @@ class EffectChain:
         return sensor
 
     def reading(self, reading: Array) -> Array:
-        """Change the reading (rad, shape (n,)) after noise and before quantisation."""
+        """Change the reading after noise and before quantisation.
+
+        Args:
+            reading: with zero and noise, rad, shape (n,).
+
+        Returns:
+            The changed reading, rad, shape (n,).
+        """
         for effect in self.effects:
             reading = effect.on_reading(reading)
         return reading

@@ -56,11 +56,14 @@ class ParameterInfo:
     per_pressure: bool
 
     def fit_range(self, swing: float) -> tuple[float, float]:
-        """Least and greatest value that a fit may take, in the unit.
+        """Least and greatest value that a fit may take.
 
         Args:
             swing: largest angle of the motion, rad. Below `SWING` a coefficient per angle may be as much greater,
                 and a least angle is as much smaller: the shares of the moments stay as they are.
+
+        Returns:
+            Both, in the unit.
         """
         if "rad" not in self.unit or not 0.0 < swing < SWING:
             return self.fit_lower, self.fit_upper

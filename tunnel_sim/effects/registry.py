@@ -53,7 +53,14 @@ def known_effects() -> tuple[type[Effect], ...]:
 
 
 def register_effect(kind: KindT) -> KindT:
-    """Add a frozen dataclass derived from `Effect` to the vocabulary, or replace one; a decorator too."""
+    """Add an effect of one's own to the vocabulary; as a decorator too.
+
+    Args:
+        kind: a frozen dataclass derived from `Effect`. It replaces an earlier one of the same name.
+
+    Raises:
+        TunnelError: when it has a built-in name, no severity, or lacks what the vocabulary needs.
+    """
     check_kind(kind)
     _registered[kind.name] = kind
     return kind
@@ -125,7 +132,14 @@ def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
 
 
 def effect_class(name: str) -> type[Effect]:
-    """The class of the effect with a given name, such as ``coulomb_friction``."""
+    """The class of the effect with a given name.
+
+    Args:
+        name: such as ``coulomb_friction``.
+
+    Raises:
+        TunnelError: when there is none; the message suggests the closest name.
+    """
     for kind in known_effects():
         if kind.name == name:
             return kind
@@ -134,7 +148,14 @@ def effect_class(name: str) -> type[Effect]:
 
 
 def the_effect(**traits: object) -> type[Effect]:
-    """The class of the only built-in effect with given traits of `Effect`; a LookupError where there is not one."""
+    """The class of the only built-in effect with given traits.
+
+    Args:
+        **traits: as listed in `Effect`.
+
+    Raises:
+        LookupError: when there is none, or more than one.
+    """
     found = [kind for kind in ALL_EFFECTS if all(getattr(kind, t) == v for t, v in traits.items())]
     if len(found) != 1:
         raise LookupError(f"{len(found)} effects have the traits {traits}")
@@ -142,5 +163,13 @@ def the_effect(**traits: object) -> type[Effect]:
 
 
 def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
-    """An effect by name, with parameters in their units; the others take their defaults."""
+    """An effect by name.
+
+    Args:
+        name: such as ``coulomb_friction``.
+        parameters: by name, in their units; the others take their defaults.
+
+    Raises:
+        TunnelError: when a name is unknown or a value out of range.
+    """
     return make_effect(effect_class(name), parameters)

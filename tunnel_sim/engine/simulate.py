@@ -59,7 +59,11 @@ def simulate(
     *,
     effects: Sequence[Effect] = (),
 ) -> Record:
-    """Simulate one run as the sensor sees it."""
+    """Simulate one run as the sensor sees it.
+
+    Raises:
+        TunnelError: when the motion grows without bound or the settings are refused.
+    """
     chain = EffectChain.draw(settings, effects, rng)
     motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
     return read_motion(motion, sensor, rng, chain)

@@ -25,11 +25,20 @@ from tunnel_sim.vocabulary.rig import Rig
 def simulate_campaign(
     plan: CampaignPlan, rig: Rig | None = None, *, nthread: int = 0, progress: Progress | None = None
 ) -> Campaign:
-    """Simulate every run of a plan as a rig engineer would have measured it, without a trace of the truth.
+    """Simulate every run of a plan.
 
     Args:
+        plan: conditions, truth, sensor, effects and seed.
+        rig: geometry and mass; None uses the packaged rig.
         nthread: number of threads; 0 uses all processors. The result does not depend on it.
         progress: called with (runs done, runs in all).
+
+    Returns:
+        The campaign as a rig engineer would have measured it: it states the rig's nominal inertia, not that of
+        the truth, and contains no other trace of the truth.
+
+    Raises:
+        TunnelError: when an effect is unknown or the motion of a run grows without bound.
     """
     (campaign,) = simulate_campaigns([plan], rig, nthread=nthread, progress=progress)
     return campaign
@@ -42,7 +51,20 @@ def simulate_campaigns(
     nthread: int = 0,
     progress: Progress | None = None,
 ) -> list[Campaign]:
-    """Simulate several plans of one sample rate together, bit-identical to `simulate_campaign`."""
+    """Simulate every run of several plans, integrating the runs together.
+
+    Args:
+        plans: all with the same sample rate.
+        rig: as in `simulate_campaign`.
+        nthread: as in `simulate_campaign`.
+        progress: called with (runs done, runs in all).
+
+    Returns:
+        One campaign per plan, bit-identical to those of `simulate_campaign`.
+
+    Raises:
+        TunnelError: when sample rates differ, an effect is unknown or the motion of a run grows without bound.
+    """
     rig = load_rig() if rig is None else rig
     rates = {plan.sensor.sample_rate for plan in plans}
     if len(rates) != 1:

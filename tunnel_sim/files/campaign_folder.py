@@ -168,7 +168,17 @@ IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
 
 
 def read_campaign(folder: Path | str) -> Campaign:
-    """Read and check the campaign in a folder, or with a ``campaign.toml``; angles in radians."""
+    """Read and check a campaign.
+
+    Args:
+        folder: the campaign's folder, or the ``campaign.toml`` in it.
+
+    Returns:
+        The campaign, angles in radians.
+
+    Raises:
+        TunnelError: for the first fault, in one line that names file, run and remedy.
+    """
     folder = Path(folder)
     if folder.name == CAMPAIGN_FILE and folder.is_file():
         folder = folder.parent
@@ -252,8 +262,21 @@ def write_campaign(
 ) -> Path:
     """Write a campaign so that reading it gives the same numbers: whole, or not at all.
 
-    An existing folder may be replaced where it is empty or contains only a campaign. ``checked`` says that
-    every record has passed `checked_record`.
+    Args:
+        campaign: what to write; it must pass every check of the reader.
+        folder: the folder to create, with its parents where they are missing.
+        run_format: ``parquet`` or ``csv``.
+        truth: the simulated truth, written as ``truth.json``; None: no such file.
+        overwrite: whether an existing folder may be replaced; it must be empty or contain only a campaign.
+        text: makes the text of ``campaign.toml`` from its tables, where comments are wanted in it.
+        beside: further files of the folder, by name.
+        checked: whether every record has passed `checked_record`, so that this need not be done again.
+
+    Raises:
+        TunnelError: the folder exists or may not be replaced; the campaign would not be readable; the disk
+            reports an error.
+        ValueError: ``truth`` contains NaN or an infinity.
+        TypeError: ``truth`` contains a value that JSON cannot represent.
     """
     folder = Path(folder)
     if run_format not in RUN_FORMATS:

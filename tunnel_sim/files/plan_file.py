@@ -199,7 +199,20 @@ def check_conditions(plan: ConditionKeys, where: str) -> None:
 
 
 def load_plan(path: Path | str, *, rig: Rig | None = None) -> CampaignPlan:
-    """Read a campaign description; a rig (the packaged one) states what the description does not."""
+    """Read a campaign description.
+
+    Args:
+        path: a TOML file like the packaged ``paper-campaign.toml``.
+        rig: defines the numbered springs, and the inertia, damping and air density that the description does not
+            state; None uses the packaged rig.
+
+    Returns:
+        The plan: runs in the order springs, stiffnesses, then wind speeds, release angles, amplitudes of the drive
+        and repeats.
+
+    Raises:
+        TunnelError: for the first fault, in one line that names file, key and remedy.
+    """
     path = Path(path)
     return plan_from(read_plan(path), load_rig() if rig is None else rig, shown(path), path.parent)
 

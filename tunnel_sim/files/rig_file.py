@@ -26,7 +26,15 @@ _MAY_BE_ZERO = {"rear_slant_deg", "mechanical_damping", "noise_std", "length_abo
 
 
 def load_rig(path: Path | None = None) -> Rig:
-    """Read a rig description: a TOML file like the packaged ``rig.toml``, or that file, of the paper's rig."""
+    """Read a rig description.
+
+    Args:
+        path: a TOML file with the sections of the packaged ``rig.toml``; None: the packaged file, which describes
+            the rig of the paper.
+
+    Raises:
+        TunnelError: when the file cannot be read, or a key is missing, unknown or out of range.
+    """
     return parse_rig(rig_document(path), "rig.toml" if path is None else str(path))
 
 

@@ -187,12 +187,23 @@ class RunSettings:
             raise TunnelError(f"unknown parameter {name!r} of the moment law", remedy=remedy)
 
     def with_moment(self, program: tuple[float, ...]) -> RunSettings:
-        """A copy with a moment on the rod's upper end added, by its program."""
+        """A copy with a moment on the rod's upper end added.
+
+        Args:
+            program: of the moment, as for ``program``.
+        """
         add = (float(operation_names().index("add")),) if self.program else ()
         return replace(self, program=(*self.program, *program, *add))
 
     def with_parameters(self, values: Mapping[str, float]) -> RunSettings:
-        """A copy with parameters of the moment law added or replaced."""
+        """A copy with parameters of the moment law added or replaced.
+
+        Args:
+            values: by name.
+
+        Raises:
+            TunnelError: when a name is unknown or belongs to a field.
+        """
         parameters = {**self.parameters, **values}
         if not values.keys() <= _further():
             return replace(self, parameters=parameters)  # which says what is wrong
@@ -201,14 +212,26 @@ class RunSettings:
         return copy
 
     def layout(self) -> tuple[object, ...]:
-        """What runs must have in common to share one compiled model."""
+        """What runs must have in common to share one compiled model.
+
+        Returns:
+            Timestep, names and lengths of the series, lengths of program and drive, the drive's delay, and whether
+            the rod is rigid.
+        """
         series = tuple((name, len(series.values)) for name, series in self.series.items())
         drive = self.drive  # a delayed one is given by its means over the steps
         driven = drive and (drive.values.size, drive.delay, float(drive.time_s[-1]) if drive.delay else 0.0)
         return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:
-        """Every parameter of the moment law by name, in the law's order and units; the rig gives its sizes."""
+        """Every parameter of the moment law.
+
+        Args:
+            rig: gives frontal area, reference length and width.
+
+        Returns:
+            Value by name, in the law's order and units.
+        """
         given = {
             "air_density": self.air_density,
             "frontal_area": rig.body.frontal_area,

@@ -121,7 +121,11 @@ class Run:
         return self.drive is not None and not self.drive.on_body and not self.wind_on
 
     def to_xarray(self) -> Dataset:
-        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes."""
+        """The record as a dataset: ``yaw_rad`` over the coordinate ``time_s``, the conditions as attributes.
+
+        Raises:
+            TunnelError: where xarray, of the extra ``frames``, is not installed.
+        """
         try:
             from xarray import Dataset  # only here: an extra
         except ModuleNotFoundError as error:
@@ -147,7 +151,13 @@ def needs_density(wind_speed: float, *scales: float | None) -> bool:
 
 @dataclass(frozen=True)
 class Campaign:
-    """One or more runs, with unique ids, of a rig with a sensor; ``law``: of the joint of one's own model."""
+    """The runs of one rig with one sensor; the sensor's zero is unknown.
+
+    Args:
+        name: short name, also of the folder.
+        runs: at least one run, with unique ids.
+        law: of the joint in a model of one's own; None: spring and damper.
+    """
 
     name: str
     rig: RigProperties

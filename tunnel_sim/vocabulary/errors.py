@@ -18,8 +18,13 @@ _LONGEST = 4096  # characters in one part of a message: the longest path
 class TunnelError(Exception):
     """Bad input, described in one line.
 
-    The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits
-    with status 2. ``where`` is the file, run or option concerned; empty when there is none.
+    Args:
+        what: what is wrong, as a short clause.
+        where: the file, run or option concerned; empty when there is none.
+        remedy: what to do about it.
+
+    The text reads ``where: what; remedy`` and is always a single line. The command line prints it and exits with
+    status 2.
     """
 
     def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:

@@ -123,7 +123,11 @@ class SensorModel:
 
 @dataclass(frozen=True)
 class EffectSetting:
-    """One effect to inject: its name, and its parameters by name in SI units; `tunnel_sim.effects` validates it."""
+    """One effect to inject, by name; ``tunnel_sim.effects`` validates it.
+
+    Args:
+        parameters: its parameters by name, SI units.
+    """
 
     name: str
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -131,7 +135,12 @@ class EffectSetting:
 
 @dataclass(frozen=True)
 class CampaignPlan:
-    """Everything a simulated campaign depends on, apart from the rig: its runs have unique ids."""
+    """Everything a simulated campaign depends on, apart from the rig.
+
+    Args:
+        conditions: the runs, at least one, with unique ids.
+        effects: effects added to the nominal model.
+    """
 
     name: str
     seed: int

@@ -198,7 +198,11 @@ class Potentiometer:
 
 @dataclass(frozen=True)
 class Rig:
-    """The whole rig; springs are torsional stiffnesses (N m/rad) by spring number (paper, Table II)."""
+    """The whole rig.
+
+    Args:
+        springs: torsional stiffness by spring number, N m/rad (paper, Table II).
+    """
 
     working_section: WorkingSection
     body: Body
@@ -209,7 +213,17 @@ class Rig:
     springs: Mapping[int, float]
 
     def spring(self, number: int) -> float:
-        """The stiffness of a numbered spring of Table II, Kr, N m/rad."""
+        """The stiffness of a numbered spring.
+
+        Args:
+            number: as in Table II.
+
+        Returns:
+            Kr, N m/rad.
+
+        Raises:
+            TunnelError: when there is no such spring.
+        """
         if number not in self.springs:
             known = ", ".join(str(n) for n in self.springs)
             raise TunnelError(f"there is no spring {number}", remedy=f"use one of {known}")
