@@ -283,11 +283,11 @@ class Estimate:
         except ModuleNotFoundError as error:
             remedy = "pip install 'virtual-wind-tunnel[arviz]'"
             raise TunnelError("arviz is not installed", remedy=remedy) from error
-        given = {name: getattr(self, name) for name in self.parameters}
         std = np.sqrt(np.diag(self.covariance_matrix))
-        correlation = self.covariance_matrix / np.outer(std, std)
-        common = rng.multivariate_normal(np.zeros(std.size), correlation, draws) * std if std.size else None
-        posterior = {n: q.value + common[None, :, i] for i, (n, q) in enumerate(given.items())}  # type: ignore[index]
+        powers, axes = np.linalg.eigh(self.covariance_matrix / np.outer(std, std))
+        own = rng.standard_normal((draws, std.size)) * np.sqrt(np.maximum(powers, 0.0))
+        values = np.array([getattr(self, name).value for name in self.parameters]) + own @ axes.T * std
+        posterior = {name: values[None, :, i] for i, name in enumerate(self.parameters)}
         runs = [run for run in self.runs if run.omega_n is not None and run.zeta is not None]
         for name in ("omega_n", "zeta") if runs else ():
             found = [getattr(run, name) for run in runs]
