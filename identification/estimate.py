@@ -25,6 +25,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
+    from arviz import InferenceData
     from pandas import DataFrame
 
 PARAMETERS = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
@@ -256,6 +257,42 @@ class Estimate:
     def to_pandas(self) -> DataFrame:
         """`to_frame` for pandas; needs the extra ``frames``, and no pyarrow."""
         return as_pandas(self.to_frame())
+
+    def to_arviz(self, rng: np.random.Generator, draws: int = 4000) -> InferenceData:
+        """Draws from the normal distribution of the values for ArviZ; needs the extra ``arviz``.
+
+        Args:
+            rng: source of all random numbers.
+            draws: number of draws.
+
+        Returns:
+            One chain in the group ``posterior``: the coefficients of ``parameters`` with their covariance, and
+            ``omega_n`` (rad/s) and ``zeta`` (1) of the identified runs over the dimension ``run``, independent.
+
+        Raises:
+            TunnelError: where arviz is not installed.
+        """
+        try:
+            from arviz import from_dict  # only here: an extra
+        except ModuleNotFoundError as error:
+            remedy = "pip install 'virtual-wind-tunnel[arviz]'"
+            raise TunnelError("arviz is not installed", remedy=remedy) from error
+        std = np.sqrt(np.diag(self.covariance_matrix))
+        powers, axes = np.linalg.eigh(self.covariance_matrix / np.outer(std, std))
+        own = rng.standard_normal((draws, std.size)) * np.sqrt(np.maximum(powers, 0.0))
+        values = np.array([getattr(self, name).value for name in self.parameters]) + own @ axes.T * std
+        posterior = {name: values[None, :, i] for i, name in enumerate(self.parameters)}
+        runs = [run for run in self.runs if run.omega_n is not None and run.zeta is not None]
+        for name in ("omega_n", "zeta") if runs else ():
+            found = [getattr(run, name) for run in runs]
+            own = rng.standard_normal((1, draws, len(runs)))
+            posterior[name] = np.array([q.value for q in found]) + own * np.array([q.std for q in found])
+        return from_dict(
+            posterior=posterior,
+            coords={"run": [run.id for run in runs]},
+            dims={"omega_n": ["run"], "zeta": ["run"]},
+            posterior_attrs={"campaign": self.campaign, "estimator": self.estimator},
+        )
 
     def runs_frame(self) -> pl.DataFrame:
         """A row for each run: its id and status, and the quantities of `RunEstimate` with each ``_std``."""

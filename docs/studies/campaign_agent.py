@@ -2,7 +2,8 @@
 
 ``python -m docs.studies.campaign_agent train OUT.safetensors`` trains on one thread, in linear theory.
 ``python -m docs.studies.campaign_agent score docs`` plays 50 campaigns in the full simulation and writes the page's
-table. Training needs the extra ``train``; the score does not.
+table; with ``--agent FILE --seed N`` it plays an agent of one's own, trained from seed N, as one more row. Training
+needs the extra ``train``; the score does not.
 """
 
 from __future__ import annotations
@@ -20,7 +21,17 @@ from gymnasium.wrappers.vector import NormalizeObservation
 import tunnel_sim.envs  # noqa: F401  registers the environments
 from docs.studies.campaign_policies import Row, from_csv, play_all, replaced, table, to_csv
 from tunnel_lab.envs.campaign import CampaignEnv
-from tunnel_lab.envs.policies import FEATURES, LAYERS, Agent, features, menu_text
+from tunnel_lab.envs.policies import (
+    FEATURES,
+    LAYERS,
+    Action,
+    Agent,
+    features,
+    menu_text,
+    packaged_agent,
+    read_agent,
+)
+from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.files.writing import write_whole
 
 TRAINED_FROM = 1_000_000  # first seed of the training, far from those of the score
@@ -85,22 +96,40 @@ def train(steps: int, seed: int) -> Agent:
     return Agent(envs.obs_rms.mean, envs.obs_rms.var, layers, menu_text(menu))
 
 
+def score(agent: Agent, name: str = "trained") -> list[Row]:
+    """Play the seeds of the score with an agent in the full simulation.
+
+    Args:
+        name: of the policy in the rows.
+    """
+
+    def use(known: Knowledge) -> Action:
+        return agent.action(known.observation(), known.conditions.menu)
+
+    return play_all("identification", name, use)
+
+
 def write_score(docs: Path, rows: Sequence[Row]) -> None:
-    """Write the episodes as CSV and fill the page's table.
+    """Write the episodes as CSV beside those of other agents, and fill the page's table.
 
     Args:
         docs: the folder docs of the source tree.
+        rows: of one agent.
     """
-    write_whole(docs / "how-to" / "train-an-agent.csv", to_csv(rows).encode())
+    stored = docs / "how-to" / "train-an-agent.csv"
+    kept = [one for one in from_csv(stored.read_text(encoding="utf-8")) if one.policy != rows[0].policy]
+    every = sorted((*kept, *rows), key=lambda one: (one.policy, one.seed))
+    write_whole(stored, to_csv(every).encode())
     page = docs / "how-to" / "train-an-agent.md"
     write_whole(page, fill(page.read_text(encoding="utf-8"), docs).encode())
 
 
 def fill(page: str, docs: Path) -> str:
-    """The page with the table of the stored episodes of all three policies."""
+    """The page with the table of the stored episodes of all policies."""
     stored = (docs / "campaign-design.csv", docs / "how-to" / "train-an-agent.csv")
     rows = [row for file in stored for row in from_csv(file.read_text(encoding="utf-8"))]
-    return replaced(page, "score", table(rows, "identification", ("scripted", "greedy", "trained")))
+    agents = sorted({row.policy for row in rows if row.policy.startswith("trained")})
+    return replaced(page, "score", table(rows, "identification", ("scripted", "greedy", *agents)))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -111,13 +140,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     training.add_argument("out", type=Path, help="file to write (.safetensors)")
     training.add_argument("--steps", type=int, default=STEPS, help="runs to make")
     training.add_argument("--seed", type=int, default=0, help="of network and environment")
-    scoring = commands.add_parser("score", help="score the packaged agent in the full simulation")
+    scoring = commands.add_parser("score", help="score an agent in the full simulation")
     scoring.add_argument("docs", type=Path, help="the folder docs of the source tree")
+    scoring.add_argument("--agent", type=Path, help="its file; the packaged agent where left out")
+    scoring.add_argument("--seed", type=int, default=1, help="of the training of --agent, for the table")
     given = parser.parse_args(arguments)
     if given.command == "train":
         write_whole(given.out, train(given.steps, given.seed).to_bytes())
+    elif given.agent is None:
+        write_score(given.docs, score(packaged_agent()))
     else:
-        write_score(given.docs, play_all("identification", "trained"))
+        write_score(given.docs, score(read_agent(given.agent), f"trained, seed {given.seed}"))
     return 0
 
 

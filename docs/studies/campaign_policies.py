@@ -22,7 +22,7 @@ from scipy.stats import binom
 from identification.estimate import PARAMETERS
 from identification.statistics import Proportion
 from tunnel_lab.envs.campaign import CampaignEnv, reached
-from tunnel_lab.envs.policies import POLICIES, run_campaign
+from tunnel_lab.envs.policies import POLICIES, Policy, run_campaign
 from tunnel_lab.envs.session import answers, probabilities
 from tunnel_lab.plotting.style import COLOURS, MARKERS, WIDTH, figure, grid, log_axis, save, styled
 from tunnel_sim.files.writing import write_whole
@@ -74,10 +74,15 @@ class Row:
     cn_r_error: float
 
 
-def play(preset: str, policy: str, seed: int) -> Row:
-    """Play one episode."""
+def play(preset: str, policy: str, seed: int, use: Policy | None = None) -> Row:
+    """Play one episode.
+
+    Args:
+        policy: its name in the row.
+        use: the policy; None: that of `POLICIES` with the name.
+    """
     env = CampaignEnv(preset=preset, expose_truth=True, **ARGUMENTS[preset])
-    info = run_campaign(env, POLICIES[policy], seed=seed)
+    info = run_campaign(env, POLICIES[policy] if use is None else use, seed=seed)
     known, truth = env.known, info["truth"]
     done = reached(known, env.targets, env.probability)
     exact = np.array([truth[name] for name in PARAMETERS])
@@ -101,11 +106,11 @@ def play(preset: str, policy: str, seed: int) -> Row:
     )
 
 
-def play_all(preset: str, policy: str) -> list[Row]:
-    """Play all seeds of a preset."""
+def play_all(preset: str, policy: str, use: Policy | None = None) -> list[Row]:
+    """Play all seeds of a preset; arguments as in `play`."""
     rows = []
     for seed in range(SEEDS[preset]):
-        rows.append(play(preset, policy, seed))
+        rows.append(play(preset, policy, seed, use))
         print(f"\r{preset} {policy} {seed + 1}/{SEEDS[preset]}  ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     return rows

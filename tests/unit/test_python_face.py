@@ -136,10 +136,33 @@ def test_a_run_is_a_dataset(data: Campaign) -> None:
     assert dataset.attrs["wind_speed"] == run.wind_speed
 
 
+@pytest.mark.filterwarnings("ignore::FutureWarning")  # of ArviZ 0.23, on its own future
+def test_draws_have_the_moments_of_the_estimate(data: Campaign) -> None:
+    pytest.importorskip("arviz")
+    found = identify(data)
+    posterior = found.to_arviz(np.random.default_rng(1), draws=20_000).posterior
+    assert found.cn_beta is not None
+    draws = np.stack([posterior[name].to_numpy()[0] for name in found.parameters])
+    std = np.sqrt(np.diag(found.covariance_matrix))
+    means = np.array([getattr(found, name).value for name in found.parameters])
+    # five standard errors of a mean of 20,000 draws, and of a correlation of them
+    np.testing.assert_allclose((draws.mean(axis=1) - means) / std, 0.0, atol=5.0 / np.sqrt(20_000))
+    correlation = found.covariance_matrix / np.outer(std, std)
+    np.testing.assert_allclose(np.corrcoef(draws), correlation, atol=5.0 / np.sqrt(20_000))
+    first = found.runs[0].omega_n
+    assert first is not None
+    own = posterior["omega_n"].sel(run=found.runs[0].id)
+    assert float(own.std()) == pytest.approx(first.std, rel=0.03)
+    assert abs(float(own.mean()) - first.value) < 5.0 * first.std / np.sqrt(20_000)
+    assert posterior.attrs["estimator"] == found.estimator
+
+
 def test_a_missing_library_is_named(data: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("pandas", "xarray"):
+    for name in ("pandas", "xarray", "arviz"):
         monkeypatch.setitem(__import__("sys").modules, name, None)
     with pytest.raises(TunnelError, match=r"pandas is not installed.*\[frames\]"):
         identify(data).to_pandas()
     with pytest.raises(TunnelError, match=r"xarray is not installed.*\[frames\]"):
         data.runs[0].to_xarray()
+    with pytest.raises(TunnelError, match=r"arviz is not installed.*\[arviz\]"):
+        identify(data).to_arviz(np.random.default_rng(0))

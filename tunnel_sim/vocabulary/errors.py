@@ -60,6 +60,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 EXTRAS = {
     "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
     "frames": ("pandas", "xarray"),
+    "arviz": ("arviz",),
     "film": ("imageio", "imageio_ffmpeg"),
     "cluster": ("dask", "distributed"),
     "bench": ("nicegui",),

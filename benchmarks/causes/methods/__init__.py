@@ -3,6 +3,7 @@
 METHODS = (
     "ours",
     "forward_bic",
+    "mujoco_sysid",
     "pysindy_ensemble",
     "spike_and_slab",
     "lisdd",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,20 +40,32 @@ def answer(folder: Path) -> dict[str, Any]:
         if bic(following.chi2, following.numbers, following.rows) >= bic(best.chi2, best.numbers, best.rows):
             break
         best = following
-    scores = np.array([bic(f.chi2, f.numbers, f.rows) for f in fitted])
-    weights = np.exp(-0.5 * (scores - scores.min()))
-    weights /= weights.sum()
     coefficients = {"before": before, "after": best.coefficients}
     gap = start.chi2 - start.rows
     if best.chi2 - best.rows > CLOSED * gap and not read_off:
         return answer_of([UNKNOWN], {UNKNOWN: 0.7}, (), coefficients)
+    sets, inclusion = weighed(
+        [((*one.names, *read_off), bic(one.chi2, one.numbers, one.rows)) for one in fitted]
+    )
+    return answer_of(sorted({*best.names, *read_off}), inclusion, sets, coefficients)
+
+
+def weighed(
+    fitted: Sequence[tuple[Sequence[str], float]],
+) -> tuple[list[tuple[tuple[str, ...], float]], dict[str, float]]:
+    """The 40 likeliest sets with their BIC weights, and the inclusion probability of each cause by name.
+
+    Args:
+        fitted: names and BIC of every set that was fitted.
+    """
+    scores = np.array([score for _, score in fitted])
+    weights = np.exp(-0.5 * (scores - scores.min()))
     sets: dict[tuple[str, ...], float] = {}
-    for one, weight in zip(fitted, weights.tolist(), strict=True):
-        names = tuple(sorted({*one.names, *read_off}))
+    for (causes, _), weight in zip(fitted, (weights / weights.sum()).tolist(), strict=True):
+        names = tuple(sorted({*causes}))
         sets[names] = sets.get(names, 0.0) + weight
     inclusion = {n: min(sum(p for s, p in sets.items() if n in s), 1.0) for n in {n for s in sets for n in s}}
-    likely = sorted(sets.items(), key=lambda one: -one[1])[:40]
-    return answer_of(sorted({*best.names, *read_off}), inclusion, likely, coefficients)
+    return sorted(sets.items(), key=lambda one: -one[1])[:40], inclusion
 
 
 def bic(chi2: float, numbers: int, rows: int) -> float:

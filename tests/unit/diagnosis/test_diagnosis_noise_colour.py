@@ -212,13 +212,15 @@ def test_colour_beside_a_gap_is_not_believed_where_more_noise_is_seen_than_state
 def test_what_is_said_of_the_noise():
     slow = NoiseTrend(0.0, 0.0, 0.0, judged=False)
     data = coloured(campaign(), "pink")
-    _, noise, _ = judged(data)
-    said = [str(remark) for remark in noise_remarks(noise, slow)]
+    _, noise, found = judged(data)
+    said = [str(remark) for remark in noise_remarks(noise, slow, found)]
     assert f"noise is coloured: {noise.std:.3g} rad" in said[0]
     low, high = noise.colour.frequency[[0, -1]]
     assert f"over a factor of {high / low:.3g} in frequency" in said[0]
     assert "too slowly" in said[1]
-    assert noise_remarks(campaign_noise(campaign()), NoiseTrend(0.0, 0.0, 0.0)) == ()
+    within = dataclasses.replace(found, within_step=True)
+    assert "less than their steps" in str(noise_remarks(noise, slow, within)[0])
+    assert noise_remarks(campaign_noise(campaign()), NoiseTrend(0.0, 0.0, 0.0), found) == ()
 
 
 def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():

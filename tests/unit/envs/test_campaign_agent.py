@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from docs.studies.campaign_agent import train
+from docs.studies.campaign_agent import train, write_score
 from docs.studies.campaign_policies import SEEDS, from_csv, median_interval
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.policies import (
@@ -112,6 +114,22 @@ def test_its_score_is_better_than_the_scripts_beyond_chance():
     difference = [one.rig_time_s - other.rig_time_s for one, other in zip(own, script, strict=True)]
     assert median_interval(np.array(difference))[2] < 0.0
     assert sum(row.reached for row in own) >= sum(row.reached for row in script)
+
+
+def test_another_agents_score_stands_beside_the_first(tmp_path):
+    for name in ("campaign-design.csv", "how-to/train-an-agent.csv", "how-to/train-an-agent.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(DOCS / name, tmp_path / name)
+    first = rows("how-to/train-an-agent.csv", "trained")
+    for hours in (1.0, 2.0):  # the second score replaces the first
+        write_score(
+            tmp_path, [replace(row, policy="trained, seed 7", rig_time_s=3600.0 * hours) for row in first]
+        )
+    stored = from_csv((tmp_path / "how-to/train-an-agent.csv").read_text(encoding="utf-8"))
+    assert [row for row in stored if row.policy == "trained"] == first
+    assert {row.rig_time_s for row in stored if row.policy == "trained, seed 7"} == {7200.0}
+    page = (tmp_path / "how-to/train-an-agent.md").read_text(encoding="utf-8")
+    assert "| trained, seed 7 | 7 (6 to 8) | 120.0 (120.0 to 120.0) |" in page
 
 
 @pytest.mark.slow
