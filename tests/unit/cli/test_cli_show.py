@@ -99,7 +99,8 @@ def test_film_and_picture_are_whole_where_the_machine_can_draw(tunnel: Tunnel, t
     status, out, error = tunnel(
         "render", PLAN, "--out", film, "--out", still, "--at", "0.3", "--fps", "10", *SMALL
     )
-    assert not any(fault in error for fault in ("NameError", "TypeError")), error  # the program's, not the machine's
+    # a fault of the program is not one of the machine
+    assert not any(fault in error for fault in ("NameError", "TypeError")), error
     if "off-screen rendering does not work here" in error:
         pytest.skip(error)
     assert status == 0, error
