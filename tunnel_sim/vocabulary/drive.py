@@ -80,7 +80,12 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
         remedy = f"record what drives the body in {name}, not the sensor's reading"
         raise TunnelError(what, where=where, remedy=remedy)
     ends = (float(values.min()), float(values.max()))
-    if not judged or np.mean((values == ends[0]) | (values == ends[1])) > _LEVELS:
+    between = (values[1:] != ends[0]) & (values[1:] != ends[1])
+    if not judged or between.mean() < 1.0 - _LEVELS:
+        return
+    if (
+        np.mean((values[1:] == values[:-1])[between]) > 0.5
+    ):  # it stands at every level, not at the extremes alone
         return
     # It is clipped where it stands at an extreme for some samples again and again, and is seldom near it.
     for end in ends:

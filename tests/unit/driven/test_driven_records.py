@@ -75,7 +75,10 @@ def test_an_input_that_cannot_be_one_is_refused_in_one_line(tmp_path: Path, case
     assert not (tmp_path / "c").exists()
 
 
-@pytest.mark.parametrize("values", [np.sign(INPUT), np.round(INPUT * 20.0) / 20.0, INPUT])
+LEVELS = np.repeat(np.round(INPUT[::25] / np.abs(INPUT).max() * 2.0), 25)[: TIME.size]
+
+
+@pytest.mark.parametrize("values", [np.sign(INPUT), np.round(INPUT * 20.0) / 20.0, INPUT, LEVELS])
 def test_square_waves_and_coarse_inputs_do_not_saturate(tmp_path: Path, values: np.ndarray) -> None:
     write_campaign(campaign(Drive("moment_nm", values)), tmp_path / "c")
 

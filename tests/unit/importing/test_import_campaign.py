@@ -172,6 +172,18 @@ def test_the_wind_is_not_guessed(tmp_path: Path) -> None:
     assert found.campaign.runs[0].air_density is None  # only ωn and ζ are possible
 
 
+def test_only_a_driven_run_may_be_stated_to_have_no_spring(tmp_path: Path) -> None:
+    choices = ImportChoices(conditions=Conditions(spring_stiffness=0.0))
+    with pytest.raises(TunnelError, match="only a driven run may have no spring"):
+        read_records([csv(tmp_path)], choices)
+    time, yaw = decay()
+    moment = np.sin(3.0 * time) + 0.5 * np.sin(7.0 * time)
+    lines = "\n".join(f"{t},{y},{m}" for t, y, m in zip(time, yaw, moment, strict=True))
+    driven = written(tmp_path, "driven.csv", f"time_s,yaw_rad,moment_nm\n{lines}\n")
+    (run,) = read_records([driven], choices).campaign.runs
+    assert run.unrestrained
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [("0.1 + 20*V", (0.1, 20.0)), ("20 V", (0.0, 20.0)), ("-2*V - 0.5", (-0.5, -2.0)), ("V", (0.0, 1.0))],

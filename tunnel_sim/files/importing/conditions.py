@@ -32,7 +32,9 @@ class Conditions(StrictModel):
     """Conditions of runs, and sizes of the rig, as in ``campaign.toml``."""
 
     wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
-    spring_stiffness: Positive | None = optional("a positive number in N m/rad")
+    spring_stiffness: NotNegative | None = optional(
+        "a number in N m/rad, 0 for a driven body without a spring"
+    )
     air_density: Positive | None = optional("a positive number in kg/m3")
     release_angle: float | None = optional("a number in rad")
     yaw_inertia: Positive | None = optional("a positive number in kg m2")

@@ -44,7 +44,7 @@ from tunnel_sim.vocabulary.campaign import (
     SensorProperties,
     needs_density,
 )
-from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold
+from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -183,8 +183,7 @@ def _part(
     stated = raw.stated | measured | raw.named | in_table | given
     sizes = {key: stated.pop(key) for key in RIG_KEYS if key in stated}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
-    loose = raw.input is not None and stated.get("spring_stiffness") == 0.0  # a driven body without a spring
-    validate(Conditions, {**stated, **sizes, **({"spring_stiffness": None} if loose else {})}, raw.source)
+    validate(Conditions, stated | sizes, raw.source)
     plausible_values(stated | sizes, where)
     if "wind_speed" not in stated:
         if _WIND_ON.search(f"{raw.source.stem} {name}"):
@@ -206,6 +205,7 @@ def _part(
         said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
         said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
         drive = Drive(column, values[kept], hold, gain)
+    without_spring_needs_drive(stated.get("spring_stiffness"), drive, where)
     time = from_zero(time)
     try:
         record, stride = None, time.size // _JUDGED
