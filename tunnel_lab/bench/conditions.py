@@ -11,7 +11,7 @@ from nicegui import events, ui
 
 from tunnel_lab.bench.parts import Fault, Frame, page_words, show_items
 from tunnel_lab.bench.workspace import Session
-from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document
+from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document, read_campaign
 from tunnel_sim.files.importing.conditions import RIG_KEYS, RUN_KEYS, Conditions
 from tunnel_sim.files.importing.records import ORIGINAL, campaign_text
 from tunnel_sim.files.plausible import plausible_values
@@ -19,6 +19,7 @@ from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.toml_input import load_toml, one_line, validate
 from tunnel_sim.files.writing import write_json, write_whole
 from tunnel_sim.vocabulary.campaign import needs_density
+from tunnel_sim.vocabulary.drive import without_spring_needs_drive
 from tunnel_sim.vocabulary.errors import TunnelError
 
 Cells = dict[str, dict[str, str]]
@@ -129,6 +130,14 @@ def save(session: Session, cells: Cells) -> Words:
     """
     document = _document(session)
     wrong = faults(cells, plausible=is_judged(session))
+    key = "spring_stiffness"
+    loose = [row for row in cells if row and (row, key) not in wrong and number(cells[row][key], row) == 0.0]
+    drives = {run.id: run.drive for run in read_campaign(session.campaign).runs} if loose else {}
+    for row in loose:
+        try:
+            without_spring_needs_drive(0.0, drives[row], f"run '{row}'")
+        except TunnelError as error:
+            wrong[row, key] = str(error)
     if wrong:
         write_json(session.draft, cells)
         return wrong
