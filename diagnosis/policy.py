@@ -13,30 +13,19 @@ from __future__ import annotations
 #: noise is coloured, that its turbulence comes in bursts, belongs to one run or follows the phase of the motion, or
 #: that a term belongs to a formula (all terms of the library together). Convention: one in a thousand.
 FALSE_ALARM_RATE = 1e-3
-#: The same of one place in it: runs, bands and lines that show a gap, all together, and a band in which steady
-#: noise differs between parts of the records and is left out of its spectrum. Convention: one in a hundred.
+#: Rate at which a place in the records is named falsely: a run, band or line that shows a gap (all together), or a
+#: band of unsteady noise, which is left out of the spectrum. Convention: one in a hundred.
 LOCAL_FALSE_ALARM_RATE = 0.01
 #: Share by which two things may differ and still count as one: what two sets change, what a textbook form leaves
 #: open, what a further term or another kind of law closes. Judgement: far below what could be told apart.
 AS_MUCH = 0.02
-#: Share that is too small to speak of: of the largest excess in a run, of the information in a part of the data, of
-#: what is left that a kind closes, of a gap that effects leave where noise that misbehaves could be all of it,
-#: and of the record in which a blow acts. Judgement.
-SMALL_PART = 0.1
 #: Share that counts as most of a thing: of the excess in a stated interval, of what laws of single runs close, of a
 #: line that the other half of a run predicts. Judgement: the text says four fifths.
 MOST = 0.8
-#: Share of the runs that must show a hum, and of the bands that must be steady where the colour of the noise is
-#: sought in still air alone. Judgement.
-MOST_RUNS = 0.75
-#: Ratio beyond which one thing is clearly more than another: a reading's step than the stated one, the frequency
-#: with the wind on than with it off (another mode), turbulence in a burst than its limit, the drift of frequency
-#: than that of damping, a run's mean squared residual than its noise. Judgement.
-CLEARLY_MORE = 1.5
 
 # ---- Is there a gap? ------------------------------------------------------------------------------------------
 
-#: Share of that rate at which the noise itself counts as misbehaving. Judgement: it outweighs any cause.
+#: Share of `FALSE_ALARM_RATE` at which the noise itself counts as misbehaving. Judgement: it outweighs any cause.
 NOISE_FALSE_ALARM_SHARE = 0.01
 #: The noise below 60 Hz may exceed the noise measured above it by this share. Judgement: quantisation colours it.
 FLOOR_TOLERANCE = 0.03
@@ -48,6 +37,9 @@ NOISE_AGREES = 3.0
 NOISE_OF_ITS_OWN = 4.065
 #: Heavier tails than white noise has, by this factor, are accepted. Judgement: sensor noise is not quite normal.
 NOISE_TAILS = 1.15
+#: Share of the bands that must be steady where the colour is sought in still air alone. Judgement, made on a set
+#: where turbulence had hidden it: few parts are compared there, so that an unsteady band is easily overlooked.
+COLOUR_THROUGHOUT = 0.75
 #: Ratio of the greatest to the smallest motion among the parts of the records from which noise is seen not to
 #: follow the motion. Judgement: power that does would then differ by a factor of four.
 COLOUR_AMPLITUDES = 2.0
@@ -59,20 +51,30 @@ ROUNDED_NOISE = 1.5
 #: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much
 #: again as the noise itself.
 NOISE_EXPLAINS_UP_TO = 1.0
+#: Share of the gap that effects leave at least where noise that misbehaves is all of it. Judgement, made when
+#: skipped samples that closed 98 % of a gap had been taken for noise.
+NOISE_LEAVES = 0.1
 
 # ---- What is read off the records before any fit --------------------------------------------------------------
 
 #: A run shows a hum when removing the line lowers χ² by this much. By chance at one frequency: one run in 1800.
 HUM_RUN_DROP = 15.0
+#: Share of the runs that must show it. Judgement: the mains hum in every run.
+HUM_RUNS = 0.75
 #: Drop of χ² at the hum's line over the largest beside it, all runs together. Judgement: rods and corners ring too.
 HUM_CONTRAST = 4.0
 #: Rate at which a steady hum is said to swell. Judgement.
 SWELL_FALSE_ALARM_RATE = 1e-6
 #: Share of a hum's power that may be left once the line and its harmonics are removed. Judgement.
 HUM_LEFT = 0.02
+#: A reading's step beyond this multiple of the stated resolution is coarser than stated. Judgement.
+COARSER_STEP = 1.5
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
+#: Frequency with the wind on over that with it off, from which a run swings in another mode. Judgement: the air
+#: would have to stiffen the spring by 1.25 times its own stiffness.
+ANOTHER_MODE = 1.5
 #: Share of the readings' power in the residual beyond which a fit misses the motion itself. Judgement.
 GROSS_MISFIT = 0.01
 
@@ -145,11 +147,15 @@ MOMENT_LEFT = 0.25
 #: deviations. Judgement: among 100 to 150 the greatest is below 3.5 by chance; a real spectrum is not first-order,
 #: which adds some. The limit by quarter was 5.5 until it had refused two true answers of tuning campaigns.
 WHITE_INNOVATIONS = 7.0
+#: Factor by which real turbulence, which is not quite steady, may exceed the limit of a burst. Judgement.
+BURST = 1.5
 #: χ² that every instant or phase of a run's own may gain by chance. Judgement: it is the best of many tried.
 OWN_EVIDENCE = 10.0
 
 # ---- Where the gap is -----------------------------------------------------------------------------------------
 
+#: Runs with a smaller share of the largest excess are not named. Judgement.
+NAMED_RUN_SHARE = 0.1
 #: An interval longer than this share of the whole range does not locate anything. Judgement.
 LOCATES_UP_TO = 0.7
 #: Share of the excess that makes a band or a line the place of the gap. Judgement.
@@ -160,12 +166,19 @@ SECOND_HARMONIC_SHARE = 0.05
 SINGLE_RUN_SHARE = 0.85
 #: Share of the excess that fits to single runs leave at most, where the gap lies between runs. Judgement.
 BETWEEN_RUNS_SHARE = 0.2
+#: Half of the missing moment within this share of the record is a blow. Judgement.
+BLOW_SHARE = 0.1
 #: Standard deviations beyond which the missing moment stands out of the noise. Convention.
 CLEAR_MOMENT = 5.0
+#: Ratio of the drifts of frequency and damping beyond which the larger decides the channel. Judgement.
+DRIFT_RATIO = 1.5
 #: Highest frequency of a moment, Hz: the rig's inertia keeps the response to faster ones below any noise. Physics.
 FASTEST_MOMENT = 30.0
 #: Bands with a smaller share of the excess are not listed. Judgement.
 LISTED_BAND_SHARE = 0.05
+#: Mean squared residual of a run, in noise variances, beyond which the intervals of its backbone allow for
+#: coloured residuals. Judgement.
+COLOURED_RUN = 1.5
 #: A line is this many times the median around it. Judgement: the skirt of a resonance is not.
 LINE_CONTRAST = 8.0
 
@@ -191,6 +204,9 @@ FORM_CHANGE_STD = 0.5
 #: What remains is material where it moves a coefficient by this share, or by more than its standard deviation.
 #: Convention: derivatives are quoted to a per cent.
 MATERIAL_SHARE = 0.01
+#: A part of the data with a smaller share of the information on a coefficient is not set against the others.
+#: Judgement: its own estimate would be too uncertain.
+LEAST_HALF = 0.1
 #: A parameter whose standard deviation exceeds this multiple of its value and of its usual size, or whose range
 #: allowed is no wider than chance, is not determined. Judgement: even its order of magnitude is then unknown.
 UNDETERMINED_FACTOR = 10.0
@@ -210,3 +226,5 @@ SECOND_MODE_LEFT = 0.5
 LAW_REACHES = 0.97
 #: Share of what is left within which a simpler kind counts as closing as much. Judgement: that of a basis itself.
 AS_MUCH = 0.02
+#: Share of what is left below which no kind is named. Judgement.
+LEAST_CLOSABLE = 0.1

@@ -17,10 +17,10 @@ from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.policy import (
     AS_MUCH,
+    LEAST_CLOSABLE,
     LINE_CONTRAST,
     LOCAL_FALSE_ALARM_RATE,
     MOST,
-    SMALL_PART,
 )
 from diagnosis.remainder.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.remainder.formula import choose, propose
@@ -100,7 +100,7 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )
-    if max(of_all.closed, of_one.closed) < SMALL_PART:
+    if max(of_all.closed, of_one.closed) < LEAST_CLOSABLE:
         return "noise"
     among, best = (common, of_all) if of_all.closed >= MOST * of_one.closed else (single, of_one)
     least = best.closed - max(AS_MUCH, best.std)
@@ -122,7 +122,7 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
     sizes = np.array([before[run].size for run in both], np.float64)
     closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-    if closed < SMALL_PART:
+    if closed < LEAST_CLOSABLE:
         return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):

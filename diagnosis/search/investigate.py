@@ -221,7 +221,7 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.CLEARLY_MORE * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.COARSER_STEP * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum, line = campaign, None, None
@@ -415,7 +415,7 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     """
     block = found.nominal.problem.data.runs[0].block
     small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < policy.SMALL_PART for w in weighed)
+    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)
 
 

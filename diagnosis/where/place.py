@@ -13,14 +13,15 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.policy import (
     BETWEEN_RUNS_SHARE,
+    BLOW_SHARE,
     CLEAR_MOMENT,
-    CLEARLY_MORE,
     DOMINANT_SHARE,
+    DRIFT_RATIO,
     FASTEST_MOMENT,
     LOCAL_FALSE_ALARM_RATE,
+    NAMED_RUN_SHARE,
     SECOND_HARMONIC_SHARE,
     SINGLE_RUN_SHARE,
-    SMALL_PART,
 )
 from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval
@@ -84,7 +85,7 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
     """The runs beyond chance (1 % over all) that have a tenth or more of the largest excess among them."""
     clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < LOCAL_FALSE_ALARM_RATE}
-    least = SMALL_PART * max(clear.values(), default=0.0)
+    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
@@ -133,7 +134,7 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     if interval is None or found.moment_z < CLEAR_MOMENT:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= SMALL_PART * length
+    brief = interval[1] - interval[0] <= BLOW_SHARE * length
     return interval if brief and interval[0] > 0.05 * length else None
 
 
@@ -150,9 +151,9 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, "every run is driven, so that no decay shows it")
     frequency, damping = drift(list(found.maps.backbones))
-    if frequency > CLEARLY_MORE * max(damping, 0.0) and frequency > 0.0:
+    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > CLEARLY_MORE * max(frequency, 0.0) and damping > 0.0:
+    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
     return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
 
