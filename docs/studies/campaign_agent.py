@@ -33,6 +33,7 @@ from tunnel_lab.envs.policies import (
 )
 from tunnel_lab.envs.session import Knowledge
 from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.errors import TunnelError
 
 TRAINED_FROM = 1_000_000  # first seed of the training, far from those of the score
 STEPS = 90_000
@@ -147,10 +148,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.command == "train":
         write_whole(given.out, train(given.steps, given.seed).to_bytes())
-    elif given.agent is None:
-        write_score(given.docs, score(packaged_agent()))
-    else:
-        write_score(given.docs, score(read_agent(given.agent), f"trained, seed {given.seed}"))
+        return 0
+    try:
+        agent = packaged_agent() if given.agent is None else read_agent(given.agent)
+    except TunnelError as error:
+        print(error, file=sys.stderr)
+        return 2
+    write_score(given.docs, score(agent, "trained" if given.agent is None else f"trained, seed {given.seed}"))
     return 0
 
 
