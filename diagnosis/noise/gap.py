@@ -91,7 +91,8 @@ class GapTest:
         tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
             above the stated level.
-        within_step: whether a gap is no larger than the error of the readings' lattice, and is therefore none.
+        within_step: whether a gap is no larger than the error of the readings' lattice, and is therefore none; the
+            smallest p-value is then 1, whatever the single tests say.
     """
 
     detected: bool

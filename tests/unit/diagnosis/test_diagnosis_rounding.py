@@ -46,7 +46,7 @@ def test_a_motion_that_the_model_misses_is_a_gap_beside_the_rounding(rate, step)
     assert judged(with_records(decays(rate, None), stiffening))[2].detected
 
 
-@pytest.mark.parametrize(("share", "gap"), [(0.75, False), (3.0, True)])
+@pytest.mark.parametrize(("share", "gap"), [(0.75, False), (1.0, True), (3.0, True)])
 def test_a_gap_is_larger_than_the_error_of_the_steps(share, gap):
     """The levels of a camera are off by a share of a step, from its middle to its edge, whatever the motion."""
     step = 0.2 * DEGREE
