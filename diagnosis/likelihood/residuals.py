@@ -405,9 +405,7 @@ def _skips(runs: list[_Skipping], count: int) -> PerRunParameters:
     """So many skips in every run, all of one time."""
     steps, lost = [run.steps(count) for run in runs], 0.0
     for number in range(_ROUNDS):
-        if (
-            number > 0
-        ):  # two skips close together were found as one of twice the time, and another one of nothing
+        if number > 0:  # two skips close together were one of twice the time, and another one of nothing
             steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
         times, weights = (
             np.array([[getattr(step, name) for step in of_run] for of_run in steps])

@@ -111,7 +111,7 @@ def test_effects_of_the_reference_simulator_are_found(tmp_path, monkeypatch):
     conditions = rig(springs, speeds, (0.35,) * 6, 6.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: conditions)
     wanted = ["coulomb_friction", "quadratic_damping", "sensor_nonlinearity", "nonlinear_yaw_damping"]
-    monkeypatch.setattr("tunnel_reference.make._in_turn", lambda _order, number: wanted[:number])
+    monkeypatch.setattr("tunnel_reference.make._in_turn", lambda _order, number, _families: wanted[:number])
     mixture = draw.Mixture(textbook=1.0, rare=0.0)
     key = make_blind(tmp_path / "set", count=4, seed=9, shares={"single": 1.0}, mixture=mixture)
     truths = json.loads(key.read_text(encoding="utf-8"))["truths"]
