@@ -21,6 +21,7 @@ from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.drive import refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.rig import JointLaw
 
@@ -132,8 +133,12 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
     if compared.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
-        said = f"A second mode is the only effect of the sensor that is tried on {compared.sensor.quantity}s."
-        left_out = (*left_out, said)
+        tried = (
+            "No effect of the sensor is"
+            if compared.driven
+            else "A second mode is the only effect of the sensor that is"
+        )
+        left_out = (*left_out, f"{tried} tried on {compared.sensor.quantity}s.")
     kinds, said_of_drive = kinds_for(compared, kinds)
     left_out = (*left_out, *said_of_drive)
     if compared.law is not None and compared.law.slide:
@@ -152,7 +157,7 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
     said = []
-    kept = stated if len(stated) >= len(bare) else bare
+    kept, derivative = stated if len(stated) >= len(bare) else bare, campaign.sensor.derivative
     if stated and bare:
         other, what = (bare, "state no") if kept is stated else (stated, "state their")
         said.append(
@@ -161,7 +166,7 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
             f"separately."
         )
     if kept is bare:
-        same = _of_one_spring(bare)
+        same = _of_one_spring(bare, derivative)
         if len(same) < len(bare):
             other = [run for run in bare if run not in same]
             said.append(
@@ -173,13 +178,13 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     still: dict[float | None, list[float]] = defaultdict(list)
     for run in kept:
         if not run.wind_on:
-            still[run.spring_stiffness].append(free_frequency(run))
+            still[run.spring_stiffness].append(free_frequency(run, derivative))
     elsewhere = [
         run
         for run in kept
         if run.wind_on
         and run.spring_stiffness in still
-        and free_frequency(run) > ANOTHER_MODE * median(still[run.spring_stiffness])
+        and free_frequency(run, derivative) > ANOTHER_MODE * median(still[run.spring_stiffness])
     ]
     if elsewhere:
         said.append(
@@ -195,7 +200,7 @@ def _ids(runs: Sequence[Run]) -> str:
     return ", ".join(run.id for run in runs)
 
 
-def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
+def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
     """The largest group of runs that may have one spring.
 
     The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
@@ -203,7 +208,7 @@ def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     for run in runs:
-        by_speed[run.wind_speed].append((free_frequency(run), run))
+        by_speed[run.wind_speed].append((free_frequency(run, derivative), run))
     # by speed, groups of runs with about the same frequency, lowest first
     groups: list[list[list[Run]]] = []
     for alike in by_speed.values():
@@ -258,18 +263,11 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
         why = ""
-        if run.spring_stiffness == 0.0 and not run.drive.on_body:
-            raise TunnelError(
-                "the motion of the root acts through the spring, and spring_stiffness = 0 states none",
-                where=where,
-                remedy="state the spring's stiffness, or name the input moment_nm or drive",
-            )
+        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
         if run.spring_stiffness == 0.0 and run.wind_on:
             why = "is driven and has no spring, and the wind blows"
         elif own_model:
             why = "is driven, and a model of your own is given"
-        elif campaign.sensor.derivative:
-            why = f"is driven, and its sensor reads {campaign.sensor.quantity}s"
         elif not run.record.uniform:
             why = "is driven, and its samples are not evenly spaced"
         elif run.record.yaw_rad.size < LEAST_SAMPLES:
@@ -303,13 +301,6 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             where=campaign.name,
             remedy="state drive_gain, or record the moment as moment_nm",
         )
-    mixed = {run.drive.column == "moment_nm" or run.drive.gain is not None for run in driven if run.drive}
-    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
-        raise TunnelError(
-            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
-            where=campaign.name,
-            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
-        )
 
 
 def refuse_motionless(campaign: Campaign) -> None:
@@ -329,7 +320,7 @@ def refuse_motionless(campaign: Campaign) -> None:
     for run in campaign.runs:
         if run.drive is None:
             continue
-        found = response_to_input(run)
+        found = response_to_input(run, campaign.sensor.derivative)
         if run.unrestrained and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",

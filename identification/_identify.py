@@ -12,7 +12,7 @@ from identification.examination.self_excited import in_limit_cycle
 from identification.statistics import widened_by_contradictions
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.drive import checked_drive
+from tunnel_sim.vocabulary.drive import checked_drive, refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -90,15 +90,4 @@ def refuse_driven(campaign: Campaign, name: str) -> None:
                 remedy=f"use {' or '.join(DRIVEN_ESTIMATORS)}, or leave the driven runs out",
             )
         checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
-        if campaign.sensor.derivative:
-            raise TunnelError(
-                f"driven runs of {campaign.sensor.quantity}s are not identified yet",
-                where=where,
-                remedy="record the angle",
-            )
-        if run.spring_stiffness == 0.0 and not run.drive.on_body:
-            raise TunnelError(
-                "the motion of the root acts through the spring, and spring_stiffness = 0 states none",
-                where=where,
-                remedy="state the spring's stiffness, or name the input moment_nm or drive",
-            )
+        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)

@@ -89,7 +89,7 @@ def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
     """
     rig, sensor = campaign.rig, campaign.sensor
     still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
-    time = float(np.median([free_frequency(run) for run in still])) / REFERENCE_FREQUENCY
+    time = float(np.median([free_frequency(run, sensor.derivative) for run in still])) / REFERENCE_FREQUENCY
     springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
     if campaign.unrestrained:
         inertia = rig.yaw_inertia
@@ -140,15 +140,18 @@ def frequency(record: Record) -> float:
     return peak_of_swing(swing, size) * record.sample_rate / size
 
 
-def free_frequency(run: Run) -> float:
+def free_frequency(run: Run, derivative: int = 0) -> float:
     """The frequency at which a run would swing freely.
+
+    Args:
+        derivative: of the angle that the readings are.
 
     Returns:
         That of its decay, Hz; of a driven run, whose motion may follow its input, that of the resonance between
         them, or of the peak of the motion where they show none. A body that nothing holds does not swing: the mean
         frequency of the power of its rate, or the one from which on inertia exceeds damping if that is higher.
     """
-    found = response_to_input(run)
+    found = response_to_input(run, derivative)
     if run.unrestrained:
         angle = run.record.yaw_rad
         power = np.abs(np.fft.rfft((angle - np.mean(angle)) * np.hanning(angle.size)))[1:] ** 2
@@ -162,8 +165,11 @@ def free_frequency(run: Run) -> float:
     return float(np.sqrt(found[1])) / (2.0 * np.pi)
 
 
-def response_to_input(run: Run) -> tuple[float, float, float] | None:
+def response_to_input(run: Run, derivative: int = 0) -> tuple[float, float, float] | None:
     """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit) of a driven run by itself.
+
+    Args:
+        derivative: of the angle that the readings are.
 
     Returns:
         As `driven_start`; None of a free decay too.
@@ -171,7 +177,9 @@ def response_to_input(run: Run) -> tuple[float, float, float] | None:
     if run.drive is None:
         return None
     record = run.record
-    return driven_start(record.time_s, record.yaw_rad, run.drive.values, sprung=not run.unrestrained)
+    return driven_start(
+        record.time_s, record.yaw_rad, run.drive.values, sprung=not run.unrestrained, derivative=derivative
+    )
 
 
 def _law(law: JointLaw, change: Similarity) -> JointLaw:

@@ -129,7 +129,7 @@ def _driven_start(run: RunData) -> tuple[float, float, float] | None:
     Of a body without a spring the gain must be positive, in N m of the input.
     """
     sprung = run.spring_stiffness != 0.0
-    found = driven_start(run.times, run.reading, run.input_means, sprung=sprung)
+    found = driven_start(run.times, run.reading, run.input_means, sprung=sprung, derivative=run.derivative)
     if found is None or run.drive is None or (found[1] if sprung else found[2] * run.drive.scale) <= 0.0:
         return None
     return found

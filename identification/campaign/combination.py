@@ -247,7 +247,8 @@ def _joint(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[
     if start is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     own_zeros = campaign.sensor.zero == "per_run" or any(run.unrestrained for run in runs)
-    found = fit_with_inputs(runs, linked.links, start[0], own_zeros=own_zeros)
+    derivative = campaign.sensor.derivative
+    found = fit_with_inputs(runs, linked.links, start[0], own_zeros=own_zeros, derivative=derivative)
     if not found.converged:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_CONVERGED}))
     information = eliminate(found.normal, np.zeros(len(found.normal)), linked.size)[0]

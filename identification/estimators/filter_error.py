@@ -16,8 +16,7 @@ import numpy as np
 from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import NoiseLevel, Quantity, Status
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
-from identification.signal.driven import driven_rows
-from identification.signal.driven_fit import DrivenRun, Gained, driven_run
+from identification.signal.driven_fit import DrivenRun, Gained, driven_run, input_response
 from identification.signal.filter import DrivenFit, KnownInput, fit_driven
 from identification.signal.free_decay import Decay
 from identification.signal.noise import Residual, noise_level, white_noise
@@ -62,7 +61,7 @@ class FilterError(RunByRun):
             return RunDecay(bare.estimate)
         driven = self._driven(run, bare, sensor)
         if driven is not None:
-            return _with_moment(run, bare, bare.noise, *driven)
+            return _with_moment(run, bare, bare.noise, *driven, sensor.derivative)
         variance = bare.noise.std**2 * bare.noise.slow_ratio
         gained = bare.gained if isinstance(bare, DrivenRun) else None
         return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, gained)
@@ -80,33 +79,34 @@ class FilterError(RunByRun):
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
         deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
-        known = None if run.drive is None else _known_input(run, run.drive, bare.reading, factor)
+        known = (
+            None
+            if run.drive is None
+            else _known_input(run, run.drive, bare.reading, factor, sensor.derivative)
+        )
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
 
 
-def _known_input(run: Run, drive: Drive, reading: Reading, factor: int) -> KnownInput:
+def _known_input(run: Run, drive: Drive, reading: Reading, factor: int, derivative: int) -> KnownInput:
     """The response to the input, in the means of the blocks."""
 
     def response(decay: Decay) -> Array:
-        motion = Reading(reading.time, _driven_part(reading, drive, decay))
+        motion = Reading(reading.time, input_response(reading, drive, decay, derivative))
         return mean_of_blocks(even_reading(motion).yaw, factor)
 
     return KnownInput(response, by_root=run.driven_by_stiffness)
 
 
-def _driven_part(reading: Reading, drive: Drive, decay: Decay) -> Array:
-    """The response to the input of unit gain, exact between the samples."""
-    held = drive.hold == "zero"
-    return np.asarray(driven_rows(reading.time, drive.values, decay.rate, decay.stiffness, held=held)[0])
-
-
-def _with_moment(run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float) -> Found:
+def _with_moment(
+    run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float, derivative: int
+) -> Found:
     decay = found.model.decay
     reading, drive = bare.reading, run.drive
     gain = decay.stiffness if run.driven_by_stiffness else found.innovations.gain
     if drive is not None:
-        reading = Reading(reading.time, reading.yaw - gain * _driven_part(reading, drive, decay))
+        response = input_response(reading, drive, decay, derivative)
+        reading = Reading(reading.time, reading.yaw - gain * response)
     projected = project_run(reading, decay)
     if projected is None:
         return Status.NOT_CONVERGED

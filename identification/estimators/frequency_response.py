@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from identification.campaign.combination import Found, RunByRun, RunDecay
 from identification.estimate import Estimate, Status
 from identification.signal.decay_fit import Reading, project_run
-from identification.signal.driven import driven_rows, driven_start
-from identification.signal.driven_fit import Gained, driven_run, linearised
+from identification.signal.driven import driven_start
+from identification.signal.driven_fit import Gained, driven_run, input_response, linearised
 from identification.signal.free_decay import Decay
 from identification.signal.run_fit import describe_run
 from identification.statistics import inverse
@@ -70,25 +70,25 @@ class FrequencyResponse(RunByRun):
         if bare.fit is None or bare.noise is None or drive is None:
             return RunDecay(bare.estimate)
         reading = bare.reading
-        start = driven_start(reading.time, reading.yaw, drive.values)
+        derivative = sensor.derivative
+        start = driven_start(reading.time, reading.yaw, drive.values, derivative=derivative)
         places = [0, 1] if run.driven_by_stiffness else [0, 1, 2]
         link = np.eye(3)[:, places]
         link[2, 1] = 1.0 if run.driven_by_stiffness else 0.0
         lines = _Lines.of(drive.values, self.segments)
-        found = None if start is None else _fitted(run, link, np.array(start)[places], lines)
+        found = None if start is None else _fitted(run, link, np.array(start)[places], lines, derivative)
         if found is not None:
             left, seen = (np.sum(np.abs(lines.spectra(y)) ** 2, axis=0) for y in (found[1], reading.yaw))
             kept = left <= (1.0 - self.least_coherence) * seen
             lines = replace(lines, used=lines.used[kept], moved=lines.moved[:, kept], power=lines.power[kept])
-            found = _fitted(run, link, found[0], lines)
+            found = _fitted(run, link, found[0], lines, derivative)
         if found is None:
             return Status.NOT_DETERMINED
         coefficients, gains = link @ found[0], found[2][: len(places)]
         decay = Decay(float(coefficients[0]), float(coefficients[1]))
         if not decay.stiffness > 0.0:
             return Status.NOT_CONVERGED
-        held = drive.hold == "zero"
-        response = driven_rows(reading.time, drive.values, decay.rate, decay.stiffness, held=held)[0]
+        response = input_response(reading, drive, decay, derivative)
         free = Reading(reading.time, reading.yaw - coefficients[2] * response)
         projected = project_run(free, decay)
         if projected is None:
@@ -157,7 +157,9 @@ class _Lines:
         return out
 
 
-def _fitted(run: Run, link: Array, start: Array, lines: _Lines) -> tuple[Array, Array, Array] | None:
+def _fitted(
+    run: Run, link: Array, start: Array, lines: _Lines, derivative: int
+) -> tuple[Array, Array, Array] | None:
     """Coefficients, the record's residual (rad), and weights of its samples in them; None where undetermined."""
     if lines.used.size < _FEWEST:
         return None
@@ -165,7 +167,7 @@ def _fitted(run: Run, link: Array, start: Array, lines: _Lines) -> tuple[Array, 
     step = np.zeros(start.size + 2)
     for _ in range(_STEPS):
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is taken back then
-            residual, jacobian = linearised(run, link, parameters, own)
+            residual, jacobian = linearised(run, link, parameters, own, derivative)
             left = lines.weighted(residual)
             cost = float(left @ left)
         if np.isfinite(cost) and cost <= last * (1.0 + _SETTLED):

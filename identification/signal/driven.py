@@ -19,7 +19,9 @@ _POWER = 0.999  # share of the response's power that these lines hold at least
 _ROUNDS = 8
 
 
-def driven_rows(time: Array, values: Array, rate: float, stiffness: float, *, held: bool) -> Array:
+def driven_rows(
+    time: Array, values: Array, rate: float, stiffness: float, *, held: bool, derivative: int = 0
+) -> Array:
     """The response from rest to an input of unit gain, and its derivatives.
 
     Args:
@@ -28,9 +30,10 @@ def driven_rows(time: Array, values: Array, rate: float, stiffness: float, *, he
         rate: a, 1/s.
         stiffness: k, 1/s².
         held: whether the input is constant from one sample to the next; else linear.
+        derivative: 0 for the angle, 1 for its rate.
 
     Returns:
-        Angle (rad), its derivative with respect to a (rad s) and to k (rad s²), shape (3, n).
+        Angle (rad), its derivative with respect to a (rad s) and to k (rad s²), shape (3, n); of the rate, per s.
     """
     steps = np.diff(time)
     if np.ptp(steps) <= 1e-6 * steps.mean():
@@ -55,11 +58,11 @@ def driven_rows(time: Array, values: Array, rate: float, stiffness: float, *, he
     else:
         for i, (matrix, push) in enumerate(zip(transition, pushed, strict=True)):
             state[i + 1] = matrix @ state[i] + push
-    return np.asarray(state[:, ::2].T, np.float64)
+    return np.asarray(state[:, derivative::2].T, np.float64)
 
 
 def driven_start(
-    time: Array, reading: Array, values: Array, *, sprung: bool = True
+    time: Array, reading: Array, values: Array, *, sprung: bool = True, derivative: int = 0
 ) -> tuple[float, float, float] | None:
     """Decay rate, stiffness and gain from the spectra of input and response.
 
@@ -69,8 +72,9 @@ def driven_start(
 
     Args:
         time: of the samples, shape (n,), s.
-        reading: of the response, shape (n,), rad.
+        reading: of the response, shape (n,), rad, or rad/s of its rate.
         values: of the input, shape (n,).
+        derivative: 0 where the reading is the angle, 1 where it is the rate.
 
     Returns:
         a (1/s), k (1/s²) and g (rad/s² per unit); None where the response holds no motion.
@@ -84,7 +88,7 @@ def driven_start(
     turn = 2.0 * np.pi / (count * (time[-1] - time[0]) / (count - 1)) * np.arange(response.size)[used]
     y, u, s = response[used], moved[used], 1j * turn
     unit = float(turn[-1])
-    columns = np.column_stack([s / unit * y, y, -u, -np.ones_like(y), -s / unit])
+    columns = np.column_stack([s / unit * y, y, -((s / unit) ** derivative) * u, -np.ones_like(y), -s / unit])
     sought = [0, 1, 2, 3, 4] if sprung else [0, 2, 3, 4]
     weight = np.ones(turn.size)
     found = np.zeros(5)
@@ -98,4 +102,4 @@ def driven_start(
         solved = np.linalg.lstsq(stacked, np.concatenate([right.real, right.imag]), rcond=None)[0]
         found[sought] = solved / size
         weight = 1.0 / np.maximum(np.abs((s / unit) ** 2 + found[0] * s / unit + found[1]), 1e-9)
-    return 0.5 * float(found[0]) * unit, float(found[1]) * unit**2, float(found[2]) * unit**2
+    return 0.5 * float(found[0]) * unit, float(found[1]) * unit**2, float(found[2]) * unit ** (2 - derivative)

@@ -21,6 +21,7 @@ from identification.signal.free_decay import Decay, response_rows, sensitivity_w
 from identification.signal.run_fit import FittedRun, decay_covariance_of, describe_run, noise_and_failure
 from identification.statistics import determined, eliminate, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
 
 _MOST_STEPS = 60
@@ -103,14 +104,16 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     places = [0, 2] if drifts else [0, 1] if run.driven_by_stiffness else [0, 1, 2]
     if reading.time.size < _LEAST_SAMPLES * (len(places) + _OWN):
         return _failed(run, reading, Status.NOT_DETERMINED)
-    start = driven_start(reading.time, reading.yaw, drive.values, sprung=not drifts)
+    derivative = sensor.derivative
+    start = driven_start(reading.time, reading.yaw, drive.values, sprung=not drifts, derivative=derivative)
     if start is None or not (drifts or start[1] > 0.0):
         return _failed(run, reading, Status.NO_OSCILLATION)
     link = np.eye(3)[:, places]
     link[2, 1] = 1.0 if len(places) == 2 else 0.0
     steps = np.diff(reading.time)
     rate = max(start[0], -_GROWTH / float(reading.time[-1] - reading.time[0])) if drifts else start[0]
-    found = fit_with_inputs([run], [link], np.array([rate, *start[1:]])[places], own_zeros=True)
+    began = np.array([rate, *start[1:]])[places]
+    found = fit_with_inputs([run], [link], began, own_zeros=True, derivative=derivative)
     coefficients = link @ found.parameters
     # a record shows no resonance above half its sample rate
     fastest = np.pi / float(steps.min())
@@ -132,6 +135,18 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     offset = _offset(found, variance, drive.unit) if drifts else None
     gained = Gained(coefficients, weight / variance, offset)
     return DrivenRun(reading, fit if estimate.identified else None, noise, estimate, gained)
+
+
+def input_response(reading: Reading, drive: Drive, decay: Decay, derivative: int) -> Array:
+    """The response to an input of unit gain at the times of a reading, shape (n,), exact between the samples.
+
+    Args:
+        derivative: 0 for the angle, 1 for its rate.
+    """
+    held = drive.hold == "zero"
+    of_decay = decay.rate, decay.stiffness
+    rows = driven_rows(reading.time, drive.values, *of_decay, held=held, derivative=derivative)
+    return np.asarray(rows[0], np.float64)
 
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
@@ -160,7 +175,7 @@ def _offset(found: InputFit, variance: float, unit: str) -> Quantity:
 
 
 def fit_with_inputs(
-    runs: Sequence[Run], links: Sequence[Array], start: Array, *, own_zeros: bool
+    runs: Sequence[Run], links: Sequence[Array], start: Array, *, own_zeros: bool, derivative: int = 0
 ) -> InputFit:
     """Fit runs together.
 
@@ -169,6 +184,7 @@ def fit_with_inputs(
         links: one per run, shape (3, p): (a, k, g) = L φ.
         start: of φ, shape (p,), SI.
         own_zeros: whether every run has its own zero; needed where one has no spring.
+        derivative: 0 where the readings are angles, 1 where they are rates.
 
     Returns:
         The fit; ``converged`` is False where a start overflows, or the steps come to no end.
@@ -176,14 +192,15 @@ def fit_with_inputs(
     parameters, own = start.astype(np.float64), np.zeros((len(runs), _OWN))
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
         with np.errstate(all="ignore"):  # a start far off may overflow
-            residual, jacobian = linearised(run, link, parameters, own[i])
+            residual, jacobian = linearised(run, link, parameters, own[i], derivative)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return InputFit(parameters, own, [], np.zeros((0, 0)), False)
         own[i] = np.linalg.lstsq(jacobian[:, -_OWN:], residual, rcond=None)[0]
     if not own_zeros:
         own[:, 0] = own[:, 0].mean()
     damping, converged = 1e-9, False
-    residuals, normal, gradient = normal_equations(runs, links, parameters, own, own_zeros=own_zeros)
+    options = {"own_zeros": own_zeros, "derivative": derivative}
+    residuals, normal, gradient = normal_equations(runs, links, parameters, own, **options)
     cost = sum(float(r @ r) for r in residuals)
     for _ in range(_MOST_STEPS):
         try:
@@ -192,7 +209,7 @@ def fit_with_inputs(
             break
         moved, moved_own = _moved(parameters, own, step, own_zeros)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
-            trial = normal_equations(runs, links, moved, moved_own, own_zeros=own_zeros)
+            trial = normal_equations(runs, links, moved, moved_own, **options)
             after = sum(float(r @ r) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
@@ -227,6 +244,7 @@ def normal_equations(
     own: Array,
     *,
     own_zeros: bool,
+    derivative: int = 0,
     filters: Sequence[tuple[Array, Array]] | None = None,
 ) -> tuple[list[Array], Array, Array]:
     """Residuals, information and score of φ, the common zero where there is one, and the runs' own numbers.
@@ -236,6 +254,7 @@ def normal_equations(
         parameters: φ, shape (p,), SI.
         own: of each run as in `InputFit`, shape (r, 3).
         own_zeros: whether every run has its own zero.
+        derivative: 0 where the readings are angles, 1 where they are rates.
         filters: numerator and denominator per run, shape (3,) each, of a recursive filter that makes its noise
             white; None where it is white.
 
@@ -247,7 +266,7 @@ def normal_equations(
     normal = np.zeros((shared + width * len(runs),) * 2)
     gradient, residuals = np.zeros(len(normal)), []
     for i, (run, link) in enumerate(zip(runs, links, strict=True)):
-        residual, jacobian = linearised(run, link, parameters, own[i])
+        residual, jacobian = linearised(run, link, parameters, own[i], derivative)
         if filters is not None:
             from scipy.signal import lfilter  # only here: slow to load
 
@@ -259,13 +278,17 @@ def normal_equations(
     return residuals, normal, gradient
 
 
-def linearised(run: Run, link: Array, parameters: Array, own: Array) -> tuple[Array, Array]:
+def linearised(
+    run: Run, link: Array, parameters: Array, own: Array, derivative: int = 0
+) -> tuple[Array, Array]:
     """Residual and Jacobian of one run.
 
     Args:
         link: (a, k, g) = L φ, shape (3, p).
         parameters: φ, shape (p,), SI.
         own: zero (rad) or constant acceleration (rad/s²), initial angle (rad) and rate (rad/s), shape (3,).
+        derivative: 0 where the readings are angles; 1 where they are rates, as are then zero and initial state,
+            since free motion has rates that obey the equation of its angles.
 
     Returns:
         Residual in rad, shape (n,), and derivatives of the model with respect to φ and ``own``, shape (n, p + 3).
@@ -284,7 +307,8 @@ def linearised(run: Run, link: Array, parameters: Array, own: Array) -> tuple[Ar
     model = constant * rest[0] + angle * rows[0] + initial * rows[1]
     local[:2] += constant * rest[1:]
     if run.drive is not None:
-        driven = driven_rows(time, run.drive.values, rate, stiffness, held=run.drive.hold == "zero")
+        held = run.drive.hold == "zero"
+        driven = driven_rows(time, run.drive.values, rate, stiffness, held=held, derivative=derivative)
         model = model + gain * driven[0]
         local[:2] += gain * driven[1:]
         local[2] = driven[0]

@@ -103,6 +103,31 @@ def checked_drive(drive: Drive, record: Record, where: str, *, judged: bool = Tr
             )
 
 
+def refuse_untreated(
+    drive: Drive,
+    spring_stiffness: float | None,
+    quantity: Literal["angle", "rate", "acceleration"],
+    where: str,
+) -> None:
+    """Refuse an input with which no driven run can be identified or diagnosed.
+
+    Args:
+        spring_stiffness: as stated, N m/rad; None where it is not.
+        quantity: what the sensor reads.
+    """
+    remedy = "state the spring's stiffness, or name the input moment_nm or drive"
+    what = ""
+    if spring_stiffness == 0.0 and not drive.on_body:
+        what = "the motion of the root acts through the spring, and spring_stiffness = 0 states none"
+    elif quantity == "acceleration":  # it jumps where a held input does
+        what, remedy = "the run is driven, and its sensor reads accelerations", "record the angle or its rate"
+    elif quantity == "rate" and spring_stiffness == 0.0:
+        what = "the run is driven and has no spring, and the rate's zero looks like a constant moment"
+        remedy = "record the angle"
+    if what:
+        raise TunnelError(what, where=where, remedy=remedy)
+
+
 def without_spring_needs_drive(spring_stiffness: float | None, drive: Drive | None, where: str) -> None:
     """Refuse a run without a spring that nothing drives.
 

@@ -218,10 +218,3 @@ def test_other_estimators_refuse_driven_runs_in_one_line(name: str) -> None:
     ) as caught:
         identify(campaign(("moment_nm", None)), name)
     assert "\n" not in str(caught.value)
-
-
-def test_what_is_not_done_yet_is_refused() -> None:
-    mixed = campaign(("moment_nm", None))
-    rates = replace(mixed, sensor=SensorProperties(RATE, quantity="rate"))
-    with pytest.raises(TunnelError, match="driven runs of rates are not identified yet"):
-        identify(rates)
