@@ -268,8 +268,6 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             why = "is driven and has no spring, and the wind blows"
         elif own_model:
             why = "is driven, and a model of your own is given"
-        elif not run.record.uniform:
-            why = "is driven, and its samples are not evenly spaced"
         elif run.record.yaw_rad.size < LEAST_SAMPLES:
             raise TunnelError(
                 f"the run is driven and has {run.record.yaw_rad.size} samples: too few to tell its noise from its "

@@ -176,9 +176,10 @@ def response_to_input(run: Run, derivative: int = 0) -> tuple[float, float, floa
     """
     if run.drive is None:
         return None
-    record = run.record
+    record = evenly_spaced(run.record)
+    values = np.interp(record.time_s, run.record.time_s, run.drive.values)
     return driven_start(
-        record.time_s, record.yaw_rad, run.drive.values, sprung=not run.unrestrained, derivative=derivative
+        record.time_s, record.yaw_rad, values, sprung=not run.unrestrained, derivative=derivative
     )
 
 

@@ -97,8 +97,10 @@ def _driven(data: RunData, run: Run, *, normalised: bool) -> RunData:
     """
     assert run.drive is not None
     known = run.drive.column != "drive" or run.drive.gain is not None
+    record = run.record
+    begun = 0.0 if record.uniform else 0.5 * record.sample_interval  # as the raster of the blocks does
     moment = DriveMoment(
-        run.record.time_s - run.record.time_s[0],
+        record.time_s - record.time_s[0] + begun,
         run.drive.values,
         scale=1.0 if run.drive.gain is None else run.drive.gain,
         held=run.drive.hold == "zero",

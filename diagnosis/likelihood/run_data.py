@@ -154,8 +154,9 @@ class RunData:
         if self.drive is None:
             return None
         scale = self.drive.scale * (gain if self.gain_free else 1.0)
-        first = max(round(self.start / self.interval) * self.block - 1, 0)
-        seen = slice(first, first + (self.reading.size + 1) * self.block + 2)
+        end = self.start + (self.reading.size + 1) * self.interval
+        first, last = np.searchsorted(self.drive.time_s, (self.start, end))
+        seen = slice(max(int(first) - 1, 0), int(last) + 2)
         return dataclasses.replace(
             self.drive,
             time_s=self.drive.time_s[seen],
@@ -168,6 +169,9 @@ class RunData:
     def input_means(self) -> Array:
         """Block means of the input of a driven run, shape (n,), in its own unit."""
         assert self.drive is not None
+        if self.samples is not None:
+            at = self.samples.time + self.start
+            return self.samples.means(np.interp(at, self.drive.time_s, self.drive.values))
         first = round(self.start / self.interval) * self.block
         values = self.drive.values[first : first + self.reading.size * self.block]
         return np.asarray(values.reshape(-1, self.block).mean(axis=1), np.float64)

@@ -19,8 +19,8 @@ from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.colour import Colour
 from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
 from identification.signal.decay_fit import mean_of_blocks
-from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
 _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of white noise
@@ -206,6 +206,7 @@ _LINES = 24  # of a window
 _DEGREE = 2  # of the polynomials of the response to the input, and of the ends of the record
 _FROM = 0.1  # of the sampling rate: the lowest frequency used where the record allows no higher one
 _TO = 0.49  # of the sampling rate
+_BAND = 0.999  # share of the power of a driven motion that its band holds
 
 
 def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, float]:
@@ -252,11 +253,11 @@ def campaign_noise(campaign: Campaign) -> Noise:
     data sheet may give the noise before or after rounding: the closer one counts. Where a run contains less noise
     than the accuracy of the fits, that stands in for it.
     """
-    fastest = max((frequency(run.record) for run in campaign.runs if not run.record.uniform), default=None)
+    fastest = max((_fastest(run) for run in campaign.runs if not run.record.uniform), default=None)
     measured: dict[str, float] = {}
     stds = []
     for run in campaign.runs:
-        if run.drive is None:
+        if run.drive is None or not run.record.uniform:
             measured[run.id], std = estimate_variance(run.record, fastest)
         else:
             low = _FLOOR_FROM / run.record.sample_rate
@@ -294,6 +295,16 @@ def campaign_noise(campaign: Campaign) -> Noise:
         said = f"they contain {found}" if uniform else f"their noise differs by run, {span}"
         reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
     return Noise(used, stated, source, reason, pooled, uncertainty, measured=measured)
+
+
+def _fastest(run: Run) -> float:
+    """The frequency of a decay, or the upper end of the band in which a driven run moves, Hz."""
+    if run.drive is None:
+        return frequency(run.record)
+    record = evenly_spaced(run.record)
+    power = np.cumsum(np.abs(np.fft.rfft(record.yaw_rad - record.yaw_rad.mean())) ** 2)
+    last = int(np.searchsorted(power, _BAND * power[-1]))
+    return max(last, 1) * record.sample_rate / record.yaw_rad.size
 
 
 def accuracy(record: Record, *, swings: bool = True) -> float:

@@ -55,7 +55,9 @@ def test_the_family_of_an_unusual_form_is_named(family):
     named = [candidate for candidate in found.candidates if candidate.effect != "unknown"]
     assert named[0].effect == family
     if family in UNDECIDED:
-        assert found.causes == ("unknown",) and named[0].probability > 0.4 and named[0].closed > 0.9
+        assert found.causes == ("unknown",)
+        assert named[0].probability > 0.4
+        assert named[0].closed > 0.9
         return
     assert found.causes == (family,)
     assert found.gap.closed > 0.8

@@ -133,6 +133,21 @@ class DriveMoment:
             remedy = "correct the sampled input"
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
+    def at_steps(self, step: float) -> bool:
+        """Whether its samples are at even times from 0 on, a whole number of steps apart, and it has no delay.
+
+        Args:
+            step: s.
+        """
+        interval = float(self.time_s[-1]) / max(1, self.time_s.size - 1)
+        apart = interval / step
+        if self.delay != 0.0 or self.time_s.size < 2 or round(apart) < 1:
+            return False
+        even = np.allclose(
+            self.time_s, interval * np.arange(self.time_s.size), rtol=0.0, atol=1e-6 * interval
+        )
+        return bool(even) and abs(apart - round(apart)) <= 1e-6 * apart
+
 
 @dataclass(frozen=True)
 class RunSettings:
@@ -219,8 +234,8 @@ class RunSettings:
             the rod is rigid.
         """
         series = tuple((name, len(series.values)) for name, series in self.series.items())
-        drive = self.drive  # a delayed one is given by its means over the steps
-        driven = drive and (drive.values.size, drive.delay, float(drive.time_s[-1]) if drive.delay else 0.0)
+        drive = self.drive  # given by its samples, or by its means over the steps
+        driven = drive and (drive.values.size, drive.delay, drive.time_s[-1], drive.at_steps(self.timestep))
         return (self.timestep, series, len(self.program), driven, self.rod_twist is None)
 
     def law(self, rig: Rig) -> dict[str, float]:

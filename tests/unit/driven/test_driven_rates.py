@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ def driven_run(seed: int, hold: str, friction: float) -> Run:
     values = multisine(seed)
     knots = TIME if hold == "zero" else TIME[[0, -1]]
     states = [np.array([[0.02], [0.0]])]
-    for first, last in zip(knots[:-1], knots[1:], strict=True):
+    for first, last in pairwise(knots):
         inside = TIME[(TIME > first) & (TIME <= last)]
 
         def slope(t: float, y: np.ndarray, since: float = first) -> list[float]:
