@@ -34,7 +34,7 @@ def driven_run(seed: int, hold: str, friction: float) -> Run:
     knots = TIME if hold == "zero" else TIME[[0, -1]]
     states = [np.array([[0.02], [0.0]])]
     for first, last in pairwise(knots):
-        inside = TIME[(TIME > first) & (TIME <= last)]
+        inside = TIME[(first < TIME) & (last >= TIME)]
 
         def slope(t: float, y: np.ndarray, since: float = first) -> list[float]:
             moment = values[np.searchsorted(TIME, since)] if hold == "zero" else np.interp(t, TIME, values)
