@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -199,8 +200,8 @@ def fit_with_inputs(
     if not own_zeros:
         own[:, 0] = own[:, 0].mean()
     damping, converged = 1e-9, False
-    options = {"own_zeros": own_zeros, "derivative": derivative}
-    residuals, normal, gradient = normal_equations(runs, links, parameters, own, **options)
+    equations = partial(normal_equations, runs, links, own_zeros=own_zeros, derivative=derivative)
+    residuals, normal, gradient = equations(parameters, own)
     cost = sum(float(r @ r) for r in residuals)
     for _ in range(_MOST_STEPS):
         try:
@@ -209,7 +210,7 @@ def fit_with_inputs(
             break
         moved, moved_own = _moved(parameters, own, step, own_zeros)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
-            trial = normal_equations(runs, links, moved, moved_own, **options)
+            trial = equations(moved, moved_own)
             after = sum(float(r @ r) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
