@@ -189,9 +189,10 @@ def sets_with_one_more(
             if all(fitted.total > base.total for fitted in tried):  # linear theory led too far
                 near = [point for start in starts if (point := start.nearer()) is not None]
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
-            best = min(filter(is_plausible, tried), key=lambda fitted: fitted.total, default=None)
+            there = filter(is_plausible, map(turned_back, tried))
+            best = min(there, key=lambda fitted: fitted.total, default=None)
             if best is not None:
-                child = Hypothesis((*parent.effects, kind.name), turned_back(best))
+                child = Hypothesis((*parent.effects, kind.name), best)
                 found[child.names] = of_more_weight(found.get(child.names), child, misfit(base))
     return list(found.values())
 

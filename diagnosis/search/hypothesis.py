@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
-from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, NEEDLESS_SPRING, OWN_EVIDENCE
+from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, MOST, NEEDLESS_SPRING, OWN_EVIDENCE
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from tunnel_sim.effects.base import IN_RUNS
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -129,8 +129,15 @@ def own_gain(problem: Problem, point: Point) -> float:
 
 
 def is_plausible(fitted: Fit) -> bool:
-    """Whether every effect of a fit is still what its name means, in at least half of the runs."""
-    effects = fitted.problem.effects_at(fitted.point.common)
+    """Whether every effect of a fit is still what its name means, in at least half of the runs.
+
+    Gravity that cancels most of an unstated spring is not: what both leave is called a spring that is not linear.
+    """
+    problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
+    if problem.data.normalised and problem.data.law is None:
+        spring, gravity = fitted.value("stiffness"), sum(effect.stiffness_at_rest for effect in effects)
+        if -gravity > MOST * spring:
+            return False
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(np.mean([effect.plausible(omega) for omega in motions]) >= IN_RUNS for effect in effects)
 
