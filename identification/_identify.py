@@ -69,7 +69,7 @@ def identify(
     return estimate
 
 
-DRIVEN_ESTIMATORS = ("output_error", "filter_error", "frequency_response")
+DRIVEN_ESTIMATORS = ("output_error", "filter_error", "bayesian", "frequency_response")
 """Names of the estimators that take the input of driven runs."""
 
 

@@ -10,26 +10,31 @@ have the stated coverage and do not depend on the choice of parameters (Proc. R.
 
 with RSS the sum of squares at the best state and zero, and I the information on (a, k) there. The two are summed
 over a grid. So the logarithm of the likelihood need not be a parabola, which it is not in records of one to three
-cycles.
+cycles. The gain of the input of a driven run is one more linear unknown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.polynomial import chebyshev
 from scipy.interpolate import RectBivariateSpline
 
 from identification.campaign.combination import Combination, Found, RunByRun, RunDecay
 from identification.campaign.derivatives import Design
-from identification.estimate import Quantity, Status
-from identification.signal.decay_fit import Reading, block_means, fit_run, project_run
-from identification.signal.free_decay import Decay
+from identification.estimate import Estimate, NoiseLevel, Quantity, Status
+from identification.signal.decay_fit import Reading, RunFit, block_means, fit_run, mean_of_blocks, project_run
+from identification.signal.driven import driven_rows
+from identification.signal.driven_fit import DrivenRun, Gained, driven_run
+from identification.signal.free_decay import Decay, response_rows
 from identification.signal.frequency import starting_decay
 from identification.signal.run_fit import decay_covariance_of, describe_run, noise_and_failure
-from identification.statistics import determined
-from tunnel_sim.vocabulary.campaign import Run, SensorProperties
+from identification.statistics import determined, inverse
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 # Half width and step in standard deviations: for a normal distribution the sum is exact to 1e-7.
@@ -43,6 +48,7 @@ _FLOOR = -60.0  # of the logarithm of the likelihood relative to its peak: small
 _STEEPEST = 50.0  # |a| times the record's length: beyond it the record would not show the motion
 _RIDGE = 1e-13  # of a scaled Gram matrix, which is singular for a motion of only a few samples
 _FINE = 121  # points a side for the quantiles
+_NODES = 5  # a side, at which the response to an input is computed: it is nearly linear over the posterior
 TAIL = 0.025
 
 
@@ -110,8 +116,36 @@ class DecayPosterior:
         return (_summary(omega, weights[real]), _summary(decays[0][real] / omega, weights[real]))
 
 
+@dataclass(frozen=True, eq=False)
+class Forced:
+    """The response of a run to its input, over a grid.
+
+    Args:
+        response: to unit gain and its derivatives with respect to a and k, at the values of the reading, shape
+            (3, n), as a function of the decay.
+        by_root: whether the gain is the stiffness itself, as where the root of the spring moves.
+    """
+
+    response: Callable[[Decay], Array]
+    by_root: bool
+
+    def over(self, centre: Array, scale: Array, axis: Array) -> Array:
+        """The response at all points of a grid, shape (m², 3, n), from Chebyshev polynomials through few of them.
+
+        Args:
+            centre, scale, axis: as of `DecayPosterior`.
+        """
+        nodes = chebyshev.chebpts1(_NODES)
+        decays = centre[:, None] + scale @ _points(axis[-1] * nodes)
+        rows = np.array([self.response(Decay(float(a), float(k))) for a, k in decays.T])
+        weights = chebyshev.chebvander(axis / axis[-1], _NODES - 1) @ np.linalg.inv(
+            chebyshev.chebvander(nodes, _NODES - 1)
+        )
+        return np.asarray(np.tensordot(np.kron(weights, weights), rows, axes=1), np.float64)
+
+
 def posterior_of(
-    thin: Reading, start: Decay, covariance: Array, knowledge: NoiseKnowledge
+    thin: Reading, start: Decay, covariance: Array, knowledge: NoiseKnowledge, forced: Forced | None = None
 ) -> DecayPosterior | None:
     """Compute the posterior on a grid, and move the grid until it covers the posterior.
 
@@ -119,6 +153,7 @@ def posterior_of(
 
     Args:
         covariance: a guess at that of (a, k), shape (2, 2).
+        forced: of a driven run.
     """
     centre, spread = np.array([start.rate, start.stiffness]), covariance
     width, step = _FIRST
@@ -129,7 +164,8 @@ def posterior_of(
             return None
         axis = np.arange(-width, width + 0.5 * step, step, dtype=np.float64)
         decays = centre[:, None] + scale @ _points(axis)
-        likelihood, prior = _log_terms(thin, decays, knowledge)
+        rows = None if forced is None else forced.over(centre, scale, axis)
+        likelihood, prior = _log_terms(thin, decays, knowledge, rows, forced is not None and forced.by_root)
         shape = (axis.size, axis.size)
         if not np.isfinite(likelihood.max()):
             return None
@@ -159,14 +195,17 @@ def _spline(axis: Array, values: Array) -> RectBivariateSpline:
     return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
 
 
-def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple[Array, Array]:
+def _log_terms(
+    thin: Reading, decays: Array, knowledge: NoiseKnowledge, forced: Array | None, by_root: bool
+) -> tuple[Array, Array]:
     # Log-likelihood and log-prior at each (a, k), in slices that stay in the cache.
     count = decays.shape[1]
     likelihood, prior = np.empty(count), np.empty(count)
     slice_size = max(1, 60_000 // thin.time.size)
     for begin in range(0, count, slice_size):
         part = slice(begin, begin + slice_size)
-        squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part])
+        driven = None if forced is None else forced[part]
+        squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part], driven, by_root)
         # Positive stiffness, and neither decay nor growth within a sample.
         real = (decays[1, part] > 0.0) & (np.abs(decays[0, part]) * float(thin.time[-1]) < _STEEPEST)
         squares = np.where(real & np.isfinite(squares), squares, np.inf)
@@ -178,7 +217,9 @@ def _log_terms(thin: Reading, decays: Array, knowledge: NoiseKnowledge) -> tuple
     return likelihood, np.where(np.isfinite(prior), prior, 0.0)
 
 
-def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Array, Array]:
+def _squares_and_prior(
+    thin: Reading, rate: Array, stiffness: Array, driven: Array | None, by_root: bool
+) -> tuple[Array, Array]:
     # As `response_rows`, for many decays; complex, so one formula covers all but exactly critical damping.
     time, limit = thin.time, _STEEPEST / float(thin.time[-1])
     damping, spring = np.clip(rate, -limit, limit), np.abs(stiffness)
@@ -192,19 +233,27 @@ def _squares_and_prior(thin: Reading, rate: Array, stiffness: Array) -> tuple[Ar
         sine = decaying * (0.5 * (turning - 1.0 / turning) / (1j * root[:, None])).real
     slope = (time * cosine - sine) / (2.0 * delta.real[:, None])
     start = cosine + damping[:, None] * sine
-    rows = np.stack((start, sine, np.ones_like(start), slope, time * sine), axis=1)  # (points, 5, n)
-    linear = rows[:, :3]
+    linear = np.stack((start, sine, np.ones_like(start)), axis=1)  # (points, 3, n)
+    a, k = rate[:, None], stiffness[:, None]
+    values = np.broadcast_to(thin.yaw, start.shape)
+    if driven is not None and by_root:
+        values = values - k * driven[:, 0]
+    elif driven is not None:
+        linear = np.concatenate((linear, driven[:, :1]), axis=1)
     gram = linear @ linear.transpose(0, 2, 1)
     unit = np.sqrt(np.einsum("gii->gi", gram))
-    moments = linear @ thin.yaw
-    scaled = gram / (unit[:, :, None] * unit[:, None, :]) + _RIDGE * np.eye(3)
+    moments = np.einsum("gin,gn->gi", linear, values)
+    scaled = gram / (unit[:, :, None] * unit[:, None, :]) + _RIDGE * np.eye(linear.shape[1])
     solution = np.linalg.solve(scaled, (moments / unit)[:, :, None])[:, :, 0] / unit
-    residual = thin.yaw - np.einsum("gi,gin->gn", solution, linear)
+    residual = values - np.einsum("gi,gin->gn", solution, linear)
     squares = np.einsum("gn,gn->g", residual, residual)
     angle, speed = solution[:, 0, None], solution[:, 1, None]
-    a, k = rate[:, None], stiffness[:, None]
-    by_rate = -2.0 * (k * angle + a * speed) * rows[:, 3] - speed * rows[:, 4]
-    by_stiffness = (a * angle + speed) * rows[:, 3] - 0.5 * angle * rows[:, 4]
+    by_rate = -2.0 * (k * angle + a * speed) * slope - speed * time * sine
+    by_stiffness = (a * angle + speed) * slope - 0.5 * angle * time * sine
+    if driven is not None:
+        gain = k if by_root else solution[:, 3, None]
+        by_rate = by_rate + gain * driven[:, 1]
+        by_stiffness = by_stiffness + gain * driven[:, 2] + (driven[:, 0] if by_root else 0.0)
     full = np.concatenate((linear, by_rate[:, None], by_stiffness[:, None]), axis=1)
     information = full @ full.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):  # a motion of only a few samples gives no information
@@ -296,7 +345,10 @@ class Bayesian(RunByRun):
     blocks_per_cycle: int = 20
     seed: int = 0
 
-    def _together(self, found: Sequence[RunDecay]) -> Combination:
+    def _together(self, found: Sequence[RunDecay]) -> Combination | None:
+        if any(one.gained is not None for one in found):  # their gains are known with (a, k) by moments alone
+            return None
+
         def together(
             design: Design, places: list[int], centre: Array, covariance: Array
         ) -> tuple[Array, Array]:
@@ -306,7 +358,23 @@ class Bayesian(RunByRun):
 
         return together
 
+    def estimate(self, campaign: Campaign) -> Estimate:
+        """Identify every run, then the campaign from the runs.
+
+        Raises:
+            TunnelError: for a driven body without a spring, or a wind-on run without air density.
+        """
+        for run in campaign.runs:
+            if run.drive is not None and run.unrestrained:
+                where, remedy = f"{campaign.name}, run '{run.id}'", "use output_error, or leave the run out"
+                raise TunnelError(
+                    "the run has no spring, and so no stiffness to find", where=where, remedy=remedy
+                )
+        return super().estimate(campaign)
+
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
+        if run.drive is not None:
+            return self._driven(run, run.drive, sensor)
         start = starting_decay(run.record)
         if start is None:
             return Status.NO_OSCILLATION
@@ -317,20 +385,69 @@ class Bayesian(RunByRun):
         noise, failure = noise_and_failure(reading, fit.runs[0], fit.zero, sensor)
         if failure is not None:
             return failure
+        return self._described(run, reading, fit.runs[0], noise)
+
+    def _driven(self, run: Run, drive: Drive, sensor: SensorProperties) -> Found:
+        bare = driven_run(run, sensor)
+        if not isinstance(bare, DrivenRun) or bare.fit is None or bare.noise is None:
+            return RunDecay(bare.estimate)
+        times, held, derivative = bare.reading.time, drive.hold == "zero", sensor.derivative
+
+        def rows(decay: Decay) -> Array:
+            return driven_rows(
+                times, drive.values, decay.rate, decay.stiffness, held=held, derivative=derivative
+            )
+
+        found = self._described(run, bare.reading, bare.fit, bare.noise, rows)
+        if not isinstance(found, _PosteriorDecay) or found.decay is None or found.covariance is None:
+            return found
+        # the gain given (a, k), as least squares has it
+        weight, known = bare.gained.weight, np.zeros((3, 3))
+        moved = np.array([found.decay.rate, found.decay.stiffness]) - bare.gained.coefficients[:2]
+        jacobian = np.eye(3)[:, :2]
+        jacobian[2] = [0.0, 1.0] if run.driven_by_stiffness else -weight[2, :2] / weight[2, 2]
+        known[:2, :2] = inverse(found.covariance)
+        if not run.driven_by_stiffness:
+            covariance = jacobian @ found.covariance @ jacobian.T
+            covariance[2, 2] += 1.0 / weight[2, 2]
+            known = inverse(covariance)
+        return replace(found, gained=Gained(bare.gained.coefficients + jacobian @ moved, known))
+
+    def _described(
+        self,
+        run: Run,
+        reading: Reading,
+        fit: RunFit,
+        noise: NoiseLevel,
+        rows: Callable[[Decay], Array] | None = None,
+    ) -> Found:
+        """The posterior about a fit; ``rows`` are the response of a driven run, as `driven_rows` gives them."""
         variance = noise.std**2 * noise.slow_ratio
-        guess = decay_covariance_of(fit.runs[0]) * variance
-        decay, residual = fit.runs[0].decay, fit.runs[0].residual
+        guess = decay_covariance_of(fit) * variance
+        decay, residual, time = fit.decay, fit.residual, reading.time
         frequency = decay.omega_n / (2.0 * np.pi)
         thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
-        means, _ = block_means(Reading(reading.time, residual), frequency, self.blocks_per_cycle)
+        means, _ = block_means(Reading(time, residual), frequency, self.blocks_per_cycle)
         known = variance if noise.source == "stated" or noise.departs else None
         within = float(residual @ residual) - factor * float(means.yaw @ means.yaw)
-        knowledge = NoiseKnowledge(known, factor, max(within, 0.0), reading.time.size - _LINEAR)
-        found = posterior_of(thin, decay, guess, knowledge)
+        by_root = run.driven_by_stiffness
+        linear = _LINEAR + (rows is not None and not by_root)
+        knowledge = NoiseKnowledge(known, factor, max(within, 0.0), time.size - linear)
+        forced = None
+        if rows is not None:
+            forced = Forced(lambda at: np.array([mean_of_blocks(row, factor) for row in rows(at)]), by_root)
+        found = posterior_of(thin, decay, guess, knowledge, forced)
         if found is None:
             return Status.NOT_CONVERGED
         mean, covariance = found.moments()
-        projected = project_run(reading, Decay(float(mean[0]), float(mean[1])))
+        decay = Decay(float(mean[0]), float(mean[1]))
+        if rows is not None:
+            response, gain = rows(decay)[0], decay.stiffness
+            if not by_root:
+                linear_rows = [response, *response_rows(time, decay)[:2], np.ones_like(time)]
+                gain = float(np.linalg.lstsq(np.transpose(linear_rows), reading.yaw, rcond=None)[0][0])
+            reading = Reading(time, reading.yaw - gain * response)
+        projected = project_run(reading, decay)
         if projected is None:
             return Status.NOT_CONVERGED
         described = describe_run(run, reading, *projected, covariance, variance, noise=noise)

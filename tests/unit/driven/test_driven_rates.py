@@ -73,7 +73,7 @@ def test_the_spectra_give_decay_stiffness_and_gain_of_a_rate() -> None:
     assert found == pytest.approx((0.25, 160.0, 10.0), rel=0.02)
 
 
-@pytest.mark.parametrize("estimator", ["output_error", "filter_error", "frequency_response"])
+@pytest.mark.parametrize("estimator", ["output_error", "filter_error", "bayesian", "frequency_response"])
 @pytest.mark.parametrize("hold", ["zero", "linear"])
 def test_the_rig_is_identified_from_rates(estimator: str, hold: str) -> None:
     estimate = identify(campaign(hold), estimator)

@@ -9,8 +9,11 @@ import pytest
 
 from identification import identify
 from identification._identify import DRIVEN_ESTIMATORS
-from identification.estimators import ALL_ESTIMATORS, DRIVEN_ONLY
+from identification.estimators import ALL_ESTIMATORS, DRIVEN_ONLY, Estimator
+from identification.estimators.bayesian import Bayesian, Forced
 from identification.estimators.frequency_response import FrequencyResponse
+from identification.signal.driven import driven_rows
+from identification.signal.free_decay import Decay
 from tests.reference.rigs import rig
 from tunnel_reference import make
 from tunnel_reference.conditions import Input
@@ -76,8 +79,9 @@ def test_an_unknown_gain_and_a_moving_root_are_taken(column: str, gain: float, e
         assert run.omega_n.value == pytest.approx(np.sqrt(true / 0.1), rel=1e-4)
 
 
+@pytest.mark.parametrize("estimator", [FrequencyResponse(), Bayesian()], ids=lambda e: e.name)
 @pytest.mark.parametrize("kind", ["multisine", "random"])
-def test_stated_deviations_are_those_of_the_estimates(kind: str) -> None:
+def test_stated_deviations_are_those_of_the_estimates(kind: str, estimator: Estimator) -> None:
     clean, noise, deviations = driven(kind), 1e-3, []
     omega = np.sqrt(RIG.spring_stiffness / 0.1)
     for seed in range(25):
@@ -86,7 +90,7 @@ def test_stated_deviations_are_those_of_the_estimates(kind: str) -> None:
             replace(r, record=Record(TIME, r.record.yaw_rad + noise * rng.standard_normal(TIME.size)))
             for r in clean.runs[:2]
         )
-        found = FrequencyResponse().estimate(replace(clean, runs=runs))
+        found = estimator.estimate(replace(clean, runs=runs))
         for run, true, damping in zip(found.runs, omega, 0.012 / (0.2 * omega), strict=False):
             deviations += [(run.omega_n.value - true) / run.omega_n.std]
             deviations += [(run.zeta.value - damping) / run.zeta.std]
@@ -121,3 +125,27 @@ def test_what_has_no_frequency_response_is_refused_in_one_line() -> None:
 def test_it_is_not_among_the_estimators_of_free_decays() -> None:
     assert DRIVEN_ONLY == ("frequency_response",)
     assert not set(DRIVEN_ONLY) & set(ALL_ESTIMATORS)
+
+
+def test_the_response_over_the_grid_of_a_posterior_is_that_of_its_points() -> None:
+    """Seven standard deviations to either side, of a record of noise 1e-3."""
+    run = driven("random").runs[0]
+    assert run.drive is not None
+    centre, scale, axis = np.array([0.06, 210.0]), np.diag([4e-3, 0.12]), np.linspace(-7.0, 7.0, 15)
+
+    def rows(decay: Decay) -> np.ndarray:
+        return driven_rows(TIME, run.drive.values, decay.rate, decay.stiffness, held=False)
+
+    found = Forced(rows, by_root=False).over(centre, scale, axis).reshape(15, 15, 3, -1)
+    for i, j in ((0, 0), (3, 11), (7, 7), (14, 2)):
+        exact = rows(Decay(*(centre + scale @ axis[[i, j]])))
+        assert np.max(np.abs(found[i, j] - exact) / np.max(np.abs(exact), axis=1, keepdims=True)) < 1e-3
+
+
+def test_a_body_without_a_spring_has_no_posterior_of_its_stiffness() -> None:
+    given = driven("random")
+    loose = replace(
+        given, runs=tuple(replace(run, spring_stiffness=0.0, wind_speed=0.0) for run in given.runs)
+    )
+    with pytest.raises(TunnelError, match="no stiffness to find"):
+        identify(loose, "bayesian")
