@@ -109,7 +109,13 @@ def assemble(
         gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds["waterfall"] = time.perf_counter() - begun
     begun = time.perf_counter()
-    found = _coefficients(study, kinds)
+    rig = study.campaign.rig
+    after = coefficients(possible_answers(study, kinds), study.campaign)
+    before = before_the_causes(study.nominal, after) if study.causes else after
+    caveats = [effect_class(name).caveat for name in study.causes if name != "unknown"]
+    identified = _AS_IDENTIFIED if "cn_beta" in before and not study.causes else ""
+    note = " ".join(filter(None, (*caveats, identified, size_note(rig, windy="cn_beta" in before))))
+    found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), note)
     seconds["coefficients"] = time.perf_counter() - begun
     similarity, names = study.similarity, coefficient_names(chosen.problem)
     stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
@@ -166,13 +172,3 @@ def assemble(
         rest=left,
         model=patched,
     )
-
-
-def _coefficients(study: Study, kinds: Sequence[type[Effect]]) -> Coefficients:
-    after = coefficients(possible_answers(study, kinds), study.campaign)
-    before = before_the_causes(study.nominal, after) if study.causes else after
-    windy, rig = "cn_beta" in before, study.campaign.rig
-    caveats = [effect_class(name).caveat for name in study.causes if name != "unknown"]
-    identified = _AS_IDENTIFIED if windy and not study.causes else ""
-    note = " ".join(filter(None, (*caveats, identified, size_note(rig, windy=windy))))
-    return Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), note)

@@ -11,7 +11,6 @@ import numpy as np
 
 from diagnosis.likelihood.nondimensional import REFERENCE_STIFFNESS
 from diagnosis.likelihood.problem import Point, Problem
-from diagnosis.likelihood.run_data import Data
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -375,6 +374,7 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     damping_load = max(
         (data.air_moment(run) * data.reference_length / run.wind_speed for run in windy), default=1.0
     )
+    inputs = [float(np.max(np.abs(run.drive.values))) for run in data.runs if run.drive is not None]
     scales = {
         "yaw_inertia": 0.1,
         "stiffness": 10.0,
@@ -384,7 +384,7 @@ def difference_steps(problem: Problem, common: Array) -> Array:
         "cn_r": _AIR_DAMPING / damping_load,
         "zero": 1.0,
         "moment_offset": REFERENCE_STIFFNESS * data.swing,
-        "drive_gain": _gain_scale(data),
+        "drive_gain": 1e-2 * REFERENCE_STIFFNESS * data.swing / max(inputs, default=1.0),
     }
     for kind in problem.effects:
         for info in kind.parameters():
@@ -394,14 +394,6 @@ def difference_steps(problem: Problem, common: Array) -> Array:
     _, upper = problem.bounds
     steps[common + steps > upper] *= -1.0
     return steps
-
-
-def _gain_scale(data: Data) -> float:
-    """A small gain of the input, by what it does on the reference spring, N m per unit."""
-    largest = max(
-        (float(np.max(np.abs(r.drive.values))) for r in data.runs if r.drive is not None), default=1.0
-    )
-    return 1e-2 * REFERENCE_STIFFNESS * data.swing / largest
 
 
 def sensitivities(

@@ -97,7 +97,12 @@ def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
     found = [one for one in driven if one is not None]
     losses = [2.0 * one[0] for one in found if one[0] > 0.0]
     loss = float(np.median(losses)) if losses else 0.01 * float(np.sqrt(typical))
-    gain: tuple[float, ...] = (_gain_start(data, driven),) if data.gain_free else ()
+    gains = [
+        response[2] / run.drive.scale
+        for run, response in zip(data.runs, driven, strict=True)
+        if response is not None and run.gain_free and run.drive is not None
+    ]
+    gain: tuple[float, ...] = ((float(np.median(gains)) if gains else 0.0),) if data.gain_free else ()
     if data.normalised:
         still = (0.0, 0.0) if data.wind_on else ()
         return Point(np.array([typical, loss, *still, *gain, *zero]), release)
@@ -147,16 +152,6 @@ def _unrestrained_start(data: Data, driven: Sequence[tuple[float, float, float] 
         [np.mean(run.reading[:3]), (run.reading[1] - run.reading[0]) / run.interval] for run in data.runs
     ]
     return Point(np.array([inertia, inertia * max(loss, _SLOW), 0.0]), np.array(release))
-
-
-def _gain_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> float:
-    """The gain of the input per unit inertia, by its median over the runs."""
-    gains = [
-        found[2] / run.drive.scale
-        for run, found in zip(data.runs, driven, strict=True)
-        if found is not None and run.gain_free and run.drive is not None
-    ]
-    return float(np.median(gains)) if gains else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -197,15 +197,11 @@ def gap_or_colour(
         believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None
         if believed if test.detected else not zero_wanders(nominal, found):
             return white, coloured, test
-    if plain.detected and not coarse_step and _within_step(nominal, noise, step):
+    blurred = max(noise.white(step).values()) >= 0.5 * step
+    power = nominal.excess * max(run.noise_variance for run in nominal.problem.data.runs)
+    if plain.detected and not coarse_step and not blurred and power < step**2 / 12.0:
         plain = replace(plain, detected=False, p_value=1.0, within_step=True)
     return nominal, noise, plain
-
-
-def _within_step(nominal: Fit, noise: Noise, step: float) -> bool:
-    """Whether the gap has no more power than readings that are off by up to half a step, with less noise."""
-    own = [run.noise_variance for run in nominal.problem.data.runs]
-    return max(noise.white(step).values()) < 0.5 * step and nominal.excess * max(own) < step**2 / 12.0
 
 
 def _colour_sources(nominal: Fit) -> Iterator[Fit]:

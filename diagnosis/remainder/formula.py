@@ -255,12 +255,22 @@ def _greedy(
 ) -> tuple[list[int], float]:
     """Terms added as long as each pays on held-out runs."""
     whole = total(parts)
+    c = whole.free
+    own = np.diag(whole.matrix)[c:]
     threshold = float(chdtri(1, FALSE_ALARM_RATE / count))
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
     while len(chosen) < _MOST_TERMS and gained < LAW_REACHES * closable:
-        drops = _drops(whole, chosen)
+        known = [*range(c), *(c + i for i in chosen)]
+        inner = whole.matrix[np.ix_(known, known)]
+        size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / size[:, None]
+        solved = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-11, hermitian=True) @ cross
+        left = own - np.sum(cross * solved, axis=0)
+        along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / size)
+        # what the others explain to within rounding gains nothing
+        drops = np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
         order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
         tried = []
         for i in order:
@@ -272,22 +282,6 @@ def _greedy(
         gained, best = max(tried)
         chosen.append(best)
     return chosen, gained
-
-
-def _drops(whole: Normal, chosen: Sequence[int]) -> Array:
-    """Drop of χ² by each further term, shape (terms,)."""
-    c = whole.free
-    known = [*range(c), *(c + i for i in chosen)]
-    inner = whole.matrix[np.ix_(known, known)]
-    size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / size[:, None]
-    inverse = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-11, hermitian=True)
-    solved = inverse @ cross
-    own = np.diag(whole.matrix)[c:]
-    left = own - np.sum(cross * solved, axis=0)
-    along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / size)
-    # what the others explain to within rounding gains nothing
-    return np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
 
 
 def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal | None:
