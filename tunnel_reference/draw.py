@@ -49,9 +49,15 @@ def draw_circumstances(
             while changed is found and name in certain:  # a wind speed that the springs kept do not have
                 changed = change(rng, found)
             found = changed
-    return (
-        _scaled(rng, found, mains) if rng.random() < (1.0 if "scaled" in certain else probability) else found
-    )
+    if rng.random() >= (1.0 if "scaled" in certain else probability):
+        return found
+    time = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(_TIME_SCALE)))
+    if mains:
+        time = float(np.clip(time, *_MAINS_SCALES))
+    # A moment scales as length⁵/time², a speed as length/time; the air is at most four times as fast as drawn.
+    top = min(_MOMENT_SCALE, _FASTER_AIR**5 * time**3)
+    moment = float(np.exp(rng.uniform(-np.log(_MOMENT_SCALE), np.log(top))))
+    return replace(found, time_scale=time, moment_scale=moment)
 
 
 def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:
@@ -78,17 +84,6 @@ def _uneven_stamps(rng: np.random.Generator, c: Conditions) -> Conditions:
     if rng.random() < 0.5:
         return replace(c, clock_jitter=float(rng.uniform(0.05, 0.5)), clock_seed=int(rng.integers(2**31)))
     return replace(c, stamp_step=float(rng.uniform(0.05, 0.5)) / c.sample_rate)
-
-
-def _scaled(rng: np.random.Generator, c: Conditions, mains: bool) -> Conditions:
-    """Another scale of time and of moments, such that the air is not faster than four times the drawn speed."""
-    time = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(_TIME_SCALE)))
-    if mains:
-        time = float(np.clip(time, *_MAINS_SCALES))
-    # A moment scales as length⁵/time², a speed as length/time.
-    top = min(_MOMENT_SCALE, _FASTER_AIR**5 * time**3)
-    moment = float(np.exp(rng.uniform(-np.log(_MOMENT_SCALE), np.log(top))))
-    return replace(c, time_scale=time, moment_scale=moment)
 
 
 NUMBERS = {"none": 0, "single": 1, "pair": 2, "three": 3, "four": 4}
@@ -186,9 +181,10 @@ def draw_campaign(
     number = NUMBERS.get(kind, 0)
     known = mixture.families
     names = draw_families(rng, number, families, known)
-    small = (
-        draw_families(rng, number + _small_number(rng, mixture.small), names, known)[number:] if names else ()
-    )
+    small: tuple[str, ...] = ()
+    if names:
+        added = 0 if rng.random() >= mixture.small else 1 + int(rng.random() < mixture.small)
+        small = draw_families(rng, number + added, names, known)[number:]
     conditions = draw_circumstances(
         rng,
         draw_conditions(rng),
@@ -197,10 +193,8 @@ def draw_campaign(
         certain=mixture.certain,
     )
     if mixture.driven:
-        by_root = "structural_damping" not in (
-            *names,
-            *small,
-        )  # whose law is that of a spring with a fixed root
+        # The law of structural damping is that of a spring with a fixed root.
+        by_root = "structural_damping" not in (*names, *small)
         conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
     effects = tuple(
         _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)
@@ -226,11 +220,6 @@ def draw_families(
     others = [name for name in known if name not in first]
     drawn = rng.choice(np.array(others), size=max(number - len(first), 0), replace=False)
     return (*first, *(str(name) for name in drawn))[:number]
-
-
-def _small_number(rng: np.random.Generator, probability: float) -> int:
-    """None, one or two."""
-    return 0 if rng.random() >= probability else 1 + int(rng.random() < probability)
 
 
 def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
@@ -264,8 +253,7 @@ def _draw_effect(
 
 def draw_conditions(rng: np.random.Generator) -> Conditions:
     """Draws springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, otherwise another plan."""
-    design = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
-    stiffness, speed, release = design
+    stiffness, speed, release = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
     duration = 10.0 if rng.random() < 0.85 else float(rng.choice([8.0, 12.0, 15.0, 20.0]))
     noise = float(rng.uniform(3e-4, 6e-4))
     start = release * (1.0 + 0.03 * rng.standard_normal(release.size))
@@ -316,8 +304,7 @@ def _other_design(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     big = float(rng.choice([10.0, 15.0, 20.0]))
     rows = [(float(k), float(v), big) for k in springs for v in speeds]
     rows += [(float(springs[0]), float(v), big * 0.4) for v in (speeds[0], speeds[-1])]
-    keep = rows[:16] if len(rows) > 16 else rows
-    return _columns(keep)
+    return _columns(rows[:16])
 
 
 def _columns(rows: Sequence[tuple[float, float, float]]) -> tuple[Array, Array, Array]:

@@ -48,13 +48,6 @@ def _rates(c: Conditions, p: Array) -> tuple[Array, Array, Array, Array]:
     return sigma, omega, d_sigma, d_omega
 
 
-def _basis(time: Array, sigma: Array, omega: Array) -> tuple[Array, Array]:
-    """e^(−σt) cos ωt and e^(−σt) sin ωt, each of shape (R, n)."""
-    decay = np.exp(-sigma[:, None] * time)
-    phase = omega[:, None] * time
-    return decay * np.cos(phase), decay * np.sin(phase)
-
-
 def _linear(cosine: Array, sine: Array, readings: Array) -> tuple[Array, Array, float]:
     """Amplitudes a, b per run and the common zero for given rates, by linear least squares."""
     runs, n = readings.shape
@@ -89,7 +82,9 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     kept: tuple[Array, float, Array, Array] | None = None
     for _ in range(_ITERATIONS):
         sigma, omega, d_sigma, d_omega = _rates(c, p)
-        cosine, sine = _basis(time, sigma, omega)
+        decay = np.exp(-sigma[:, None] * time)
+        phase = omega[:, None] * time
+        cosine, sine = decay * np.cos(phase), decay * np.sin(phase)  # shape (R, n)
         a, b, zero = _linear(cosine, sine, y)
         model = a[:, None] * cosine + b[:, None] * sine
         residual = y - model - zero

@@ -76,7 +76,14 @@ def read_motion(
     """
     noise = conditions.noise_std * rng.standard_normal(motion.angle.shape)
     if conditions.coloured_share > 0.0:
-        noise = _coloured(conditions, noise, rng)
+        n = noise.shape[0]  # the noise is mixed with noise of a first-order spectrum; the variance remains
+        frequency = np.fft.rfftfreq(n, 1.0 / conditions.sample_rate)
+        gain = 1.0 / np.sqrt(1.0 + (frequency / conditions.noise_corner) ** 2)
+        gain /= np.sqrt(np.mean(gain**2))
+        drawn = np.fft.rfft(conditions.noise_std * rng.standard_normal(noise.shape), axis=0)
+        slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
+        share = conditions.coloured_share
+        noise = np.sqrt(1.0 - share) * noise + np.sqrt(share) * slow
     motion = _at_stamps(conditions, motion)
     value = motion.angle
     ordered = sorted(terms, key=lambda t: t.order)
@@ -90,17 +97,6 @@ def read_motion(
     for term in (t for t in ordered if t.order is Order.LINE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
     return value
-
-
-def _coloured(c: Conditions, white: Array, rng: np.random.Generator) -> Array:
-    """White noise mixed with noise of a first-order spectrum; the variance remains."""
-    n = white.shape[0]
-    frequency = np.fft.rfftfreq(n, 1.0 / c.sample_rate)
-    gain = 1.0 / np.sqrt(1.0 + (frequency / c.noise_corner) ** 2)
-    gain /= np.sqrt(np.mean(gain**2))
-    drawn = np.fft.rfft(c.noise_std * rng.standard_normal(white.shape), axis=0)
-    slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
-    return np.asarray(np.sqrt(1.0 - c.coloured_share) * white + np.sqrt(c.coloured_share) * slow)
 
 
 def _at_stamps(c: Conditions, motion: Motion) -> Motion:
