@@ -129,7 +129,12 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     )
     weight = np.zeros((3, 3))
     weight[np.ix_(places, places)] = eliminate(found.normal, np.zeros(len(found.normal)), len(places))[0]
-    offset = _offset(found, variance, drive.unit) if drifts else None
+    offset = None
+    if drifts:  # the constant acceleration, over the gain
+        gain, constant = float(found.parameters[1]), float(found.own[0, 0])
+        slope = np.array([0.0, -constant / gain**2, 1.0 / gain, 0.0, 0.0])
+        std = float(np.sqrt(slope @ inverse(found.normal) @ slope * variance))
+        offset = Quantity(constant / gain, std, drive.unit)
     gained = Gained(coefficients, weight / variance, offset)
     return DrivenRun(reading, fit if estimate.identified else None, noise, estimate, gained)
 
@@ -150,13 +155,6 @@ def _as_run_fit(found: InputFit, coefficients: Array, places: Sequence[int]) -> 
     decay = Decay(float(coefficients[0]), float(coefficients[1]))
     angle, rate = found.own[0, 1:].tolist()
     return RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
-
-
-def _offset(found: InputFit, variance: float, unit: str) -> Quantity:
-    """The constant acceleration of a body without a spring, over the gain."""
-    gain, constant = float(found.parameters[1]), float(found.own[0, 0])
-    slope = np.array([0.0, -constant / gain**2, 1.0 / gain, 0.0, 0.0])
-    return Quantity(constant / gain, float(np.sqrt(slope @ inverse(found.normal) @ slope * variance)), unit)
 
 
 def fit_with_inputs(
@@ -190,7 +188,13 @@ def fit_with_inputs(
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:
             break
-        moved, moved_own = _moved(parameters, own, step, own_zeros)
+        size = parameters.size
+        moved, moved_own = parameters + step[:size], own.copy()
+        if own_zeros:
+            moved_own += step[size:].reshape(-1, _OWN)
+        else:
+            moved_own[:, 0] += step[size]
+            moved_own[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
             trial = normal_equations(runs, links, moved, moved_own, own_zeros=own_zeros)
             after = sum(float(r @ r) for r in trial[0])
@@ -207,17 +211,6 @@ def fit_with_inputs(
         if converged:
             break
     return InputFit(parameters, own, residuals, normal, converged)
-
-
-def _moved(parameters: Array, own: Array, step: Array, own_zeros: bool) -> tuple[Array, Array]:
-    size = parameters.size
-    changed = own.copy()
-    if own_zeros:
-        changed += step[size:].reshape(-1, _OWN)
-    else:
-        changed[:, 0] += step[size]
-        changed[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
-    return parameters + step[:size], changed
 
 
 def normal_equations(
