@@ -42,14 +42,25 @@ def draw_circumstances(
     Returns:
         Conditions of a rig of another scale, with few springs and speeds, coloured noise, or uneven time stamps.
     """
+
+    def occurs(name: str) -> bool:
+        return rng.random() < (1.0 if name in certain else probability)
+
     found = conditions
-    for name, change in zip(CIRCUMSTANCES, (_few_runs, _coloured, _uneven_stamps), strict=False):
-        if rng.random() < (1.0 if name in certain else probability):
-            changed = change(rng, found)
-            while changed is found and name in certain:  # a wind speed that the springs kept do not have
-                changed = change(rng, found)
-            found = changed
-    if rng.random() >= (1.0 if "scaled" in certain else probability):
+    if occurs("few_runs"):
+        found = _few_runs(rng, conditions)
+        while found is conditions and "few_runs" in certain:  # a wind speed that the springs kept do not have
+            found = _few_runs(rng, conditions)
+    if occurs("coloured"):  # half or more of the noise's power falls off above a corner frequency
+        corner = float(np.exp(rng.uniform(np.log(3.0), np.log(100.0))))
+        found = replace(found, noise_corner=corner, coloured_share=float(rng.uniform(0.5, 0.95)))
+    if occurs("uneven_stamps"):
+        if rng.random() < 0.5:  # samples taken late by part of an interval and stamped when taken
+            jitter = float(rng.uniform(0.05, 0.5))
+            found = replace(found, clock_jitter=jitter, clock_seed=int(rng.integers(2**31)))
+        else:  # even samples with rounded stamps
+            found = replace(found, stamp_step=float(rng.uniform(0.05, 0.5)) / found.sample_rate)
+    if not occurs("scaled"):
         return found
     time = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(_TIME_SCALE)))
     if mains:
@@ -71,19 +82,6 @@ def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:
         return c
     by_run = {name: value[keep] for name, value in vars(c).items() if np.shape(value) == keep.shape}
     return replace(c, **by_run)
-
-
-def _coloured(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Half or more of the noise's power falls off above a corner frequency."""
-    corner = float(np.exp(rng.uniform(np.log(3.0), np.log(100.0))))
-    return replace(c, noise_corner=corner, coloured_share=float(rng.uniform(0.5, 0.95)))
-
-
-def _uneven_stamps(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Samples taken late by part of an interval and stamped when taken, or even samples with rounded stamps."""
-    if rng.random() < 0.5:
-        return replace(c, clock_jitter=float(rng.uniform(0.05, 0.5)), clock_seed=int(rng.integers(2**31)))
-    return replace(c, stamp_step=float(rng.uniform(0.05, 0.5)) / c.sample_rate)
 
 
 NUMBERS = {"none": 0, "single": 1, "pair": 2, "three": 3, "four": 4}

@@ -84,7 +84,18 @@ def read_motion(
         slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
         share = conditions.coloured_share
         noise = np.sqrt(1.0 - share) * noise + np.sqrt(share) * slow
-    motion = _at_stamps(conditions, motion)
+    if (
+        conditions.clock_jitter != 0.0
+    ):  # the motion when the samples were taken, by cubic Hermite interpolation
+        n, interval = motion.angle.shape[0], 1.0 / conditions.sample_rate
+        u = (conditions.time[:n] / interval - np.arange(n))[:, None]
+        after = np.minimum(np.arange(n) + 1, n - 1)
+        a, b = motion.angle, motion.angle[after]
+        ra, rb = motion.rate * interval, motion.rate[after] * interval
+        angle = (1 + 2 * u) * (1 - u) ** 2 * a + u * (1 - u) ** 2 * ra
+        angle = angle + u * u * (3 - 2 * u) * b + u * u * (u - 1) * rb
+        angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
+        motion = Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
     value = motion.angle
     ordered = sorted(terms, key=lambda t: t.order)
     for term in (t for t in ordered if t.order < Order.NOISE):
@@ -97,21 +108,6 @@ def read_motion(
     for term in (t for t in ordered if t.order is Order.LINE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
     return value
-
-
-def _at_stamps(c: Conditions, motion: Motion) -> Motion:
-    """The motion when the samples were taken, by cubic Hermite interpolation."""
-    if c.clock_jitter == 0.0:
-        return motion
-    n, interval = motion.angle.shape[0], 1.0 / c.sample_rate
-    u = (c.time[:n] / interval - np.arange(n))[:, None]
-    after = np.minimum(np.arange(n) + 1, n - 1)
-    a, b = motion.angle, motion.angle[after]
-    ra, rb = motion.rate * interval, motion.rate[after] * interval
-    angle = (1 + 2 * u) * (1 - u) ** 2 * a + u * (1 - u) ** 2 * ra
-    angle = angle + u * u * (3 - 2 * u) * b + u * u * (u - 1) * rb
-    angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
-    return Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
 
 
 # ---- linkage

@@ -118,7 +118,17 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
         return _failed(run, reading, Status.NOT_CONVERGED)
     if not determined(found.normal):
         return _failed(run, reading, Status.NOT_DETERMINED)
-    fit = _as_run_fit(found, coefficients, places)
+    # In the order of free runs: the gain eliminated, and a known k with a row of its own.
+    size, kept = len(places), sum(place < 2 for place in places)
+    order = [*range(kept), *range(size, size + _OWN), *range(kept, size)]
+    normal = found.normal[np.ix_(order, order)]
+    if size > kept:
+        normal = eliminate(normal, np.zeros(len(order)), kept + _OWN)[0]
+    information, at = np.eye(2 + _OWN), [*range(kept), 2, 3, 4]
+    information[np.ix_(at, at)] = normal
+    decay = Decay(float(coefficients[0]), float(coefficients[1]))
+    angle, rate = found.own[0, 1:].tolist()
+    fit = RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
     zero = float(reading.yaw.mean()) if drifts else float(found.own[0, 0])
     noise, failure = noise_and_failure(reading, fit, zero, sensor)
     if failure is not None:
@@ -141,20 +151,6 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
     return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))
-
-
-def _as_run_fit(found: InputFit, coefficients: Array, places: Sequence[int]) -> RunFit:
-    """The fit in the order of free runs: the gain eliminated, and a known k with a row of its own."""
-    size, kept = len(places), sum(place < 2 for place in places)
-    order = [*range(kept), *range(size, size + _OWN), *range(kept, size)]
-    normal = found.normal[np.ix_(order, order)]
-    if size > kept:
-        normal = eliminate(normal, np.zeros(len(order)), kept + _OWN)[0]
-    information, at = np.eye(2 + _OWN), [*range(kept), 2, 3, 4]
-    information[np.ix_(at, at)] = normal
-    decay = Decay(float(coefficients[0]), float(coefficients[1]))
-    angle, rate = found.own[0, 1:].tolist()
-    return RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
 
 
 def fit_with_inputs(
