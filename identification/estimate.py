@@ -350,11 +350,7 @@ def estimate_schema() -> dict[str, Any]:
 
 
 def as_pandas(frame: pl.DataFrame) -> DataFrame:
-    """A frame for pandas, by its columns: Polars' own way needs pyarrow.
-
-    Raises:
-        TunnelError: where pandas is not installed.
-    """
+    """A frame for pandas, by its columns: Polars' own way needs pyarrow."""
     try:
         from pandas import DataFrame  # only here: an extra
     except ModuleNotFoundError as error:

@@ -169,9 +169,6 @@ def draw_campaign(
         rng: source of all random numbers.
         kind: one of ``KINDS``.
         families: of the first effects that matter; the others are drawn.
-
-    Raises:
-        ValueError: for an unknown kind.
     """
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")

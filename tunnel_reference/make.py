@@ -169,9 +169,6 @@ def parse_shares(text: str) -> dict[str, float]:
     """Parse kinds with optional weights, such as ``single:3,none``.
 
     The default weights are `DEFAULT_SHARES`, and 1 for a kind that is not among them.
-
-    Raises:
-        TunnelError: for an unknown kind or a weight that is not a positive number.
     """
     shares: dict[str, float] = {}
     for item in text.split(","):

@@ -345,11 +345,7 @@ class Checkpoint:
 
 
 def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
-    """Read the checkpoint of a training; None where there is none, or it belongs to another training.
-
-    Raises:
-        TunnelError: when the file exists but cannot be read.
-    """
+    """Read the checkpoint of a training; None where there is none, or it belongs to another training."""
     return Checkpoint.from_bytes(read_regular(path, limits.WEIGHTS_BYTES), spec) if path.exists() else None
 
 

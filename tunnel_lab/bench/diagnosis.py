@@ -432,11 +432,7 @@ class ReportPage:
 
 
 def write_session_report(session: Session, author: str, notes: str) -> None:
-    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does.
-
-    Raises:
-        TunnelError: when it cannot be written.
-    """
+    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does."""
     from diagnosis.diagnosable import diagnosable
     from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_folder import read_campaign

@@ -331,11 +331,7 @@ class Curves:
 
 
 def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
-    """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``.
-
-    Raises:
-        TunnelError: for a run that the diagnosis does not have.
-    """
+    """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
     maps = document.get("maps") or {"runs": [], "traces": []}
     unit, factor = unit_shown(maps.get("unit", "rad"))
     labels = {run["id"]: run_label(run) for run in maps["runs"]}
