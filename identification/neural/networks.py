@@ -306,7 +306,7 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> NetworkErro
 
 
 def read_stored(weights: Path) -> tuple[bytes, bytes]:
-    """Weights and record that ``tunnel train`` wrote: a safetensors file and the ``.json`` of its name beside it."""
+    """Weights and record of ``tunnel train``: a safetensors file, and the ``.json`` of its name beside it."""
     remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
     content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
     beside = weights.with_suffix(".json")
