@@ -191,14 +191,16 @@ def draw_campaign(
         # The law of structural damping is that of a spring with a fixed root.
         by_root = "structural_damping" not in (*names, *small)
         conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
-    effects = tuple(
-        _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)
-        for name in (*names, *small)
-    )
+    effects = []
+    for name in (*names, *small):
+        forms, textbook = forms_of(name), rng.random() < mixture.textbook
+        others = _pool(forms, rng, mixture)
+        form = forms[0] if textbook or not others else others[int(rng.integers(len(others)))]
+        effects.append(_draw_effect(rng, form, conditions, small=name in small))
     if kind in BEYOND:
         pool = _pool(BEYOND[kind], rng, mixture)
-        effects = (_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions),)
-    return CampaignDraw(kind, conditions, effects, int(rng.integers(2**62)), mixture)
+        effects = [_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions)]
+    return CampaignDraw(kind, conditions, tuple(effects), int(rng.integers(2**62)), mixture)
 
 
 def redraw(draw: CampaignDraw) -> CampaignDraw:
@@ -222,16 +224,6 @@ def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> 
     group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
     other = Group.COMMON
     return [f for f in forms if f.group is group] or [f for f in forms if f.group is other]
-
-
-def _draw_form(rng: np.random.Generator, family: str, mixture: Mixture) -> Form:
-    """A form of the family."""
-    forms = forms_of(family)
-    textbook = rng.random() < mixture.textbook
-    others = _pool(forms, rng, mixture)
-    if textbook or not others:
-        return forms[0]
-    return others[int(rng.integers(len(others)))]
 
 
 def _draw_effect(

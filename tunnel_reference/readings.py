@@ -84,16 +84,13 @@ def read_motion(
         slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
         share = conditions.coloured_share
         noise = np.sqrt(1.0 - share) * noise + np.sqrt(share) * slow
-    if (
-        conditions.clock_jitter != 0.0
-    ):  # the motion when the samples were taken, by cubic Hermite interpolation
+    if conditions.clock_jitter != 0.0:  # the motion when the samples were taken
         n, interval = motion.angle.shape[0], 1.0 / conditions.sample_rate
         u = (conditions.time[:n] / interval - np.arange(n))[:, None]
         after = np.minimum(np.arange(n) + 1, n - 1)
         a, b = motion.angle, motion.angle[after]
         ra, rb = motion.rate * interval, motion.rate[after] * interval
-        angle = (1 + 2 * u) * (1 - u) ** 2 * a + u * (1 - u) ** 2 * ra
-        angle = angle + u * u * (3 - 2 * u) * b + u * u * (u - 1) * rb
+        angle = _hermite(u, a, b, ra, rb)
         angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
         motion = Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
     value = motion.angle
@@ -110,6 +107,16 @@ def read_motion(
     return value
 
 
+def _hermite(u: Array, a: Array, b: Array, ra: Array, rb: Array) -> Array:
+    """The cubic from a to b at the share u of an interval; ra and rb are the rates times the interval."""
+    return (
+        (1 + 2 * u) * (1 - u) ** 2 * a
+        + u * (1 - u) ** 2 * ra
+        + u * u * (3 - 2 * u) * b
+        + u * u * (u - 1) * rb
+    )
+
+
 # ---- linkage
 
 _PLAY_STEPS = 8
@@ -120,12 +127,7 @@ def _fine_path(motion: Motion, interval: float) -> Array:
     u = (np.arange(_PLAY_STEPS) / _PLAY_STEPS)[None, :, None]
     a, b = motion.angle[:-1, None], motion.angle[1:, None]
     ra, rb = motion.rate[:-1, None] * interval, motion.rate[1:, None] * interval
-    inner = (
-        (1 + 2 * u) * (1 - u) ** 2 * a
-        + u * (1 - u) ** 2 * ra
-        + u * u * (3 - 2 * u) * b
-        + u * u * (u - 1) * rb
-    )
+    inner = _hermite(u, a, b, ra, rb)
     return np.concatenate([inner.reshape(-1, motion.angle.shape[1]), motion.angle[-1:]])
 
 
