@@ -74,11 +74,7 @@ DRIVEN_ESTIMATORS = ("output_error", "filter_error", "bayesian", "frequency_resp
 
 
 def refuse_driven(campaign: Campaign, name: str) -> None:
-    """Refuse driven runs that an estimator, by its name, would take for free decays.
-
-    Raises:
-        TunnelError: naming the first such run.
-    """
+    """Refuse driven runs that an estimator, by its name, would take for free decays."""
     for run in campaign.runs:
         if run.drive is None:
             continue

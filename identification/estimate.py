@@ -247,7 +247,18 @@ class Estimate:
     def coefficients_frame(self) -> pl.DataFrame:
         """A row for each coefficient: value, std, unit, and the ends low and high of its 95 % interval."""
         document = self.to_json_dict()
-        return long_frame({name: document[name] for name in _CAMPAIGN_QUANTITIES})
+        rows = []
+        for name in _CAMPAIGN_QUANTITIES:
+            given = document[name]
+            row: dict[str, Any] = {"quantity": name}
+            if given is not None:
+                reach = 1.96 * given["std"]
+                low, high = given.get("interval") or (given["value"] - reach, given["value"] + reach)
+                row |= {key: given[key] for key in ("value", "std", "unit")} | {"low": low, "high": high}
+            rows.append(row)
+        numbers = dict.fromkeys(("value", "std"), pl.Float64)
+        ends = dict.fromkeys(("low", "high"), pl.Float64)
+        return pl.DataFrame(rows, schema={"quantity": pl.String, **numbers, "unit": pl.String, **ends})
 
     def to_frame(self) -> pl.DataFrame:
         """`coefficients_frame`, or `runs_frame` where the runs give no coefficients."""
@@ -350,36 +361,13 @@ def estimate_schema() -> dict[str, Any]:
 
 
 def as_pandas(frame: pl.DataFrame) -> DataFrame:
-    """A frame for pandas, by its columns: Polars' own way needs pyarrow.
-
-    Raises:
-        TunnelError: where pandas is not installed.
-    """
+    """A frame for pandas, by its columns: Polars' own way needs pyarrow."""
     try:
         from pandas import DataFrame  # only here: an extra
     except ModuleNotFoundError as error:
         remedy = "pip install 'virtual-wind-tunnel[frames]'"
         raise TunnelError("pandas is not installed", remedy=remedy) from error
     return DataFrame(frame.to_dict(as_series=False))
-
-
-def long_frame(quantities: Mapping[str, Mapping[str, Any] | None]) -> pl.DataFrame:
-    """A row for each quantity: columns quantity, value, std, unit, and low and high, the ends of its 95 % interval.
-
-    Args:
-        quantities: value, std, unit and perhaps interval by name; None where there is none, which gives nulls.
-    """
-    rows = []
-    for name, given in quantities.items():
-        row: dict[str, Any] = {"quantity": name}
-        if given is not None:
-            reach = 1.96 * given["std"]
-            low, high = given.get("interval") or (given["value"] - reach, given["value"] + reach)
-            row |= {key: given[key] for key in ("value", "std", "unit")} | {"low": low, "high": high}
-        rows.append(row)
-    numbers = dict.fromkeys(("value", "std"), pl.Float64)
-    ends = dict.fromkeys(("low", "high"), pl.Float64)
-    return pl.DataFrame(rows, schema={"quantity": pl.String, **numbers, "unit": pl.String, **ends})
 
 
 def wide_frame(

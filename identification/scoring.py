@@ -233,8 +233,23 @@ def changes(before: Sequence[Trials], now: Sequence[Trials]) -> tuple[Change, ..
             failures[side] += trials.failures, trials.count
             covered[side] += trials.covered, trials.error.size
             beyond[side] += int(np.sum(np.abs(errors[side]) > limit)), trials.error.size
+    turned, sizes, means = [], [], []
+    for old_errors, new_errors in scaled:
+        both = np.concatenate((old_errors, new_errors))
+        # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
+        direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
+        turned.append((direction * old_errors, direction * new_errors))
+        sizes.append((np.abs(old_errors), np.abs(new_errors)))
+    for side in (0, 1):
+        cells = [abs(float(pair[side].mean())) for pair in scaled if pair[side].size]
+        means.append(float(np.mean(cells)) if cells else 0.0)
+    every = [np.concatenate([pair[side] for pair in scaled]) if scaled else np.zeros(0) for side in (0, 1)]
+    rms = [float(np.sqrt(np.mean(errors**2))) if errors.size else 0.0 for errors in every]
+    least_bias = means[0] + (LEAST_CHANGE * rms[0] if same else 0.0)
+    least_rms = rms[0] * (1.0 + LEAST_CHANGE if same else 1.0)
     return (
-        *_errors(scaled, same),
+        Change("bias", means[0], means[1], _larger(turned, same) if means[1] > least_bias else 1.0),
+        Change("spread", rms[0], rms[1], _larger(sizes, same) if rms[1] > least_rms else 1.0),
         _share("outliers", beyond, larger_is_worse=True),
         _share("coverage", covered, larger_is_worse=False),
         _share("failures", failures, larger_is_worse=True),
@@ -254,26 +269,6 @@ def holm(p_values: Sequence[float], rate: float = DIFFERENCE_RATE) -> tuple[bool
             break
         verdicts[place] = True
     return tuple(verdicts)
-
-
-def _errors(scaled: Sequence[tuple[Array, Array]], same: bool) -> tuple[Change, Change]:
-    """The changes of bias and of spread."""
-    turned, sizes, means = [], [], []
-    for old, new in scaled:
-        both = np.concatenate((old, new))
-        # The direction of a cell is that of all its errors, old and new: a move in this direction is worse.
-        direction = 1.0 if both.size == 0 or both.mean() >= 0.0 else -1.0
-        turned.append((direction * old, direction * new))
-        sizes.append((np.abs(old), np.abs(new)))
-    for side in (0, 1):
-        cells = [abs(float(pair[side].mean())) for pair in scaled if pair[side].size]
-        means.append(float(np.mean(cells)) if cells else 0.0)
-    every = [np.concatenate([pair[side] for pair in scaled]) if scaled else np.zeros(0) for side in (0, 1)]
-    before, now = (float(np.sqrt(np.mean(errors**2))) if errors.size else 0.0 for errors in every)
-    least = means[0] + (LEAST_CHANGE * before if same else 0.0)
-    bias = Change("bias", means[0], means[1], _larger(turned, same) if means[1] > least else 1.0)
-    least = before * (1.0 + LEAST_CHANGE if same else 1.0)
-    return bias, Change("spread", before, now, _larger(sizes, same) if now > least else 1.0)
 
 
 def _share(aspect: Aspect, counts: NDArray[np.int64], *, larger_is_worse: bool) -> Change:

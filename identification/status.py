@@ -151,11 +151,7 @@ class Examined:
     remarks: tuple[Remark, ...] = ()
 
     def accepted(self) -> Examined:
-        """Return itself, unless the examination refuses the campaign.
-
-        Raises:
-            TunnelError: for the first remark that refuses it.
-        """
+        """Return itself, unless the examination refuses the campaign."""
         for remark in self.remarks:
             if remark.outcome is Outcome.REFUSED:
                 word = "run" if len(remark.runs) == 1 else "runs"

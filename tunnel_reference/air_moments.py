@@ -19,15 +19,6 @@ def _length(conditions: Conditions) -> int:
     return round(conditions.duration * RATE) + 2
 
 
-def _shaped(rng: np.random.Generator, n: int, power: Array) -> Array:
-    """Gaussian noise of unit variance whose power spectrum over rfft bins is proportional to ``power``."""
-    spectrum = np.sqrt(power) * (rng.standard_normal(power.size) + 1j * rng.standard_normal(power.size))
-    spectrum[0] = 0.0
-    series = np.fft.irfft(spectrum, n)
-    expected = np.sqrt(2.0 * np.sum(power[1:]) * 2.0) / n
-    return np.asarray(series / expected, dtype=np.float64)
-
-
 def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) -> Array:
     """Series of unit variance for every run (zero with the wind off), shape (runs, n).
 
@@ -51,7 +42,10 @@ def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) ->
             power = 1.0 / (1.0 + (2.0 * np.pi * reduced) ** 2)
         else:
             power = 1.0 / (1.0 + 70.8 * reduced**2) ** (5.0 / 6.0)
-        out[run] = _shaped(rng, n, power)
+        spectrum = np.sqrt(power) * (rng.standard_normal(power.size) + 1j * rng.standard_normal(power.size))
+        spectrum[0] = 0.0
+        series = np.fft.irfft(spectrum, n)
+        out[run] = series / (np.sqrt(2.0 * np.sum(power[1:]) * 2.0) / n)
     return out[:, : _length(conditions)]
 
 

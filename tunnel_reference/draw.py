@@ -42,16 +42,33 @@ def draw_circumstances(
     Returns:
         Conditions of a rig of another scale, with few springs and speeds, coloured noise, or uneven time stamps.
     """
+
+    def occurs(name: str) -> bool:
+        return rng.random() < (1.0 if name in certain else probability)
+
     found = conditions
-    for name, change in zip(CIRCUMSTANCES, (_few_runs, _coloured, _uneven_stamps), strict=False):
-        if rng.random() < (1.0 if name in certain else probability):
-            changed = change(rng, found)
-            while changed is found and name in certain:  # a wind speed that the springs kept do not have
-                changed = change(rng, found)
-            found = changed
-    return (
-        _scaled(rng, found, mains) if rng.random() < (1.0 if "scaled" in certain else probability) else found
-    )
+    if occurs("few_runs"):
+        found = _few_runs(rng, conditions)
+        while found is conditions and "few_runs" in certain:  # a wind speed that the springs kept do not have
+            found = _few_runs(rng, conditions)
+    if occurs("coloured"):  # half or more of the noise's power falls off above a corner frequency
+        corner = float(np.exp(rng.uniform(np.log(3.0), np.log(100.0))))
+        found = replace(found, noise_corner=corner, coloured_share=float(rng.uniform(0.5, 0.95)))
+    if occurs("uneven_stamps"):
+        if rng.random() < 0.5:  # samples taken late by part of an interval and stamped when taken
+            jitter = float(rng.uniform(0.05, 0.5))
+            found = replace(found, clock_jitter=jitter, clock_seed=int(rng.integers(2**31)))
+        else:  # even samples with rounded stamps
+            found = replace(found, stamp_step=float(rng.uniform(0.05, 0.5)) / found.sample_rate)
+    if not occurs("scaled"):
+        return found
+    time = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(_TIME_SCALE)))
+    if mains:
+        time = float(np.clip(time, *_MAINS_SCALES))
+    # A moment scales as length⁵/time², a speed as length/time; the air is at most four times as fast as drawn.
+    top = min(_MOMENT_SCALE, _FASTER_AIR**5 * time**3)
+    moment = float(np.exp(rng.uniform(-np.log(_MOMENT_SCALE), np.log(top))))
+    return replace(found, time_scale=time, moment_scale=moment)
 
 
 def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:
@@ -65,30 +82,6 @@ def _few_runs(rng: np.random.Generator, c: Conditions) -> Conditions:
         return c
     by_run = {name: value[keep] for name, value in vars(c).items() if np.shape(value) == keep.shape}
     return replace(c, **by_run)
-
-
-def _coloured(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Half or more of the noise's power falls off above a corner frequency."""
-    corner = float(np.exp(rng.uniform(np.log(3.0), np.log(100.0))))
-    return replace(c, noise_corner=corner, coloured_share=float(rng.uniform(0.5, 0.95)))
-
-
-def _uneven_stamps(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Samples taken late by part of an interval and stamped when taken, or even samples with rounded stamps."""
-    if rng.random() < 0.5:
-        return replace(c, clock_jitter=float(rng.uniform(0.05, 0.5)), clock_seed=int(rng.integers(2**31)))
-    return replace(c, stamp_step=float(rng.uniform(0.05, 0.5)) / c.sample_rate)
-
-
-def _scaled(rng: np.random.Generator, c: Conditions, mains: bool) -> Conditions:
-    """Another scale of time and of moments, such that the air is not faster than four times the drawn speed."""
-    time = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(_TIME_SCALE)))
-    if mains:
-        time = float(np.clip(time, *_MAINS_SCALES))
-    # A moment scales as length⁵/time², a speed as length/time.
-    top = min(_MOMENT_SCALE, _FASTER_AIR**5 * time**3)
-    moment = float(np.exp(rng.uniform(-np.log(_MOMENT_SCALE), np.log(top))))
-    return replace(c, time_scale=time, moment_scale=moment)
 
 
 NUMBERS = {"none": 0, "single": 1, "pair": 2, "three": 3, "four": 4}
@@ -176,9 +169,6 @@ def draw_campaign(
         rng: source of all random numbers.
         kind: one of ``KINDS``.
         families: of the first effects that matter; the others are drawn.
-
-    Raises:
-        ValueError: for an unknown kind.
     """
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
@@ -186,9 +176,10 @@ def draw_campaign(
     number = NUMBERS.get(kind, 0)
     known = mixture.families
     names = draw_families(rng, number, families, known)
-    small = (
-        draw_families(rng, number + _small_number(rng, mixture.small), names, known)[number:] if names else ()
-    )
+    small: tuple[str, ...] = ()
+    if names:
+        added = 0 if rng.random() >= mixture.small else 1 + int(rng.random() < mixture.small)
+        small = draw_families(rng, number + added, names, known)[number:]
     conditions = draw_circumstances(
         rng,
         draw_conditions(rng),
@@ -197,19 +188,19 @@ def draw_campaign(
         certain=mixture.certain,
     )
     if mixture.driven:
-        by_root = "structural_damping" not in (
-            *names,
-            *small,
-        )  # whose law is that of a spring with a fixed root
+        # The law of structural damping is that of a spring with a fixed root.
+        by_root = "structural_damping" not in (*names, *small)
         conditions = draw_inputs(rng, replace(conditions, clock_jitter=0.0), by_root=by_root)
-    effects = tuple(
-        _draw_effect(rng, _draw_form(rng, name, mixture), conditions, small=name in small)
-        for name in (*names, *small)
-    )
+    effects = []
+    for name in (*names, *small):
+        forms, textbook = forms_of(name), rng.random() < mixture.textbook
+        others = _pool(forms, rng, mixture)
+        form = forms[0] if textbook or not others else others[int(rng.integers(len(others)))]
+        effects.append(_draw_effect(rng, form, conditions, small=name in small))
     if kind in BEYOND:
         pool = _pool(BEYOND[kind], rng, mixture)
-        effects = (_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions),)
-    return CampaignDraw(kind, conditions, effects, int(rng.integers(2**62)), mixture)
+        effects = [_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions)]
+    return CampaignDraw(kind, conditions, tuple(effects), int(rng.integers(2**62)), mixture)
 
 
 def redraw(draw: CampaignDraw) -> CampaignDraw:
@@ -228,26 +219,11 @@ def draw_families(
     return (*first, *(str(name) for name in drawn))[:number]
 
 
-def _small_number(rng: np.random.Generator, probability: float) -> int:
-    """None, one or two."""
-    return 0 if rng.random() >= probability else 1 + int(rng.random() < probability)
-
-
 def _pool(forms: Sequence[Form], rng: np.random.Generator, mixture: Mixture) -> list[Form]:
     """The common or the rare forms, as drawn from the mixture; not empty unless there are none at all."""
     group = Group.RARE if rng.random() < mixture.rare else Group.COMMON
     other = Group.COMMON
     return [f for f in forms if f.group is group] or [f for f in forms if f.group is other]
-
-
-def _draw_form(rng: np.random.Generator, family: str, mixture: Mixture) -> Form:
-    """A form of the family."""
-    forms = forms_of(family)
-    textbook = rng.random() < mixture.textbook
-    others = _pool(forms, rng, mixture)
-    if textbook or not others:
-        return forms[0]
-    return others[int(rng.integers(len(others)))]
 
 
 def _draw_effect(
@@ -264,8 +240,7 @@ def _draw_effect(
 
 def draw_conditions(rng: np.random.Generator) -> Conditions:
     """Draws springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, otherwise another plan."""
-    design = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
-    stiffness, speed, release = design
+    stiffness, speed, release = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
     duration = 10.0 if rng.random() < 0.85 else float(rng.choice([8.0, 12.0, 15.0, 20.0]))
     noise = float(rng.uniform(3e-4, 6e-4))
     start = release * (1.0 + 0.03 * rng.standard_normal(release.size))
@@ -316,8 +291,7 @@ def _other_design(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     big = float(rng.choice([10.0, 15.0, 20.0]))
     rows = [(float(k), float(v), big) for k in springs for v in speeds]
     rows += [(float(springs[0]), float(v), big * 0.4) for v in (speeds[0], speeds[-1])]
-    keep = rows[:16] if len(rows) > 16 else rows
-    return _columns(keep)
+    return _columns(rows[:16])
 
 
 def _columns(rows: Sequence[tuple[float, float, float]]) -> tuple[Array, Array, Array]:

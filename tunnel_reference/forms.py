@@ -8,15 +8,12 @@ from pkgutil import iter_modules
 import tunnel_reference
 from tunnel_reference.catalogue import NOT_DRIVEN, Form
 
-
-def _found() -> tuple[Form, ...]:
-    """``FORMS`` of every module of this package whose name begins with ``forms_``."""
-    names = [module.name for module in iter_modules(tunnel_reference.__path__)]
-    modules = [import_module(f"tunnel_reference.{name}") for name in names if name.startswith("forms_")]
-    return tuple(form for module in modules for form in module.FORMS)
-
-
-FORMS: tuple[Form, ...] = _found()
+_MODULES = [
+    import_module(f"tunnel_reference.{module.name}")
+    for module in iter_modules(tunnel_reference.__path__)
+    if module.name.startswith("forms_")
+]
+FORMS: tuple[Form, ...] = tuple(form for module in _MODULES for form in module.FORMS)
 FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS if not form.driven}))
 DRIVEN_FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS} - NOT_DRIVEN))
 """Of driven runs."""

@@ -50,11 +50,6 @@ def _wagner(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
     return {"w1": e["w1"], "w2": 1.0 - e["w1"], "tau1": lag_time(p, c), "tau2": lag_time(p * e["ratio"], c)}
 
 
-def _speed_power(c: Conditions, exponent: float) -> Array:
-    """(V/20)^n where the wind is on, 1 elsewhere."""
-    return np.where(c.wind_on, c.true_speed / 20.0, 1.0) ** exponent
-
-
 _SPEED = (
     Form("unsteady_aero_lag", "lag", T, "a, l/V", 0.2,
          moving(m.lag_one, Phase.ANGLE, lambda p, _e, c: {"w1": 1.0, "tau1": lag_time(p, c)}, states=1)),
@@ -84,7 +79,8 @@ _SPEED = (
          moving(m.steady_moment, Phase.MOMENT, lambda p, _e, c: {"moment": c.air_stiffness * p}), _BOTH),
     Form("flow_misalignment", "speed_dependent", C, "βf, rad", 0.01,
          moving(m.steady_moment, Phase.MOMENT,
-                lambda p, e, c: {"moment": c.air_stiffness * p * _speed_power(c, e["exponent"])}), _BOTH,
+                lambda p, e, c: {"moment": c.air_stiffness * p * np.where(c.wind_on, c.true_speed / 20.0, 1.0)
+                                 ** e["exponent"]}), _BOTH,
          draw=lambda g, _c: {"exponent": g.uniform(-0.6, 0.6)}),
 )  # fmt: skip
 

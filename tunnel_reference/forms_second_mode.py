@@ -16,19 +16,18 @@ def ringing(r: Reading, p: Params) -> Array:
     return np.asarray(r.value + wave.real)
 
 
-def _phases(e: Extra, c: Conditions) -> float | Array:
-    """A phase per run, or the one given."""
-    if "seed" not in e:
-        return e["own"]
-    return np.random.default_rng(int(e["seed"])).uniform(0.0, 2.0 * np.pi, c.runs)
-
-
 def _made(released: float, in_phase: bool) -> ParamMaker:
     """Amplitude as the release angle to a power; phases drawn, or that of a rod released at rest."""
 
     def make(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
         size = p * np.abs(c.start_angle / np.max(np.abs(c.start_angle))) ** released
-        phase = np.where(c.start_angle < 0.0, np.pi, 0.0) if in_phase else _phases(e, c)
+        phase: float | Array
+        if in_phase:
+            phase = np.where(c.start_angle < 0.0, np.pi, 0.0)
+        elif "seed" in e:
+            phase = np.random.default_rng(int(e["seed"])).uniform(0.0, 2.0 * np.pi, c.runs)
+        else:
+            phase = e["own"]
         return {
             "amplitude": size,
             "phase": phase,

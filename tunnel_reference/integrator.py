@@ -117,20 +117,6 @@ class _Group:
     start: int = 0
 
 
-def _as_rows(indices: Places) -> Rows:
-    """A slice where the indices are consecutive, because a view is faster than indexing."""
-    first, last = int(indices[0]), int(indices[-1])
-    return slice(first, last + 1) if last - first + 1 == indices.size else indices
-
-
-def _stack(arrays: Sequence[Array]) -> Array:
-    """Join parameters along runs; shorter time series are extended with their last value."""
-    if arrays[0].ndim == 1:
-        return np.concatenate(arrays)
-    longest = max(a.shape[1] for a in arrays)
-    return np.concatenate([np.pad(a, ((0, 0), (0, longest - a.shape[1])), mode="edge") for a in arrays])
-
-
 def _group_terms(
     terms: Sequence[Sequence[Term]], offsets: Sequence[int], runs: Sequence[int]
 ) -> list[_Group]:
@@ -149,12 +135,21 @@ def _group_terms(
     groups = []
     for (phase, law, states, _), members in sorted(found.items(), key=lambda item: item[0][0]):
         rows = np.concatenate([r for _, r in members])
-        params = {k: _stack([t.params[k] for t, _ in members]) for k in members[0][0].params}
+        params = {}
+        for name in members[0][0].params:
+            arrays = [t.params[name] for t, _ in members]
+            if arrays[0].ndim > 1:  # shorter time series are extended with their last value
+                longest = max(a.shape[1] for a in arrays)
+                arrays = [np.pad(a, ((0, 0), (0, longest - a.shape[1])), mode="edge") for a in arrays]
+            params[name] = np.concatenate(arrays)
         memory = np.concatenate(
             [t.memory if t.memory is not None else np.zeros((0, r.size)) for t, r in members], axis=1
         )
         assert memory.shape[0] == states
-        groups.append(_Group(law, Phase(phase), _as_rows(rows), params, memory))
+        first, last = int(rows[0]), int(rows[-1])
+        consecutive = last - first + 1 == rows.size  # a view is faster than indexing
+        places = slice(first, last + 1) if consecutive else rows
+        groups.append(_Group(law, Phase(phase), places, params, memory))
     return groups
 
 
@@ -181,45 +176,33 @@ class _Batch:
         self.ones = np.ones(self.size)
         self.sign = np.sign(self.rate)
         self.moving = np.ones(self.size)
-        self._rod(conditions, runs)
-        self.state = self._initial_state()
-        self.stage = self._new_stage(0.0, self.state)
-
-    def _rod(self, conditions: Sequence[Conditions], runs: Sequence[int]) -> None:
-        """Set the rod's properties by row, and the rows with friction."""
+        dry = [np.arange(self.size)[g.rows] for g in self.groups if g.phase is Phase.FRICTION]
+        self.dry = np.unique(np.concatenate(dry)) if dry else np.zeros(0, dtype=np.intp)
+        # The state: body angle and rate, (angle and rate of the upper end,) and the states of the laws.
+        blocks = [self.release.copy(), self.rate.copy()]
         self.top_inertia, self.body_inertia = self.inertia, self.inertia
         if self.flexible:
             rods = [c.rod for c in conditions if c.rod is not None]
             share = np.repeat([r.share for r in rods], runs)
             self.rod_stiffness = np.repeat([1.0 / r.compliance for r in rods], runs)
             self.rod_hardening = np.repeat([r.hardening for r in rods], runs)
-            self.held_body = np.repeat([r.held_body for r in rods], runs)
+            held_body = np.repeat([r.held_body for r in rods], runs)
             self.top_inertia, self.body_inertia = share * self.inertia, (1.0 - share) * self.inertia
             ratio = np.repeat([r.damping_ratio for r in rods], runs)
             self.rod_damping = 2.0 * ratio * np.sqrt(self.rod_stiffness * self.top_inertia)
-        dry = [np.arange(self.size)[g.rows] for g in self.groups if g.phase is Phase.FRICTION]
-        self.dry = np.unique(np.concatenate(dry)) if dry else np.zeros(0, dtype=np.intp)
-
-    def _initial_state(self) -> Array:
-        """Body angle and rate, (angle and rate of the upper end,) and the states of the laws, in one vector."""
-        blocks = [self.release.copy(), self.rate.copy()]
-        if self.flexible:
             series = self.stiffness / (self.stiffness + self.rod_stiffness)
-            blocks[0] = np.where(self.held_body, self.release, self._held_at_top())
-            blocks += [
-                np.where(self.held_body, self.release * (1.0 - series), self.release),
-                self.rate.copy(),
-            ]
+            body_if_top_is_held = (
+                self.release * self.rod_stiffness / (self.rod_stiffness - self.air_stiffness)
+            )
+            blocks[0] = np.where(held_body, self.release, body_if_top_is_held)
+            blocks += [np.where(held_body, self.release * (1.0 - series), self.release), self.rate.copy()]
         position = len(blocks) * self.size
         for group in self.groups:
             group.start = position
             position += group.memory.size
             blocks.append(group.memory.ravel())
-        return np.concatenate(blocks)
-
-    def _held_at_top(self) -> Array:
-        """Equilibrium angle of the body while the upper end is held at the release angle."""
-        return np.asarray(self.release * self.rod_stiffness / (self.rod_stiffness - self.air_stiffness))
+        self.state = np.concatenate(blocks)
+        self.stage = self._new_stage(0.0, self.state)
 
     def _new_stage(self, time: float, state: Array) -> Stage:
         """A stage to which no law has been applied yet."""
@@ -279,7 +262,10 @@ class _Batch:
             self._leave_rest(resting)
 
     def step(self, time: float, h: float) -> None:
-        """Advance by one RK4 step, then correct the rows with friction whose rate changed sign."""
+        """Advance by one RK4 step, then correct the rows with friction whose rate changed sign.
+
+        Rows at rest start to slip or remain at rest.
+        """
         self.middle = time + h / 2
         before = self.state
         k1 = self.derivative(time, before)
@@ -287,16 +273,13 @@ class _Batch:
         k3 = self.derivative(time + h / 2, before + (h / 2) * k2)
         k4 = self.derivative(time + h, before + h * k3)
         self.state = before + (h / 6) * (k1 + 2.0 * (k2 + k3) + k4)
-        if self.dry.size:
-            self._friction(before, k1, h)
-
-    def _friction(self, before: Array, slope: Array, h: float) -> None:
-        """Correct zero crossings of the rate within the last step; rows at rest start to slip or remain at rest."""
         rows = self.dry
+        if not rows.size:
+            return
         at = rows + (3 if self.flexible else 1) * self.size
         crossed = rows[self.state[at] * self.sign[rows] < 0.0]
         if crossed.size:
-            self._cross(crossed, before, slope, h)
+            self._cross(crossed, before, k1, h)
         resting = rows[self.moving[rows] == 0.0]
         if resting.size:
             self._leave_rest(resting)

@@ -13,8 +13,6 @@ from tunnel_reference.conditions import (
     NOMINAL_INERTIA,
     REFERENCE_LENGTH,
     WIDTH,
-    Conditions,
-    Input,
 )
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
@@ -82,9 +80,14 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
     time = np.round(c.time, 9) if c.stamp_step == 0.0 else np.round(c.time / c.stamp_step) * c.stamp_step
     time = np.round(time * c.time_scale, 11)
     length, speed = c.length_scale, c.length_scale / c.time_scale
-    drives = [
-        None if c.drive is None or not c.drive.driven[r] else _drive(c, c.drive, r) for r in range(c.runs)
-    ]
+    drives: list[Drive | None] = [None] * c.runs
+    if c.drive is not None:
+        column = cast(InputColumn, c.drive.column)
+        scale = c.moment_scale if column == "moment_nm" else 1.0
+        gain = c.drive.gain * c.moment_scale if column == "drive" and c.drive.stated else None
+        for run in np.flatnonzero(c.drive.driven):
+            hold: Hold = "zero" if c.drive.held[run] else "linear"
+            drives[run] = Drive(column, c.drive.values[:, run] * scale, hold, gain)
     runs = tuple(
         Run(
             id=f"r{number + 1:02d}",
@@ -108,15 +111,6 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
         sensor=SensorProperties(c.sample_rate / c.time_scale, c.resolution, c.stated_noise),
         runs=runs,
     )
-
-
-def _drive(c: Conditions, given: Input, run: int) -> Drive:
-    """The input of a run, in the scales of its rig."""
-    hold: Hold = "zero" if given.held[run] else "linear"
-    column = cast(InputColumn, given.column)
-    scale = c.moment_scale if column == "moment_nm" else 1.0
-    gain = given.gain * c.moment_scale if column == "drive" and given.stated else None
-    return Drive(column, given.values[:, run] * scale, hold, gain)
 
 
 def truth_of(simulated: Simulated) -> dict[str, Any]:
@@ -175,9 +169,6 @@ def parse_shares(text: str) -> dict[str, float]:
     """Parse kinds with optional weights, such as ``single:3,none``.
 
     The default weights are `DEFAULT_SHARES`, and 1 for a kind that is not among them.
-
-    Raises:
-        TunnelError: for an unknown kind or a weight that is not a positive number.
     """
     shares: dict[str, float] = {}
     for item in text.split(","):

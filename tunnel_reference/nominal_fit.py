@@ -48,28 +48,6 @@ def _rates(c: Conditions, p: Array) -> tuple[Array, Array, Array, Array]:
     return sigma, omega, d_sigma, d_omega
 
 
-def _basis(time: Array, sigma: Array, omega: Array) -> tuple[Array, Array]:
-    """e^(−σt) cos ωt and e^(−σt) sin ωt, each of shape (R, n)."""
-    decay = np.exp(-sigma[:, None] * time)
-    phase = omega[:, None] * time
-    return decay * np.cos(phase), decay * np.sin(phase)
-
-
-def _linear(cosine: Array, sine: Array, readings: Array) -> tuple[Array, Array, float]:
-    """Amplitudes a, b per run and the common zero for given rates, by linear least squares."""
-    runs, n = readings.shape
-    basis = np.stack([cosine, sine], axis=1)
-    gram = basis @ basis.transpose(0, 2, 1)
-    sums = basis.sum(axis=2)
-    right = np.einsum("rkn,rn->rk", basis, readings)
-    reduce = np.linalg.solve(gram, np.stack([right, sums], axis=2))
-    fitted, levels = reduce[:, :, 0], reduce[:, :, 1]
-    numerator = readings.sum() - np.einsum("rk,rk->", sums, fitted)
-    zero = float(numerator / (runs * n - np.einsum("rk,rk->", sums, levels)))
-    ab = fitted - zero * levels
-    return ab[:, 0], ab[:, 1], zero
-
-
 def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     """Fit Izz, Cr, Cnβ, Cnr, the zero and the initial state of every run to the readings.
 
@@ -89,8 +67,20 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     kept: tuple[Array, float, Array, Array] | None = None
     for _ in range(_ITERATIONS):
         sigma, omega, d_sigma, d_omega = _rates(c, p)
-        cosine, sine = _basis(time, sigma, omega)
-        a, b, zero = _linear(cosine, sine, y)
+        decay = np.exp(-sigma[:, None] * time)
+        phase = omega[:, None] * time
+        cosine, sine = decay * np.cos(phase), decay * np.sin(phase)  # shape (R, n)
+        # Amplitudes a, b per run and the common zero for given rates, by linear least squares.
+        basis = np.stack([cosine, sine], axis=1)
+        gram = basis @ basis.transpose(0, 2, 1)
+        sums = basis.sum(axis=2)
+        right = np.einsum("rkn,rn->rk", basis, y)
+        reduce = np.linalg.solve(gram, np.stack([right, sums], axis=2))
+        fitted, levels = reduce[:, :, 0], reduce[:, :, 1]
+        numerator = y.sum() - np.einsum("rk,rk->", sums, fitted)
+        zero = float(numerator / (y.size - np.einsum("rk,rk->", sums, levels)))
+        ab = fitted - zero * levels
+        a, b = ab[:, 0], ab[:, 1]
         model = a[:, None] * cosine + b[:, None] * sine
         residual = y - model - zero
         power = np.einsum("rn,rn->r", residual, residual) / y.shape[1]

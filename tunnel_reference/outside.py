@@ -17,18 +17,11 @@ C, R = Group.COMMON, Group.RARE
 _BOTH = (-1, 1)
 
 
-def _in_run(value: float, e: Extra, c: Conditions) -> Array:
-    """The value in one run, zero in the others."""
+def _in_run(value: float, e: Extra, c: Conditions, *, windy: bool = False) -> Array:
+    """The value in one run, or in one wind-on run; zero in the others."""
     out = np.zeros(c.runs)
-    out[int(e["run"]) % c.runs] = value
-    return out
-
-
-def _in_windy_run(value: float, e: Extra, c: Conditions) -> Array:
-    """The value in one wind-on run, zero in the others."""
-    out = np.zeros(c.runs)
-    windy = np.flatnonzero(c.wind_on)
-    out[windy[int(e["run"]) % windy.size]] = value
+    places = np.flatnonzero(c.wind_on) if windy else np.arange(c.runs)
+    out[places[int(e["run"]) % places.size]] = value
     return out
 
 
@@ -62,7 +55,7 @@ _BLOWS = (
                                  "width": e["width"]}), _BOTH, draw=_when(0.3, 0.7)),
     Form(UNKNOWN, "gust_one_run", C, "g, share of V", 0.01,
          moving(air.gust, Phase.WIND,
-                lambda p, e, c: {"size": _in_windy_run(p, e, c), "when": e["part"] * c.duration,
+                lambda p, e, c: {"size": _in_run(p, e, c, windy=True), "when": e["part"] * c.duration,
                                  "width": 0.15 * c.duration}), _BOTH, draw=_when(0.2, 0.5)),
     Form(UNKNOWN, "platform_vibration", R, "M, N m", 0.01,
          moving(air.harmonic_moment, Phase.MOMENT,

@@ -76,8 +76,23 @@ def read_motion(
     """
     noise = conditions.noise_std * rng.standard_normal(motion.angle.shape)
     if conditions.coloured_share > 0.0:
-        noise = _coloured(conditions, noise, rng)
-    motion = _at_stamps(conditions, motion)
+        n = noise.shape[0]  # the noise is mixed with noise of a first-order spectrum; the variance remains
+        frequency = np.fft.rfftfreq(n, 1.0 / conditions.sample_rate)
+        gain = 1.0 / np.sqrt(1.0 + (frequency / conditions.noise_corner) ** 2)
+        gain /= np.sqrt(np.mean(gain**2))
+        drawn = np.fft.rfft(conditions.noise_std * rng.standard_normal(noise.shape), axis=0)
+        slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
+        share = conditions.coloured_share
+        noise = np.sqrt(1.0 - share) * noise + np.sqrt(share) * slow
+    if conditions.clock_jitter != 0.0:  # the motion when the samples were taken
+        n, interval = motion.angle.shape[0], 1.0 / conditions.sample_rate
+        u = (conditions.time[:n] / interval - np.arange(n))[:, None]
+        after = np.minimum(np.arange(n) + 1, n - 1)
+        a, b = motion.angle, motion.angle[after]
+        ra, rb = motion.rate * interval, motion.rate[after] * interval
+        angle = _hermite(u, a, b, ra, rb)
+        angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
+        motion = Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
     value = motion.angle
     ordered = sorted(terms, key=lambda t: t.order)
     for term in (t for t in ordered if t.order < Order.NOISE):
@@ -92,30 +107,14 @@ def read_motion(
     return value
 
 
-def _coloured(c: Conditions, white: Array, rng: np.random.Generator) -> Array:
-    """White noise mixed with noise of a first-order spectrum; the variance remains."""
-    n = white.shape[0]
-    frequency = np.fft.rfftfreq(n, 1.0 / c.sample_rate)
-    gain = 1.0 / np.sqrt(1.0 + (frequency / c.noise_corner) ** 2)
-    gain /= np.sqrt(np.mean(gain**2))
-    drawn = np.fft.rfft(c.noise_std * rng.standard_normal(white.shape), axis=0)
-    slow = np.fft.irfft(gain[:, None] * drawn, n, axis=0)
-    return np.asarray(np.sqrt(1.0 - c.coloured_share) * white + np.sqrt(c.coloured_share) * slow)
-
-
-def _at_stamps(c: Conditions, motion: Motion) -> Motion:
-    """The motion when the samples were taken, by cubic Hermite interpolation."""
-    if c.clock_jitter == 0.0:
-        return motion
-    n, interval = motion.angle.shape[0], 1.0 / c.sample_rate
-    u = (c.time[:n] / interval - np.arange(n))[:, None]
-    after = np.minimum(np.arange(n) + 1, n - 1)
-    a, b = motion.angle, motion.angle[after]
-    ra, rb = motion.rate * interval, motion.rate[after] * interval
-    angle = (1 + 2 * u) * (1 - u) ** 2 * a + u * (1 - u) ** 2 * ra
-    angle = angle + u * u * (3 - 2 * u) * b + u * u * (u - 1) * rb
-    angle[-1] = motion.angle[-1] + u[-1] * ra[-1]
-    return Motion(angle, motion.rate + u * (motion.rate[after] - motion.rate))
+def _hermite(u: Array, a: Array, b: Array, ra: Array, rb: Array) -> Array:
+    """The cubic from a to b at the share u of an interval; ra and rb are the rates times the interval."""
+    return (
+        (1 + 2 * u) * (1 - u) ** 2 * a
+        + u * (1 - u) ** 2 * ra
+        + u * u * (3 - 2 * u) * b
+        + u * u * (u - 1) * rb
+    )
 
 
 # ---- linkage
@@ -128,12 +127,7 @@ def _fine_path(motion: Motion, interval: float) -> Array:
     u = (np.arange(_PLAY_STEPS) / _PLAY_STEPS)[None, :, None]
     a, b = motion.angle[:-1, None], motion.angle[1:, None]
     ra, rb = motion.rate[:-1, None] * interval, motion.rate[1:, None] * interval
-    inner = (
-        (1 + 2 * u) * (1 - u) ** 2 * a
-        + u * (1 - u) ** 2 * ra
-        + u * u * (3 - 2 * u) * b
-        + u * u * (u - 1) * rb
-    )
+    inner = _hermite(u, a, b, ra, rb)
     return np.concatenate([inner.reshape(-1, motion.angle.shape[1]), motion.angle[-1:]])
 
 

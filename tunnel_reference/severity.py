@@ -17,7 +17,7 @@ import numpy as np
 
 from tunnel_reference.catalogue import Bound
 from tunnel_reference.conditions import Array, Conditions
-from tunnel_reference.draw import CampaignDraw, EffectDraw, redraw, with_defaults
+from tunnel_reference.draw import CampaignDraw, redraw, with_defaults
 from tunnel_reference.driven_fit import fit_driven
 from tunnel_reference.integrator import Motion, Term, integrate
 from tunnel_reference.nominal_fit import fit_nominal
@@ -61,14 +61,6 @@ def bind_effects(draw: CampaignDraw) -> tuple[Conditions, list[Bound]]:
     return conditions, terms
 
 
-def _batches(conditions: Sequence[Conditions]) -> dict[tuple[bool, bool], list[int]]:
-    """Campaigns that can be integrated together efficiently: grouped by rod and by short or long runs."""
-    found: dict[tuple[bool, bool], list[int]] = {}
-    for number, c in enumerate(conditions):
-        found.setdefault((c.rod is not None, c.duration > _SHORT), []).append(number)
-    return found
-
-
 def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> list[Motion]:
     """Integrate campaigns in as few batches as possible.
 
@@ -77,7 +69,10 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
     """
     bound = [bind_effects(d) for d in draws]
     motions: list[Motion | None] = [None] * len(draws)
-    for (flexible, _), numbers in _batches([c for c, _ in bound]).items():
+    batches: dict[tuple[bool, bool], list[int]] = {}  # by rod and by short or long runs: efficient together
+    for number, (c, _) in enumerate(bound):
+        batches.setdefault((c.rod is not None, c.duration > _SHORT), []).append(number)
+    for (flexible, _), numbers in batches.items():
         substeps = (
             (_ROD_SUBSTEPS if flexible else _SUBSTEPS) if fine else (_ROD_COARSE if flexible else _COARSE)
         )
@@ -100,11 +95,6 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
 
 
-def _is_sensor(effect: EffectDraw, conditions: Conditions) -> bool:
-    """Whether the effect acts on the sensor only, not on the motion."""
-    return isinstance(effect.form.bind(effect.value, effect.extra, with_defaults(conditions))[1], ReadingTerm)
-
-
 def _excess(alone: CampaignDraw, motion: Motion) -> float:
     """Excess of a campaign; infinite where its motion grows without bound or is nothing like a free decay."""
     if not np.all(np.isfinite(motion.angle)):
@@ -120,7 +110,9 @@ class _Search:
 
     def __init__(self, campaign: int, slot: int, alone: CampaignDraw) -> None:
         self.campaign, self.slot, self.alone = campaign, slot, alone
-        self.sensor = _is_sensor(alone.effects[0], alone.conditions)
+        effect = alone.effects[0]
+        term = effect.form.bind(effect.value, effect.extra, with_defaults(alone.conditions))[1]
+        self.sensor = isinstance(term, ReadingTerm)  # the motion is that without the effect
         self.motion: Motion | None = None
         self.tried: list[tuple[float, float]] = []
         self.done = False
@@ -252,21 +244,12 @@ def own_excesses(draws: Sequence[CampaignDraw]) -> list[CampaignDraw]:
     for number, by_slot in residuals.items():
         nothing = by_slot.pop(-1)
         power = found[number].conditions.noise_power
-        own = _orthogonal(np.stack([r - nothing for r in by_slot.values()]).astype(np.float64)) / power
+        signatures = np.stack([r - nothing for r in by_slot.values()]).astype(np.float64)
         effects = list(found[number].effects)
-        for slot, value in zip(by_slot, own, strict=True):
-            effects[slot] = replace(effects[slot], own=float(value))
+        for row, (slot, rest) in enumerate(zip(by_slot, signatures, strict=True)):
+            others = np.delete(signatures, row, axis=0).T
+            if others.size:  # only the part that is orthogonal to the others counts
+                rest = rest - others @ np.linalg.lstsq(others, rest, rcond=None)[0]
+            effects[slot] = replace(effects[slot], own=float(np.mean(rest**2) / power))
         found[number] = replace(found[number], effects=tuple(effects))
-    return found
-
-
-def _orthogonal(signatures: Array) -> Array:
-    """Mean square of the part of each row that is orthogonal to the others, shape (rows,)."""
-    found = np.empty(len(signatures))
-    for row, signature in enumerate(signatures):
-        others = np.delete(signatures, row, axis=0)
-        rest = signature
-        if len(others):
-            rest = signature - others.T @ np.linalg.lstsq(others.T, signature, rcond=None)[0]
-        found[row] = np.mean(rest**2)
     return found

@@ -95,8 +95,21 @@ def combined_estimate(
     runs = [run for _, run, _ in pairs]
     design = build_design(runs, campaign.rig)
     linked = with_gains(design, runs) if campaign.driven else design
-    decays, informations = _own(pairs, driven=campaign.driven)
-    combined = combine(linked, decays, informations)
+    # (a, k) of the runs; with driven runs (a, k, g), zeros for the gain of a free one.
+    decays, informations = [], []
+    for _, _, item in pairs:
+        assert item.decay is not None
+        assert item.covariance is not None
+        if item.gained is not None:
+            decays.append(item.gained.coefficients)
+            informations.append(item.gained.weight)
+            continue
+        size = 3 if campaign.driven else 2
+        decays.append(np.array([item.decay.rate, item.decay.stiffness, 0.0][:size]))
+        information = np.zeros((size, size))
+        information[:2, :2] = inverse(item.covariance)
+        informations.append(information)
+    combined = combine(linked, np.array(decays), informations)
     if combined is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     parameters, covariance = combined
@@ -118,24 +131,6 @@ def combined_estimate(
     return filled_estimate(
         campaign, estimate, runs, design, values, own, statuses | design_statuses(design, parameters[:size])
     )
-
-
-def _own(pairs: Sequence[tuple[int, Run, RunDecay]], *, driven: bool) -> tuple[Array, list[Array]]:
-    """(a, k) of the runs and their informations; with driven runs (a, k, g), zeros for the gain of a free one."""
-    decays, informations = [], []
-    for _, _, item in pairs:
-        assert item.decay is not None
-        assert item.covariance is not None
-        if item.gained is not None:
-            decays.append(item.gained.coefficients)
-            informations.append(item.gained.weight)
-            continue
-        size = 3 if driven else 2
-        decays.append(np.array([item.decay.rate, item.decay.stiffness, 0.0][:size]))
-        information = np.zeros((size, size))
-        information[:2, :2] = inverse(item.covariance)
-        informations.append(information)
-    return np.array(decays), informations
 
 
 Found: TypeAlias = RunDecay | Status
@@ -215,19 +210,15 @@ def driven_estimate(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statu
     statuses = statuses | noise_statuses([item.noise for _, item in pairs])
     fitted = [(run, item) for run, item in pairs if item.fit is not None]
     joined = joined_runs([run for run, _ in fitted], campaign.rig)
-    linked = [(run, item) for run, item in fitted if run.id in joined]
+    pairs = [(run, item) for run, item in fitted if run.id in joined]
     remarks = tuple(
         run_remark(run, item.gained)
         for run, item in fitted
         if isinstance(item, DrivenRun) and is_remarked(run, joined)
     )
     estimate = replace(estimate, remarks=remarks)
-    if not linked:
+    if not pairs:
         return replace(estimate, statuses=by_severity(statuses))
-    return _joint(campaign, estimate, linked, statuses)
-
-
-def _joint(campaign: Campaign, estimate: Estimate, pairs: _Pairs, statuses: set[Status]) -> Estimate:
     runs = [run for run, _ in pairs]
     design = build_design(runs, campaign.rig)
     linked = with_gains(design, runs)

@@ -29,7 +29,6 @@ from identification.signal.run_fit import (
 )
 from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
 
 _DECIDED = 6  # parameters fitted to a run's data: decay, stiffness, intensity, initial state, zero
@@ -79,23 +78,18 @@ class FilterError(RunByRun):
             return None
         interval = float(thin.time[-1] - thin.time[0]) / (thin.time.size - 1)
         deviations = np.sqrt(np.diag(decay_covariance_of(fit))) * noise_std
-        known = (
-            None
-            if run.drive is None
-            else _known_input(run, run.drive, bare.reading, factor, sensor.derivative)
-        )
+        known, drive = None, run.drive
+        if drive is not None:
+
+            def response(decay: Decay) -> Array:
+                """Of the input, in the means of the blocks."""
+                driven = input_response(bare.reading, drive, decay, sensor.derivative)
+                motion = Reading(bare.reading.time, driven)
+                return mean_of_blocks(even_reading(motion).yaw, factor)
+
+            known = KnownInput(response, by_root=run.driven_by_stiffness)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
-
-
-def _known_input(run: Run, drive: Drive, reading: Reading, factor: int, derivative: int) -> KnownInput:
-    """The response to the input, in the means of the blocks."""
-
-    def response(decay: Decay) -> Array:
-        motion = Reading(reading.time, input_response(reading, drive, decay, derivative))
-        return mean_of_blocks(even_reading(motion).yaw, factor)
-
-    return KnownInput(response, by_root=run.driven_by_stiffness)
 
 
 def _with_moment(

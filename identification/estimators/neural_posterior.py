@@ -92,7 +92,38 @@ class NeuralPosterior:
         linked = _linked(found)
         if not linked or Status.NO_RUN_IDENTIFIED in statuses:
             return replace(estimate, statuses=by_severity(statuses))
-        return _of_campaign(campaign, estimate, linked, statuses, self.networks["campaign"])
+        known_runs = [one.run for one in linked]
+        design = build_design(known_runs, campaign.rig)
+        decays, informations = [], []  # (a, k) of the runs by their nominal fits
+        for one in linked:
+            rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
+            decays.append([rate, omega**2 + rate**2])
+            slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
+            informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
+        combined = combine(design, np.array(decays), informations)
+        if combined is None:
+            return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
+        statuses = statuses | design_statuses(design, combined[0])
+        features = _campaign_features(linked, design)
+        if features is None:
+            nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
+            return filled_estimate(
+                campaign, estimate, known_runs, design, nothing, np.zeros((0, 0)), statuses
+            )
+        posterior = posteriors([features], self.networks["campaign"])[0]
+        if posterior.unlike:
+            return replace(estimate, statuses=by_severity(statuses | {Status.UNLIKE_TRAINING}))
+        known = np.flatnonzero(features.known)
+        names = tuple(CAMPAIGN_NAMES[place] for place in known)
+        values = Derivatives(names, posterior.values[known], np.eye(known.size))
+        covariance = posterior.covariance[np.ix_(known, known)]
+        result = filled_estimate(campaign, estimate, known_runs, design, values, covariance, statuses)
+        intervals = {
+            name: replace(quantity, interval=posterior.quantity(int(place), "").interval)
+            for name, place in zip(names, known, strict=True)
+            if (quantity := getattr(result, name)) is not None
+        }
+        return replace(result, **intervals)
 
     def effects(self, campaign: Campaign) -> dict[str, float]:
         """Probability of every effect of the vocabulary in a campaign, by name; none where it has no coefficients.
@@ -166,42 +197,3 @@ def _described(seen: _DemodulatedRun, sensor: SensorProperties) -> RunEstimate:
 def _campaign_features(linked: Sequence[_DemodulatedRun], design: Design) -> Features | None:
     runs, windows = [one.run for one in linked], [one.windows for one in linked]
     return campaign_features(runs, windows, design, [one.alone for one in linked])
-
-
-def _of_campaign(
-    campaign: Campaign,
-    estimate: Estimate,
-    linked: Sequence[_DemodulatedRun],
-    statuses: set[Status],
-    network: TrainedPosterior,
-) -> Estimate:
-    runs = [one.run for one in linked]
-    design = build_design(runs, campaign.rig)
-    decays, informations = [], []  # (a, k) of the runs by their nominal fits
-    for one in linked:
-        rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
-        decays.append([rate, omega**2 + rate**2])
-        slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
-        informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
-    combined = combine(design, np.array(decays), informations)
-    if combined is None:
-        return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
-    statuses = statuses | design_statuses(design, combined[0])
-    features = _campaign_features(linked, design)
-    if features is None:
-        nothing = Derivatives((), np.zeros(0), np.zeros((0, 0)))
-        return filled_estimate(campaign, estimate, runs, design, nothing, np.zeros((0, 0)), statuses)
-    posterior = posteriors([features], network)[0]
-    if posterior.unlike:
-        return replace(estimate, statuses=by_severity(statuses | {Status.UNLIKE_TRAINING}))
-    known = np.flatnonzero(features.known)
-    names = tuple(CAMPAIGN_NAMES[place] for place in known)
-    values = Derivatives(names, posterior.values[known], np.eye(known.size))
-    covariance = posterior.covariance[np.ix_(known, known)]
-    result = filled_estimate(campaign, estimate, runs, design, values, covariance, statuses)
-    intervals = {
-        name: replace(quantity, interval=posterior.quantity(int(place), "").interval)
-        for name, place in zip(names, known, strict=True)
-        if (quantity := getattr(result, name)) is not None
-    }
-    return replace(result, **intervals)

@@ -54,7 +54,20 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
     frequency = starting_frequency(later)
     if frequency is None:
         return 0
-    crossings, largest, out = _crossings(record, sensor, float(np.median(later.yaw_rad)), frequency)
+    # Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
+    width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
+    total = np.concatenate([[0.0], np.cumsum(yaw - float(np.median(later.yaw_rad)))])
+    smooth = (total[width:] - total[:-width]) / width
+    away = np.abs(smooth)
+    noise = white_noise(yaw, sensor) / np.sqrt(width)
+    band = max(_BAND, min(_NOISE_MARGIN * noise / float(away.max()), _WIDEST_BAND)) * float(away.max())
+    outside = np.flatnonzero(away > band)
+    change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
+    middles = 0.5 * (outside[change] + outside[change + 1]) + 0.5 * width
+    crossings = np.concatenate([[0.0], middles])
+    steps = float(np.argmax(away))  # to the largest excursion
+    turn = steps + 0.5 * width
+    largest = int(np.searchsorted(crossings, turn))  # the first crossing after it
     # The last interval before the largest excursion that is too long for free motion.
     lengths = np.diff(crossings)
     for place in range(min(largest, lengths.size - 1) - 1, -1, -1):
@@ -65,32 +78,8 @@ def find_release(record: Record, sensor: SensorProperties) -> int:
             if regular <= _REGULAR:
                 return _standstill(record, crossings, place)
             break
-    pulled = largest == 1 and crossings.size > 2 and out[0] > _SLOWER * (crossings[1] - out[1]) + 0.5
+    pulled = largest == 1 and crossings.size > 2 and steps > _SLOWER * (crossings[1] - turn) + 0.5
     return _standstill(record, crossings, 0) if pulled else 0
-
-
-def _crossings(
-    record: Record, sensor: SensorProperties, centre: float, frequency: float
-) -> tuple[Array, int, tuple[float, float]]:
-    """Where the smoothed reading crosses its centre, in samples; the start of the record counts as the first.
-
-    The second value is the place of the first crossing after the largest excursion; the third are the samples that
-    the smoothed reading takes to get there, and its place in samples.
-    """
-    yaw = record.yaw_rad
-    width = max(1, min(round(_SMOOTHED * record.sample_rate / frequency), yaw.size // 4))
-    total = np.concatenate([[0.0], np.cumsum(yaw - centre)])
-    smooth = (total[width:] - total[:-width]) / width
-    away = np.abs(smooth)
-    noise = white_noise(yaw, sensor) / np.sqrt(width)
-    band = max(_BAND, min(_NOISE_MARGIN * noise / float(away.max()), _WIDEST_BAND)) * float(away.max())
-    outside = np.flatnonzero(away > band)
-    change = np.flatnonzero(np.diff(np.sign(smooth[outside])) != 0.0)
-    middles = 0.5 * (outside[change] + outside[change + 1]) + 0.5 * width
-    crossings = np.concatenate([[0.0], middles])
-    steps = float(np.argmax(away))
-    turn = steps + 0.5 * width
-    return crossings, int(np.searchsorted(crossings, turn)), (steps, turn)
 
 
 def _standstill(record: Record, crossings: Array, held: int) -> int:

@@ -106,7 +106,42 @@ def demodulate(record: Record) -> Demodulated | Status:
         if rate > 0.0 and sizes[0] > least:
             span = min(float(reading.time[-1]), max(np.log(sizes[0] / least) / rate, 8.0 * np.pi / omega))
     assert windows is not None
-    return _relative(windows, omega, rate, max(windows.noise, _ROUGH * peak), record, factor)
+    # Deviations from one oscillation.
+    noise = max(windows.noise, _ROUGH * peak)
+    first = windows.amplitudes[:, 0]
+    weight = windows.samples * np.abs(first) ** 2
+    logs = np.log(np.maximum(np.abs(first), 1e-300)) + rate * windows.time
+    level = float(weight @ logs / weight.sum())
+    line = np.exp(level - rate * windows.time)
+    turned = first / line
+    turned = turned * np.exp(-1j * float(np.angle(weight @ turned)))
+    information = 0.5 * windows.samples * line**2 / noise**2
+    if np.abs(information @ turned) ** 2 < LEAST_ENERGY * information.sum():
+        return Status.NO_OSCILLATION  # noise has amplitudes in all windows, but no common phase
+    clear = information > _LINEAR
+    logarithm = np.where(clear, np.log(np.maximum(np.abs(turned), 1e-300)), np.clip(turned.real - 1.0, -3, 3))
+    phase = np.where(clear, np.unwrap(np.angle(turned)), np.clip(turned.imag, -3.0, 3.0))
+    # A window of equal readings, rounded coarsely, has no phase.
+    unit = np.where(first == 0.0, 1.0, first / np.maximum(np.abs(first), 1e-300))
+    differences = np.diff(record.yaw_rad, n=2)
+    fast = float(np.sqrt(np.mean(differences**2) / 6.0)) if differences.size else 0.0
+    return Demodulated(
+        omega=omega,
+        rate=rate,
+        time=windows.time,
+        logarithm=logarithm,
+        phase=phase,
+        information=information,
+        amplitude=line,
+        zero=windows.zero,
+        second=windows.amplitudes[:, 1] / unit**2 / line,
+        third=windows.amplitudes[:, 2] / unit**3 / line,
+        noise=noise,
+        samples=windows.samples,
+        block=factor,
+        fast_noise=fast / (noise * np.sqrt(factor)),
+        duration=record.duration,
+    )
 
 
 def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmonics: int) -> _Windows | None:
@@ -149,46 +184,6 @@ def _fit_windows(reading: Reading, omega: float, rate: float, span: float, harmo
     amplitudes = found[:, 1::2] - 1j * found[:, 2::2]
     return _Windows(
         middle, np.asarray(amplitudes), np.asarray(found[:, 0], np.float64), sizes.astype(np.float64), noise
-    )
-
-
-def _relative(
-    windows: _Windows, omega: float, rate: float, noise: float, record: Record, factor: int
-) -> Demodulated | Status:
-    """Deviations from one oscillation; a status where the windows have no common phase."""
-    first = windows.amplitudes[:, 0]
-    weight = windows.samples * np.abs(first) ** 2
-    logs = np.log(np.maximum(np.abs(first), 1e-300)) + rate * windows.time
-    level = float(weight @ logs / weight.sum())
-    line = np.exp(level - rate * windows.time)
-    turned = first / line
-    turned = turned * np.exp(-1j * float(np.angle(weight @ turned)))
-    information = 0.5 * windows.samples * line**2 / noise**2
-    if np.abs(information @ turned) ** 2 < LEAST_ENERGY * information.sum():
-        return Status.NO_OSCILLATION  # noise has amplitudes in all windows, but no common phase
-    clear = information > _LINEAR
-    logarithm = np.where(clear, np.log(np.maximum(np.abs(turned), 1e-300)), np.clip(turned.real - 1.0, -3, 3))
-    phase = np.where(clear, np.unwrap(np.angle(turned)), np.clip(turned.imag, -3.0, 3.0))
-    # A window of equal readings, rounded coarsely, has no phase.
-    unit = np.where(first == 0.0, 1.0, first / np.maximum(np.abs(first), 1e-300))
-    differences = np.diff(record.yaw_rad, n=2)
-    fast = float(np.sqrt(np.mean(differences**2) / 6.0)) if differences.size else 0.0
-    return Demodulated(
-        omega=omega,
-        rate=rate,
-        time=windows.time,
-        logarithm=logarithm,
-        phase=phase,
-        information=information,
-        amplitude=line,
-        zero=windows.zero,
-        second=windows.amplitudes[:, 1] / unit**2 / line,
-        third=windows.amplitudes[:, 2] / unit**3 / line,
-        noise=noise,
-        samples=windows.samples,
-        block=factor,
-        fast_noise=fast / (noise * np.sqrt(factor)),
-        duration=record.duration,
     )
 
 

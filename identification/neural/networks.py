@@ -306,11 +306,7 @@ def held_out_errors(networks: Networks, rng: np.random.Generator) -> NetworkErro
 
 
 def read_stored(weights: Path) -> tuple[bytes, bytes]:
-    """Weights and record that ``tunnel train`` wrote: a safetensors file, and the ``.json`` of its name beside it.
-
-    Raises:
-        TunnelError: when a file is missing, cannot be read or is too large.
-    """
+    """Weights and record of ``tunnel train``: a safetensors file, and the ``.json`` of its name beside it."""
     remedy = "name the .safetensors file that tunnel train wrote, with its .json beside it"
     content = read_regular(weights, limits.WEIGHTS_BYTES, missing=remedy, readable=remedy)
     beside = weights.with_suffix(".json")
@@ -367,7 +363,7 @@ def weights_bytes(damping: Network, frequency: Network) -> bytes:
 
 
 def read_networks(weights: Path) -> Networks:
-    """Read networks written by ``tunnel train``: arguments and errors as in `read_stored` and `networks_of`."""
+    """Read networks written by ``tunnel train``, as `read_stored` does."""
     return networks_of(*read_stored(weights), str(weights))
 
 
@@ -384,11 +380,7 @@ def shipped_record() -> dict[str, Any]:
 
 
 def networks_of(weights: bytes, record: bytes | str, where: str) -> Networks:
-    """Networks from safetensors and the JSON of their training record.
-
-    Raises:
-        TunnelError: when they are malformed, or do not belong together.
-    """
+    """Networks from safetensors and the JSON of their training record."""
     with open_stored(weights, record, where, estimator="neural_network") as (tensors, document):
         spec = DataSpec.from_json_dict(document["data"])
         errors = NetworkErrors.from_json_dict(document["errors"])

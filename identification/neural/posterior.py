@@ -239,7 +239,7 @@ def to_bytes(networks: Mapping[str, TrainedPosterior]) -> bytes:
 
 
 def read_trained(path: Path) -> dict[str, TrainedPosterior]:
-    """Read networks that ``tunnel train`` wrote: arguments and errors as in `trained_of` and `read_stored`."""
+    """Read networks that ``tunnel train`` wrote, as `read_stored` does."""
     return trained_of(*read_stored(path), str(path))
 
 
@@ -250,11 +250,7 @@ def shipped_posteriors() -> dict[str, TrainedPosterior]:
 
 
 def trained_of(weights: bytes, record: bytes, where: str) -> dict[str, TrainedPosterior]:
-    """Networks from safetensors and the JSON of their training record, by kind.
-
-    Raises:
-        TunnelError: when they are malformed, or do not belong together.
-    """
+    """Networks from safetensors and the JSON of their training record, by kind."""
     with open_stored(weights, record, where, estimator="neural_posterior") as (tensors, document):
         found = {}
         for kind in KINDS:

@@ -80,13 +80,6 @@ def _drifts_and_steps(w: RivalWindows, stiffness: Array | float) -> list[Column]
     ]
 
 
-def record_columns(w: RivalWindows) -> Array:
-    """The columns of the rivals of records by themselves, shape (2 w, 22)."""
-    free: list[Column] = [(-w.integrals[power], None) for power in _ANY]
-    free += [(None, w.integrals[power]) for power in _ANY]
-    return w.joined([*free, *_readings(w), *_drifts_and_steps(w, 1.0)])
-
-
 def campaign_columns(w: RivalWindows, c: RivalConditions) -> Array:
     """The columns of the rivals of a campaign, shape (2 w, 51)."""
     one, ones = np.ones_like(c.stiffness), np.ones(w.time.size)
@@ -303,7 +296,9 @@ def record_features(runs: Sequence[Demodulated]) -> list[tuple[Features, Rivals]
     """
     windows = RivalWindows.of(runs)
     nominal = windows.joined([(-windows.time, None), (None, windows.time)])
-    columns = record_columns(windows)
+    free: list[Column] = [(-windows.integrals[power], None) for power in _ANY]
+    free += [(None, windows.integrals[power]) for power in _ANY]
+    columns = windows.joined([*free, *_readings(windows), *_drifts_and_steps(windows, 1.0)])
     ends = 2 * np.cumsum(windows.sizes)
     pairs: list[tuple[Features, Rivals] | None] = []
     for run, a, b in zip(runs, ends - 2 * windows.sizes, ends, strict=True):

@@ -345,11 +345,7 @@ class Checkpoint:
 
 
 def read_checkpoint(path: Path, spec: dict[str, Any]) -> Checkpoint | None:
-    """Read the checkpoint of a training; None where there is none, or it belongs to another training.
-
-    Raises:
-        TunnelError: when the file exists but cannot be read.
-    """
+    """Read the checkpoint of a training; None where there is none, or it belongs to another training."""
     return Checkpoint.from_bytes(read_regular(path, limits.WEIGHTS_BYTES), spec) if path.exists() else None
 
 
@@ -430,40 +426,38 @@ def train(
                     progress(whole, name)
                     checkpoint = Checkpoint((*checkpoint.ended, state), None)
                 before = whole
-        return _collect(spec, checkpoint)
+        best: dict[str, Network] = {}
+        described: dict[str, Any] = {}
+        for number, which in enumerate(NETWORKS):
+            problem = problem_of(spec, which)
+            ended = checkpoint.ended[number * spec.starts : (number + 1) * spec.starts]
+            concluded = [conclude_training(one, problem) for one in ended]
+            chosen = int(np.argmax([record["log_evidence"] for _, record in concluded]))
+            best[which] = concluded[chosen][0]
+            described[which] = {
+                "sizes": list(SIZES[which]),
+                "parameters": parameter_count(SIZES[which]),
+                "training_pairs": int(problem.targets.size),
+                "chosen_start": chosen + 1,
+                "starts": [record for _, record in concluded],
+            }
+        untested = Networks(best[DAMPING], best[FREQUENCY], spec.data, _NO_ERRORS)
+        networks = replace(
+            untested, errors=held_out_errors(untested, np.random.default_rng([spec.seed, _TEST]))
+        )
+        weights = weights_bytes(best[DAMPING], best[FREQUENCY])
+        record = {
+            **spec.to_json_dict(),
+            "networks": described,
+            "errors": asdict(networks.errors),
+            "versions": {
+                name: version(name) for name in ("virtual-wind-tunnel", "torch", "numpy", "safetensors")
+            },
+            "weights_sha256": hashlib.sha256(weights).hexdigest(),
+        }
+        return TrainedNetworks(networks, weights, json.loads(json_line(record)))
 
 
 def problem_of(spec: TrainingSpec, which: str) -> Problem:
     """The scaled training pairs of a network, ``damping`` or ``frequency``."""
     return Problem.of(training_pairs(spec.data, which), SIZES[which], unit_deviation=which == FREQUENCY)
-
-
-def _collect(spec: TrainingSpec, checkpoint: Checkpoint) -> TrainedNetworks:
-    best: dict[str, Network] = {}
-    described: dict[str, Any] = {}
-    for number, which in enumerate(NETWORKS):
-        problem = problem_of(spec, which)
-        ended = checkpoint.ended[number * spec.starts : (number + 1) * spec.starts]
-        concluded = [conclude_training(one, problem) for one in ended]
-        chosen = int(np.argmax([record["log_evidence"] for _, record in concluded]))
-        best[which] = concluded[chosen][0]
-        described[which] = {
-            "sizes": list(SIZES[which]),
-            "parameters": parameter_count(SIZES[which]),
-            "training_pairs": int(problem.targets.size),
-            "chosen_start": chosen + 1,
-            "starts": [record for _, record in concluded],
-        }
-    untested = Networks(best[DAMPING], best[FREQUENCY], spec.data, _NO_ERRORS)
-    networks = replace(untested, errors=held_out_errors(untested, np.random.default_rng([spec.seed, _TEST])))
-    weights = weights_bytes(best[DAMPING], best[FREQUENCY])
-    record = {
-        **spec.to_json_dict(),
-        "networks": described,
-        "errors": asdict(networks.errors),
-        "versions": {
-            name: version(name) for name in ("virtual-wind-tunnel", "torch", "numpy", "safetensors")
-        },
-        "weights_sha256": hashlib.sha256(weights).hexdigest(),
-    }
-    return TrainedNetworks(networks, weights, json.loads(json_line(record)))

@@ -122,7 +122,17 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
         return _failed(run, reading, Status.NOT_CONVERGED)
     if not determined(found.normal):
         return _failed(run, reading, Status.NOT_DETERMINED)
-    fit = _as_run_fit(found, coefficients, places)
+    # In the order of free runs: the gain eliminated, and a known k with a row of its own.
+    size, kept = len(places), sum(place < 2 for place in places)
+    order = [*range(kept), *range(size, size + _OWN), *range(kept, size)]
+    normal = found.normal[np.ix_(order, order)]
+    if size > kept:
+        normal = eliminate(normal, np.zeros(len(order)), kept + _OWN)[0]
+    information, at = np.eye(2 + _OWN), [*range(kept), 2, 3, 4]
+    information[np.ix_(at, at)] = normal
+    decay = Decay(float(coefficients[0]), float(coefficients[1]))
+    angle, rate = found.own[0, 1:].tolist()
+    fit = RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
     zero = float(reading.yaw.mean()) if drifts else float(found.own[0, 0])
     noise, failure = noise_and_failure(reading, fit, zero, sensor)
     if failure is not None:
@@ -133,7 +143,12 @@ def driven_run(run: Run, sensor: SensorProperties) -> FittedRun:
     )
     weight = np.zeros((3, 3))
     weight[np.ix_(places, places)] = eliminate(found.normal, np.zeros(len(found.normal)), len(places))[0]
-    offset = _offset(found, variance, drive.unit) if drifts else None
+    offset = None
+    if drifts:  # the constant acceleration, over the gain
+        gain, constant = float(found.parameters[1]), float(found.own[0, 0])
+        slope = np.array([0.0, -constant / gain**2, 1.0 / gain, 0.0, 0.0])
+        std = float(np.sqrt(slope @ inverse(found.normal) @ slope * variance))
+        offset = Quantity(constant / gain, std, drive.unit)
     gained = Gained(coefficients, weight / variance, offset)
     return DrivenRun(reading, fit if estimate.identified else None, noise, estimate, gained)
 
@@ -152,27 +167,6 @@ def input_response(reading: Reading, drive: Drive, decay: Decay, derivative: int
 
 def _failed(run: Run, reading: Reading, status: Status) -> FittedRun:
     return FittedRun(reading, None, None, RunEstimate(run.id, (status,)))
-
-
-def _as_run_fit(found: InputFit, coefficients: Array, places: Sequence[int]) -> RunFit:
-    """The fit in the order of free runs: the gain eliminated, and a known k with a row of its own."""
-    size, kept = len(places), sum(place < 2 for place in places)
-    order = [*range(kept), *range(size, size + _OWN), *range(kept, size)]
-    normal = found.normal[np.ix_(order, order)]
-    if size > kept:
-        normal = eliminate(normal, np.zeros(len(order)), kept + _OWN)[0]
-    information, at = np.eye(2 + _OWN), [*range(kept), 2, 3, 4]
-    information[np.ix_(at, at)] = normal
-    decay = Decay(float(coefficients[0]), float(coefficients[1]))
-    angle, rate = found.own[0, 1:].tolist()
-    return RunFit(decay, angle, rate, found.residuals[0], information, np.zeros(2 + _OWN))
-
-
-def _offset(found: InputFit, variance: float, unit: str) -> Quantity:
-    """The constant acceleration of a body without a spring, over the gain."""
-    gain, constant = float(found.parameters[1]), float(found.own[0, 0])
-    slope = np.array([0.0, -constant / gain**2, 1.0 / gain, 0.0, 0.0])
-    return Quantity(constant / gain, float(np.sqrt(slope @ inverse(found.normal) @ slope * variance)), unit)
 
 
 def fit_with_inputs(
@@ -208,7 +202,13 @@ def fit_with_inputs(
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
         except np.linalg.LinAlgError:
             break
-        moved, moved_own = _moved(parameters, own, step, own_zeros)
+        size = parameters.size
+        moved, moved_own = parameters + step[:size], own.copy()
+        if own_zeros:
+            moved_own += step[size:].reshape(-1, _OWN)
+        else:
+            moved_own[:, 0] += step[size]
+            moved_own[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
             trial = equations(moved, moved_own)
             after = sum(float(r @ r) for r in trial[0])
@@ -225,17 +225,6 @@ def fit_with_inputs(
         if converged:
             break
     return InputFit(parameters, own, residuals, normal, converged)
-
-
-def _moved(parameters: Array, own: Array, step: Array, own_zeros: bool) -> tuple[Array, Array]:
-    size = parameters.size
-    changed = own.copy()
-    if own_zeros:
-        changed += step[size:].reshape(-1, _OWN)
-    else:
-        changed[:, 0] += step[size]
-        changed[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
-    return parameters + step[:size], changed
 
 
 def normal_equations(

@@ -18,7 +18,7 @@ from pydantic import Field
 from scipy.linalg import block_diag
 from scipy.special import chdtri
 
-from identification.campaign.derivatives import Design, build_design, combine, derivatives
+from identification.campaign.derivatives import build_design, combine, derivatives
 from identification.estimate import PARAMETERS, Estimate, Quantity, RunEstimate
 from identification.policy import (
     DIFFERENCE_DEVIATIONS,
@@ -28,7 +28,7 @@ from identification.policy import (
 )
 from identification.statistics import inverse
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
+from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -244,7 +244,16 @@ def make_budget(
     noise = Component("noise of the readings", "A", covariance)
     common = _common(budget, inputs, any(run.wind_on for run in campaign.runs))
     individual = _individual(campaign, budget, identify, inputs, progress)
-    scatter = _scatter(campaign, estimate, budget, inputs)
+    scatter = []  # of the wind-off and the wind-on runs, as far as the components above do not explain it
+    sides = side_scatter(campaign, estimate.runs, inputs.individual)
+    for side, label in zip(sides, ("wind-off", "wind-on"), strict=True):
+        of_side = np.zeros((len(budget.names),) * 2)
+        shared = [name for name in side.names if name in budget.names]
+        mine, theirs = [budget.names.index(n) for n in shared], [side.names.index(n) for n in shared]
+        of_side[np.ix_(mine, mine)] = side.covariance[np.ix_(theirs, theirs)]
+        note = "" if of_side.any() else "explained by the components above"
+        note = note if side.known else "unknown, because the campaign has no redundant runs"
+        scatter.append(Component(f"scatter of the {label} runs", "A", of_side, note, known=side.known))
     progress("choice of model")
     rivals = {name: other(campaign) for name, other in (others or {}).items()}
     halves = []
@@ -324,23 +333,6 @@ def _values(estimate: Estimate, budget: Budget) -> Array | None:
     found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
     given = [quantity.value for quantity in found if quantity is not None]
     return np.array(given) if len(given) == len(found) else None
-
-
-def _scatter(
-    campaign: Campaign, estimate: Estimate, budget: Budget, inputs: InputUncertainties
-) -> list[Component]:
-    """The scatter of the wind-off and of the wind-on runs, as far as the components above do not explain it."""
-    found = []
-    sides = side_scatter(campaign, estimate.runs, inputs.individual)
-    for side, label in zip(sides, ("wind-off", "wind-on"), strict=True):
-        covariance = np.zeros((len(budget.names),) * 2)
-        shared = [name for name in side.names if name in budget.names]
-        mine, theirs = [budget.names.index(n) for n in shared], [side.names.index(n) for n in shared]
-        covariance[np.ix_(mine, mine)] = side.covariance[np.ix_(theirs, theirs)]
-        note = "" if covariance.any() else "explained by the components above"
-        note = note if side.known else "unknown, because the campaign has no redundant runs"
-        found.append(Component(f"scatter of the {label} runs", "A", covariance, note, known=side.known))
-    return found
 
 
 def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Component:
@@ -428,28 +420,22 @@ def side_scatter(
     gain = inverse_normal @ links.T @ weight
     residual = np.concatenate(decays) - links @ shared
     fit = _SideFit(residual, weight, links @ gain, noise, values.jacobian @ gain, values.names)
-    covariance = fit.noise + _input_covariance(runs, campaign.rig, design, shared, individual)
-    windy = np.repeat([run.wind_on for run in runs], 2)
-    return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
-
-
-def _input_covariance(
-    runs: Sequence[Run], rig: RigProperties, design: Design, shared: Array, individual: Mapping[str, float]
-) -> Array:
-    """Covariance of the runs' (a, k) due to the errors of their stated inputs."""
-    total = np.zeros((2 * len(runs),) * 2)
+    # The covariance of the runs' (a, k) due to the errors of their stated inputs.
+    of_inputs = np.zeros((2 * len(runs),) * 2)
     before = np.concatenate(design.links) @ shared
     for name, size in individual.items():
         for group in error_groups(runs, name):
             moved = [
                 with_scaled_input(run, name, 1.0 + _STEP) if i in group else run for i, run in enumerate(runs)
             ]
-            links = build_design(moved, rig).links
-            if links[0].shape != design.links[0].shape:
+            others = build_design(moved, campaign.rig).links
+            if others[0].shape != design.links[0].shape:
                 continue
-            move = (np.concatenate(links) @ shared - before) * (size / _STEP)
-            total += np.outer(move, move)
-    return total
+            move = (np.concatenate(others) @ shared - before) * (size / _STEP)
+            of_inputs += np.outer(move, move)
+    covariance = fit.noise + of_inputs
+    windy = np.repeat([run.wind_on for run in runs], 2)
+    return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
 
 
 def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:

@@ -202,8 +202,16 @@ def propose_drive(
         *(_stepped([f]) for f in resonances),
         _band("multisine")([outer[0] / _BROAD, outer[1] * _BROAD]),
         *(_moved(_band(k), [outer[0] / _WIDER, outer[1] * _WIDER], score) for k in ("multisine", "chirp")),
-        _moved(_stepped, _fewer(resonances, score), score),
     ]
+    rates = resonances  # of a stepped sine, without those whose time is better spent at the others, Hz
+    while len(rates) > 1:
+        shorter = min(
+            ([*rates[:i], *rates[i + 1 :]] for i in range(len(rates))), key=lambda left: score(_stepped(left))
+        )
+        if score(_stepped(shorter)) >= score(_stepped(rates)):
+            break
+        rates = shorter
+    found.append(_moved(_stepped, rates, score))
     best = min(found, key=score)
     if score(best) == inf:
         raise TunnelError(
@@ -226,18 +234,6 @@ def _moved(
                 if score(trial := make(moved)) < score(best):
                     rates, best, improved = moved, trial, True
     return best
-
-
-def _fewer(rates: list[float], score: Callable[[DriveTable], float]) -> list[float]:
-    """Frequencies of a stepped sine (Hz) without those whose time is better spent at the others."""
-    while len(rates) > 1:
-        shorter = min(
-            ([*rates[:i], *rates[i + 1 :]] for i in range(len(rates))), key=lambda left: score(_stepped(left))
-        )
-        if score(_stepped(shorter)) >= score(_stepped(rates)):
-            break
-        rates = shorter
-    return rates
 
 
 def _stepped(rates: list[float]) -> DriveTable:

@@ -59,18 +59,14 @@ _SHORT = (
 
 
 def stated(session: Session) -> Cells:
-    """The conditions in ``campaign.toml``.
-
-    Raises:
-        TunnelError: when it cannot be read.
-    """
+    """The conditions in ``campaign.toml``."""
     document = _document(session)
     rows = {run["id"]: _texts(run, RUN_KEYS) for run in document["runs"]}
     return {RIG: _texts(document.get("rig", {}), RIG_KEYS), **rows}
 
 
 def typed(session: Session) -> Cells:
-    """The conditions as they were typed last, saved in the campaign or not; errors as of `stated`."""
+    """The conditions as they were typed last, saved in the campaign or not."""
     saved = stated(session)
     if not session.draft.is_file():
         return saved
@@ -107,11 +103,7 @@ def faults(cells: Cells, *, plausible: bool) -> Words:
 
 
 def number(text: str, where: str) -> float | None:
-    """The number that a cell holds, with a decimal point or comma; None where it is empty.
-
-    Raises:
-        TunnelError: when it is not a number.
-    """
+    """The number that a cell holds, with a decimal point or comma; None where it is empty."""
     if not text.strip():
         return None
     try:

@@ -78,7 +78,16 @@ class DiagnosePage:
         if not state.running and (took := work.seconds_taken(self._log)) is not None:
             self._before = f"; the last diagnosis took {took:.0f} s"
         now = (replace(state, lines=()), stages, written)
-        self._show_clock(state)
+        words = "Paused; it goes on where it was."
+        if state.running and not state.paused:
+            begun = datetime.fromisoformat(state.started)
+            elapsed = (datetime.now().astimezone() - begun).total_seconds()
+            tried = f", now with {self._tried}" if self._tried else ""
+            words = (
+                f"{elapsed:.0f} s so far{self._before}{tried}. "
+                "It runs in a process of its own: this page may be closed."
+            )
+        self._clock.set_text(f"{words} {_STOP}" if state.running else "")
         if now == self._shown:
             return
         self._shown = now
@@ -113,21 +122,6 @@ class DiagnosePage:
                 words = "The campaign has changed since it was diagnosed; diagnose it again."
                 ui.label(words).classes("fault")
         self._frame.refresh(self._on)
-
-    def _show_clock(self, state: work.Work) -> None:
-        if not state.running:
-            self._clock.set_text("")
-            return
-        words = "Paused; it goes on where it was."
-        if not state.paused:
-            begun = datetime.fromisoformat(state.started)
-            elapsed = (datetime.now().astimezone() - begun).total_seconds()
-            tried = f", now with {self._tried}" if self._tried else ""
-            words = (
-                f"{elapsed:.0f} s so far{self._before}{tried}. "
-                "It runs in a process of its own: this page may be closed."
-            )
-        self._clock.set_text(f"{words} {_STOP}")
 
     async def _start(self) -> None:
         with self._fault.around():
@@ -438,11 +432,7 @@ class ReportPage:
 
 
 def write_session_report(session: Session, author: str, notes: str) -> None:
-    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does.
-
-    Raises:
-        TunnelError: when it cannot be written.
-    """
+    """Write the report of the session's diagnosis, as ``tunnel diagnose --report`` does."""
     from diagnosis.diagnosable import diagnosable
     from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_folder import read_campaign

@@ -86,11 +86,7 @@ def files_of(session: Session) -> list[Path]:
 
 
 def choices_of(session: Session) -> ImportChoices:
-    """What has been stated about the files.
-
-    Raises:
-        TunnelError: when the recipe beside the campaign cannot be read.
-    """
+    """What has been stated about the files."""
     return read_recipe(session.choices) if session.choices.is_file() else ImportChoices()
 
 

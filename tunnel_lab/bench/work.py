@@ -108,11 +108,7 @@ def seconds_taken(log: Path) -> float | None:
 
 
 def start(words: Sequence[str], log: Path) -> None:
-    """Start a command of ``tunnel`` that prints into a log.
-
-    Raises:
-        TunnelError: when the command is running already.
-    """
+    """Start a command of ``tunnel`` that prints into a log."""
     child = _started.get(log)
     if work_of(log).running or (child is not None and child.poll() is None):
         raise TunnelError("is running already", where=words[0], remedy="wait for it, or stop it")

@@ -100,11 +100,7 @@ def sessions(folder: Path) -> list[Session]:
 
 
 def open_session(folder: Path, name: str) -> Session:
-    """A session by the name in an address.
-
-    Raises:
-        TunnelError: when there is no such session.
-    """
+    """A session by the name in an address."""
     by_name = {session.name: session for session in sessions(folder)}
     if name not in by_name:
         what, remedy = f"there is no campaign '{one_line(name, 60)}'", "choose one on the first page"
@@ -191,11 +187,7 @@ def _hashes(session: Session, _: object) -> dict[str, str]:
 
 
 def read_result(path: Path) -> dict[str, Any] | None:
-    """The JSON document that a command has written; None where there is none.
-
-    Raises:
-        TunnelError: when the file is not such a document.
-    """
+    """The JSON document that a command has written; None where there is none."""
     from tunnel_sim.files.reading import read_json
 
     if not path.is_file():

@@ -16,7 +16,6 @@ from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tab
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from identification.neural.train import TrainingSpec
     from tunnel_lab.experiments.score_trials import Results
 
 PACKAGED = "packaged"
@@ -393,7 +392,9 @@ def train(
       0 trained, 2 bad input, 130 interrupted (finished work is kept).
     """
     from identification.neural.networks import DataSpec
-    from identification.neural.train import TrainingSpec
+    from identification.neural.train import Checkpoint, TrainingSpec, read_checkpoint
+    from identification.neural.train import train as train_networks
+    from tunnel_sim.files.writing import write_json, write_whole
 
     if out.suffix != ".safetensors":
         raise TunnelError("does not end in .safetensors", where=str(out), remedy="give the file this suffix")
@@ -405,41 +406,7 @@ def train(
             remedy = f"give LOW HIGH between 0 and {most:g}"
             raise TunnelError(f"{low:g} {high:g} is not a range", where=option, remedy=remedy)
     data = DataSpec(zeta_range=zeta, omega_range=omega)
-    _train_network(out, TrainingSpec(seed, data, starts, steps or 400, steps or 3000), restart=restart)
-
-
-def _train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int, restart: bool) -> None:
-    """Train and write both networks of `neural_posterior`, with a record beside them."""
-    from tunnel_lab.experiments.training import TrainingSpec, train
-    from tunnel_sim.files.writing import write_json, write_whole
-
-    refuse_unwritable_files(out, out.with_suffix(".json"))
-    folder = out.with_suffix(".part")
-    if restart and folder.exists():
-        shutil.rmtree(folder)
-    with bar("training", 1) as progress:
-        weights, record = train(
-            TrainingSpec(seed, shards, steps),
-            folder,
-            jobs=jobs,
-            progress=lambda what, done, all_of_it: progress(done, all_of_it, what),
-        )
-    write_whole(out, weights)
-    write_json(out.with_suffix(".json"), record)
-    shutil.rmtree(folder)
-    for kind, network in record["networks"].items():
-        losses = ", ".join(f"{part} {loss:.3f}" for part, (loss, _) in network["loss"].items())
-        say(
-            f"{kind}: {network['samples']['training']} samples; −ln of the density at the truth, in standard "
-            f"deviations of the nominal fit: {losses}"
-        )
-    say(f"Written: {out} and {out.with_suffix('.json')}")
-
-
-def _train_network(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
-    from identification.neural.train import Checkpoint, read_checkpoint, train
-    from tunnel_sim.files.writing import write_json, write_whole
-
+    spec = TrainingSpec(seed, data, starts, steps or 400, steps or 3000)
     partial = out.with_suffix(".part.safetensors")
     refuse_unwritable_files(out, out.with_suffix(".json"), partial)
     resume = None if restart else read_checkpoint(partial, spec.to_json_dict())
@@ -458,7 +425,7 @@ def _train_network(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
 
     try:
         with bar("training", spec.total_work) as progress:
-            trained = train(
+            trained = train_networks(
                 spec,
                 resume=resume,
                 keep=keep,
@@ -489,4 +456,32 @@ def _train_network(out: Path, spec: TrainingSpec, *, restart: bool) -> None:
         f"({100 * errors['zeta_relative']:.2g} % of ζ at most), "
         f"ωn to {100 * errors['omega_relative']:.2g} %"
     )
+    say(f"Written: {out} and {out.with_suffix('.json')}")
+
+
+def _train_posterior(out: Path, seed: int, shards: int, steps: int, *, jobs: int, restart: bool) -> None:
+    """Train and write both networks of `neural_posterior`, with a record beside them."""
+    from tunnel_lab.experiments.training import TrainingSpec, train
+    from tunnel_sim.files.writing import write_json, write_whole
+
+    refuse_unwritable_files(out, out.with_suffix(".json"))
+    folder = out.with_suffix(".part")
+    if restart and folder.exists():
+        shutil.rmtree(folder)
+    with bar("training", 1) as progress:
+        weights, record = train(
+            TrainingSpec(seed, shards, steps),
+            folder,
+            jobs=jobs,
+            progress=lambda what, done, all_of_it: progress(done, all_of_it, what),
+        )
+    write_whole(out, weights)
+    write_json(out.with_suffix(".json"), record)
+    shutil.rmtree(folder)
+    for kind, network in record["networks"].items():
+        losses = ", ".join(f"{part} {loss:.3f}" for part, (loss, _) in network["loss"].items())
+        say(
+            f"{kind}: {network['samples']['training']} samples; −ln of the density at the truth, in standard "
+            f"deviations of the nominal fit: {losses}"
+        )
     say(f"Written: {out} and {out.with_suffix('.json')}")

@@ -29,10 +29,7 @@ from tunnel_lab.terminal.outputs import (
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from identification.estimate import Estimate
     from identification.estimators import Estimator
-    from identification.uncertainty.budget import Budget
-    from tunnel_sim.vocabulary.campaign import Campaign
 
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
@@ -128,7 +125,25 @@ def run(
     estimate = identify(data, chosen, throw=False)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
-        estimate, found = _budgeted(data, estimate, chosen, uncertainties, models or [])
+        from identification.uncertainty import budget as budgets
+
+        inputs = budgets.InputUncertainties()  # exact
+        if uncertainties is not None:
+            inputs = budgets.load_uncertainties(uncertainties)
+        with console(stderr=True).status("uncertainty budget") as status:
+            found = budgets.make_budget(
+                data,
+                estimate,
+                partial(identify, estimator=chosen, throw=False),
+                inputs,
+                others={
+                    name: partial(identify, estimator=name, throw=False)
+                    for name in models or ()
+                    if name != estimate.estimator
+                },
+                progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
+            )
+        estimate = budgets.with_budget(estimate, found)
     document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
     if to_stdout:
         typer.echo(json_text(document), nl=False)
@@ -163,33 +178,3 @@ def with_estimators(text: str | None) -> str:
 
 
 run.__doc__ = with_estimators(run.__doc__)
-
-
-def _budgeted(
-    campaign: Campaign,
-    estimate: Estimate,
-    chosen: str | Estimator,
-    uncertainties: Path | None,
-    models: list[str],
-) -> tuple[Estimate, Budget]:
-    """The estimate with combined standard uncertainties, and their budget."""
-    from identification import identify
-    from identification.uncertainty import budget
-
-    inputs = budget.InputUncertainties()  # exact
-    if uncertainties is not None:
-        inputs = budget.load_uncertainties(uncertainties)
-    with console(stderr=True).status("uncertainty budget") as status:
-        made = budget.make_budget(
-            campaign,
-            estimate,
-            partial(identify, estimator=chosen, throw=False),
-            inputs,
-            others={
-                name: partial(identify, estimator=name, throw=False)
-                for name in models
-                if name != estimate.estimator
-            },
-            progress=lambda what: status.update(Text(f"uncertainty budget: {what}")),
-        )
-    return budget.with_budget(estimate, made), made

@@ -65,6 +65,9 @@ def demo(
     """
     from identification import identify
     from identification.datasets import measured_campaign
+    from tunnel_lab.plotting import runs
+    from tunnel_lab.plotting.style import save_both
+    from tunnel_lab.show.film import Look, Request, write_film
     from tunnel_sim.files.plan_file import paper_plan
     from tunnel_sim.files.writing import output_folder, write_json
 
@@ -77,7 +80,19 @@ def demo(
     measured = measured_campaign(MEASURED)
     estimate = identify(measured, CHECKED_ESTIMATOR, throw=False)
     write_json(folder / f"estimate-{MEASURED}.json", estimate.to_json_dict())
-    problem = _draw(folder, campaign, estimates, plan, estimate)
+    off = next(run for run in campaign.runs if not run.wind_on)
+    pairs = [run for run in campaign.runs if run.wind_on and run.spring_stiffness == off.spring_stiffness]
+    on = max(pairs, key=lambda run: run.wind_speed)
+    save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
+    save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")
+    save_both(runs.windows_figure(estimate), folder / "windows.png")
+    save_both(runs.truth_figure(estimates, vars(plan.truth)), folder / "estimates.png")
+    problem = ""  # why there is no picture of the rig
+    with console(stderr=True).status("rendering the rig"):
+        try:
+            write_film(Request(), Look(height=800, trace=False), folder / "rig.png", at=0.0)
+        except TunnelError as error:
+            problem = str(error)
     show_simulated(campaign, estimates, plan)
     say(f"Measured: {measured.name}, {len(measured.runs)} runs. {measured.description}\n")
     show_estimate(measured, estimate, windows=True)
@@ -135,29 +150,6 @@ def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: Camp
     for estimate in estimates:
         for line in status_lines(estimate.to_json_dict()):
             say(f"Note, {estimate.estimator}: {line}")
-
-
-def _draw(
-    folder: Path, campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan, measured: Estimate
-) -> str:
-    """Draw the figures and the rig; return why there is no picture of the rig, or an empty text."""
-    from tunnel_lab.plotting import runs
-    from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.show.film import Look, Request, write_film
-
-    off = next(run for run in campaign.runs if not run.wind_on)
-    pairs = [run for run in campaign.runs if run.wind_on and run.spring_stiffness == off.spring_stiffness]
-    on = max(pairs, key=lambda run: run.wind_speed)
-    save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
-    save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")
-    save_both(runs.windows_figure(measured), folder / "windows.png")
-    save_both(runs.truth_figure(estimates, vars(plan.truth)), folder / "estimates.png")
-    with console(stderr=True).status("rendering the rig"):
-        try:
-            write_film(Request(), Look(height=800, trace=False), folder / "rig.png", at=0.0)
-        except TunnelError as error:
-            return str(error)
-    return ""
 
 
 def springs(

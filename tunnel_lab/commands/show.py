@@ -212,12 +212,20 @@ def render(
 
     targets = out or list(_DEFAULT)
     for path in targets:
-        _check_target(path)
+        where = f"--out {path}"  # what cannot be written is refused before the work is done
+        if path.suffix.lower() not in (".mp4", ".png"):
+            raise TunnelError(
+                "is neither .mp4 nor .png", where=where, remedy="name a file that ends in one of these"
+            )
+        if path.suffix.lower() == ".mp4":
+            library("imageio_ffmpeg", "a film", "film", where)
+        if path.is_dir():
+            raise TunnelError("is a folder", where=where, remedy="name a file")
         if not out:
             output_folder(path.parent)
         elif not path.parent.is_dir():
             remedy = "make the folder, or name another file"
-            raise TunnelError("its folder does not exist", where=f"--out {path}", remedy=remedy)
+            raise TunnelError("its folder does not exist", where=where, remedy=remedy)
     width, cross, height = size.lower().partition("x")
     pixels = [int(part) if part.isdecimal() else 0 for part in (width, height)]
     if not cross or any(n % 2 or not 160 <= n <= 3840 for n in pixels):
@@ -234,14 +242,3 @@ def render(
             with bar("drawing frames") as progress:
                 write_film(request, look, path, progress)
     say_written(*targets)
-
-
-def _check_target(path: Path) -> None:
-    """Refuse a file that cannot be written before the work is done."""
-    if path.suffix.lower() not in (".mp4", ".png"):
-        remedy = "name a file that ends in one of these"
-        raise TunnelError("is neither .mp4 nor .png", where=f"--out {path}", remedy=remedy)
-    if path.suffix.lower() == ".mp4":
-        library("imageio_ffmpeg", "a film", "film", f"--out {path}")
-    if path.is_dir():
-        raise TunnelError("is a folder", where=f"--out {path}", remedy="name a file")

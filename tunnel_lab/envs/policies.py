@@ -205,11 +205,7 @@ def menu_text(menu: Menu) -> str:
 
 
 def read_agent(path: Path) -> Agent:
-    """An agent from a file that `Agent.to_bytes` made.
-
-    Raises:
-        TunnelError: when the file cannot be read or is not an agent.
-    """
+    """An agent from a file that `Agent.to_bytes` made."""
     from safetensors import SafetensorError, safe_open
 
     try:

@@ -330,7 +330,21 @@ def draw_truth(
         low, high = severities[name]
         severity = exp(rng.uniform(log(low), log(high)))
         effects = (effect_from(name, {effect_class(name).parameters()[0].name: severity}),)
-    given = _numbers(options.get("truth", {}))
+    truth, known = options.get("truth", {}), (*PARAMETERS, "sensor_zero")
+    if not isinstance(truth, Mapping):
+        raise TunnelError("option truth is not a mapping", remedy=f"give some of {', '.join(known)} by name")
+    for name, value in truth.items():
+        if name not in known:
+            raise TunnelError(
+                f"unknown coefficient {name!r}", where="truth", remedy=did_you_mean(name, known)
+            )
+        positive = name in ("yaw_inertia", "mechanical_damping")
+        number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+        if not number or (positive and value <= 0.0):
+            unit = UNITS.get(name, "rad")
+            remedy = f"give a {'positive ' if positive else ''}number in {unit}"
+            raise TunnelError(f"{name} = {value!r} is out of range", where="truth", remedy=remedy)
+    given = {name: float(value) for name, value in truth.items()}
     zero = given.pop("sensor_zero", zero)
     stated = options.get("effects")
     if stated is not None:
@@ -346,22 +360,3 @@ def _normal(rng: np.random.Generator, mean: float, std: float) -> float:
         step = float(rng.standard_normal())
         if abs(step) <= CUT:
             return mean + std * step
-
-
-def _numbers(given: Any) -> dict[str, float]:
-    """The option ``truth``, checked."""
-    known = (*PARAMETERS, "sensor_zero")
-    if not isinstance(given, Mapping):
-        raise TunnelError("option truth is not a mapping", remedy=f"give some of {', '.join(known)} by name")
-    for name, value in given.items():
-        if name not in known:
-            raise TunnelError(
-                f"unknown coefficient {name!r}", where="truth", remedy=did_you_mean(name, known)
-            )
-        positive = name in ("yaw_inertia", "mechanical_damping")
-        number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-        if not number or (positive and value <= 0.0):
-            unit = UNITS.get(name, "rad")
-            remedy = f"give a {'positive ' if positive else ''}number in {unit}"
-            raise TunnelError(f"{name} = {value!r} is out of range", where="truth", remedy=remedy)
-    return {name: float(value) for name, value in given.items()}

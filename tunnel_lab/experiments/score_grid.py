@@ -201,9 +201,6 @@ def load_grid(path: Path) -> Grid:
 
     Returns:
         The grid; cells in the order of the tables, the last list of a table varies fastest.
-
-    Raises:
-        TunnelError: for the first error, in one line that names file, key and remedy.
     """
     missing = "name a grid such as the packaged score-grid.toml, or leave it out"
     document = read_document(GridDocument, path, missing=missing)

@@ -325,11 +325,7 @@ def trials_frame(results: Results) -> pl.DataFrame:
 
 
 def read_trials(path: Path) -> Results:
-    """Read what `write_trials` wrote; estimators are in the order of their first rows.
-
-    Raises:
-        TunnelError: when there is no such file, or it is not a table of trials.
-    """
+    """Read what `write_trials` wrote; estimators are in the order of their first rows."""
     where, remedy = shown(path), "write one with tunnel score --write-baseline"
     content = read_regular(path, limits.DATA_BYTES, missing=remedy, readable=remedy)
     with as_described("is not a table of trials", where, remedy):

@@ -315,11 +315,7 @@ class Store:
         write_whole(self._file(RESULTS, shard.index), shard.results)
 
     def timings(self) -> pl.DataFrame:
-        """Step, runs and seconds of each step of the finished shards; a shard whose times were removed is left out.
-
-        Raises:
-            TunnelError: when a file of times is damaged.
-        """
+        """Step, runs and seconds of each step of the finished shards, but those whose times were removed."""
         frames = [pl.DataFrame(schema={name: TIMING_COLUMNS[name] for name in _READ_TIMINGS})]
         remedy = "remove it: no result depends on it"
         for path in filter(Path.exists, (self._file(TIMINGS, index) for index in self.finished())):

@@ -339,9 +339,6 @@ def read_sweep(path: Path) -> Sweep:
 
     Args:
         path: a TOML file; paths of rig files are relative to its folder.
-
-    Raises:
-        TunnelError: for the first error, in one line that names file, key and remedy.
     """
     content = load_toml(path, missing="name a sweep file, see docs/how-to/sweep.md")
     where = shown(path)

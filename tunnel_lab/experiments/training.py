@@ -111,7 +111,35 @@ def train(
     networks = {kind: _fitted(kind, spec, used[kind][PARTS[0]], folder, progress) for kind in KINDS}
     trained = {kind: judged(networks[kind], used[kind][PARTS[0]], used[kind][PARTS[2]]) for kind in KINDS}
     weights = to_bytes(trained)
-    return weights, _record(spec, trained, used, weights)
+    described = {}
+    for kind, by_part in used.items():
+        rivals, runs = by_part["training"]["rivals"], by_part["training"]["runs"]
+        described[kind] = {
+            "sizes": {
+                "rivals": rivals.shape[1],
+                "features": rivals.shape[2],
+                "runs": runs.shape[2] - 1,
+                "quantities": by_part["training"]["target"].shape[1],
+                "effects": len(FAMILIES),
+            },
+            "samples": {part: len(values["target"]) for part, values in by_part.items()},
+            "loss": {
+                part: [float(loss) for loss in losses(np, trained[kind].weights, values)]
+                for part, values in by_part.items()
+            },
+            "threshold": trained[kind].threshold,
+        }
+    record = {
+        "schema_version": 1,
+        "seed": spec.seed,
+        "spec": asdict(spec),
+        "false_alarms": FALSE_ALARMS,
+        "effects": list(FAMILIES),
+        "networks": described,
+        "versions": {name: version(name) for name in ("numpy", "torch", "safetensors")},
+        "weights_sha256": hashlib.sha256(weights).hexdigest(),
+    }
+    return weights, record
 
 
 def _fitted(
@@ -161,42 +189,6 @@ def judged(
     )
     distances = trained.distance(contexts(weights, apart))
     return replace(trained, threshold=float(np.quantile(distances, 1.0 - FALSE_ALARMS)))
-
-
-def _record(
-    spec: TrainingSpec,
-    trained: Mapping[str, TrainedPosterior],
-    used: Mapping[str, Mapping[str, Mapping[str, Array]]],
-    weights: bytes,
-) -> dict[str, Any]:
-    networks = {}
-    for kind, parts in used.items():
-        rivals, runs = parts["training"]["rivals"], parts["training"]["runs"]
-        networks[kind] = {
-            "sizes": {
-                "rivals": rivals.shape[1],
-                "features": rivals.shape[2],
-                "runs": runs.shape[2] - 1,
-                "quantities": parts["training"]["target"].shape[1],
-                "effects": len(FAMILIES),
-            },
-            "samples": {part: len(values["target"]) for part, values in parts.items()},
-            "loss": {
-                part: [float(loss) for loss in losses(np, trained[kind].weights, values)]
-                for part, values in parts.items()
-            },
-            "threshold": trained[kind].threshold,
-        }
-    return {
-        "schema_version": 1,
-        "seed": spec.seed,
-        "spec": asdict(spec),
-        "false_alarms": FALSE_ALARMS,
-        "effects": list(FAMILIES),
-        "networks": networks,
-        "versions": {name: version(name) for name in ("numpy", "torch", "safetensors")},
-        "weights_sha256": hashlib.sha256(weights).hexdigest(),
-    }
 
 
 @dataclass(frozen=True)

@@ -382,14 +382,11 @@ def infer_springs() -> tuple[SpringInference, ...]:
     return tuple(springs)
 
 
-def paper_run_plan(
-    seed: int, *, noisy: bool = True, effects: tuple[EffectSetting, ...] = (), wind_speed: float = 10.0
-) -> CampaignPlan:
+def paper_run_plan(seed: int, *, noisy: bool = True, effects: tuple[EffectSetting, ...] = ()) -> CampaignPlan:
     """Spring 5 with the wind off and on, released at 20°: what Table III's run may have been, an inference.
 
     Args:
         noisy: noise of 0.0005 rad and 12 bits; else neither.
-        wind_speed: of the second run, m/s.
     """
     plan = paper_plan()
     off = next(
@@ -400,7 +397,7 @@ def paper_run_plan(
     damping = _DAMPING_BESIDE_QUADRATIC if effects else _MECHANICAL_DAMPING
     truth = Truth(0.4719, -0.1033, plan.truth.yaw_inertia, damping)
     sensor = SensorModel(zero=0.004) if noisy else SensorModel(noise_std=0.0, resolution=0.0, zero=0.004)
-    on = replace(off, id="wind-on", wind_speed=wind_speed)
+    on = replace(off, id="wind-on", wind_speed=_SPEED)
     return CampaignPlan("paper-run", seed, truth, (replace(off, id="wind-off"), on), sensor, effects)
 
 

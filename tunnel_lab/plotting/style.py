@@ -159,11 +159,7 @@ def figure_text(text: str) -> str:
 
 @styled
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as ``.png`` or ``.pdf``, completely or not at all; the same figure gives the same file.
-
-    Raises:
-        TunnelError: when the file cannot be written.
-    """
+    """Write a figure as ``.png`` or ``.pdf``, completely or not at all; the same figure gives the same file."""
     form = path.suffix[1:]
     dates = {"CreationDate": None} if form == "pdf" else None
     return write_encoded(path, lambda stream: figure.savefig(stream, format=form, metadata=dates))

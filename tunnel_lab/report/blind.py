@@ -129,6 +129,23 @@ def _other_sections(score: Score) -> list[ScoreSection]:
         wrong = sorted(given.items(), key=lambda item: -item[1])
         others = [f"{name} {number}" for name, number in wrong if name != _RIGHT_ANSWER.get(truth, truth)]
         answers.append((truth, str(right[truth].total), str(right[truth].count), ", ".join(others)))
+    errors = {(e.group, e.name, e.when): e for e in score.coefficients()}
+    coefficients: list[tuple[str, ...]] = []
+    for (group, name, when), later in errors.items():
+        earlier = errors.get((group, name, "before"))
+        if when == "before" or earlier is None:
+            continue
+        least, most = later.within.interval
+        coefficients.append(
+            (
+                f"{group}: {NAMES[name]}",
+                f"{100.0 * earlier.median:.2g}",
+                f"{100.0 * later.median:.2g}",
+                f"{earlier.within.count}/{earlier.within.total}",
+                f"{later.within.count}/{later.within.total}",
+                f"{100.0 * least:.1f}–{100.0 * most:.1f} %",
+            )
+        )
     return [
         _section(
             "Closure on held-out runs, where the causes are right",
@@ -139,7 +156,7 @@ def _other_sections(score: Score) -> list[ScoreSection]:
         _section(
             "Coefficients before and after the causes are added",
             ("campaigns", "error before [%]", "after [%]", "≤ 3 std before", "after", "95 %"),
-            _coefficient_rows(score),
+            coefficients,
             "Errors are medians of |estimate − truth| / |truth|; ≤ 3 std counts errors within three standard "
             "deviations of the estimate.",
         ),
@@ -155,27 +172,6 @@ def _other_sections(score: Score) -> list[ScoreSection]:
             [(f"{middle:.1f}", f"{high:.1f}", f"{longest:.1f}")] if longest > 0.0 else (),
         ),
     ]
-
-
-def _coefficient_rows(score: Score) -> list[tuple[str, ...]]:
-    errors = {(e.group, e.name, e.when): e for e in score.coefficients()}
-    rows: list[tuple[str, ...]] = []
-    for (group, name, when), after in errors.items():
-        before = errors.get((group, name, "before"))
-        if when == "before" or before is None:
-            continue
-        low, high = after.within.interval
-        rows.append(
-            (
-                f"{group}: {NAMES[name]}",
-                f"{100.0 * before.median:.2g}",
-                f"{100.0 * after.median:.2g}",
-                f"{before.within.count}/{before.within.total}",
-                f"{after.within.count}/{after.within.total}",
-                f"{100.0 * low:.1f}–{100.0 * high:.1f} %",
-            )
-        )
-    return rows
 
 
 def origin_lines(score: Score) -> list[str]:

@@ -80,20 +80,12 @@ class Document(Part):
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
-    """The fields that are compared, of a file that ``tunnel diagnose --json`` wrote, in JSON's types.
-
-    Raises:
-        TunnelError: when it is missing, is not JSON, or is not a diagnosis.
-    """
+    """The fields that are compared, of a file that ``tunnel diagnose --json`` wrote, in JSON's types."""
     return validate(Document, read_document(path), path).model_dump()
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """The whole document of a diagnosis, of which only the fields that are compared are checked.
-
-    Raises:
-        TunnelError: as for `read_diagnosis`.
-    """
+    """The whole document of a diagnosis, of which only the fields that are compared are checked."""
     document = read_json(path, remedy=REMEDY)
     check_version(document, path)
     validate(Document, document, path)

@@ -255,7 +255,29 @@ def charts(document: Document) -> dict[str, list[Chart]]:
         "range": [low, high],
         "log": True,
     }
-    by_figure: dict[str, list[Chart]] = {"where-runs": [runs], "where-spectrum": [_spectrum(maps)]}
+    given = maps["frequency"]
+    centre = _spectrum_axis(given)[1]
+    none = np.full(centre.size, np.nan)
+    excess, std = array(given["excess"]), SIGMAS * array(given["std"])
+    after = none if given["after"] is None else array(given["after"])
+    views = [_filled("all runs together", centre, -std, std, excess, after)]
+    for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
+        views.append(_filled(run_label(run), centre, none, none, array(by_bin), none, run=run["id"]))
+    spectrum = {
+        "kind": "lines",
+        "title": "Residual power over noise against frequency",
+        "x": {"label": "frequency [Hz]", "log": True},
+        "y": {"label": "residual power over noise", "log": True},
+        "series": [
+            {"label": "noise −3σ", "role": "quiet"},
+            {"label": "noise +3σ", "role": "quiet"},
+            {"label": "nominal model", "role": "before"},
+            {"label": "with the causes", "role": "after"},
+        ],
+        "band": [2, 1],
+        "views": views,
+    }
+    by_figure: dict[str, list[Chart]] = {"where-runs": [runs], "where-spectrum": [spectrum]}
     plane = maps["phase_plane"]
     if plane is not None:
         cells, reach, unit, _ = _plane_cells(plane)
@@ -271,31 +293,6 @@ def charts(document: Document) -> dict[str, list[Chart]]:
         }
         by_figure["where-phase-plane"] = [missing]
     return by_figure
-
-
-def _spectrum(maps: Document) -> Chart:
-    given = maps["frequency"]
-    centre = _spectrum_axis(given)[1]
-    nothing = np.full(centre.size, np.nan)
-    excess, std = array(given["excess"]), SIGMAS * array(given["std"])
-    after = nothing if given["after"] is None else array(given["after"])
-    views = [_filled("all runs together", centre, -std, std, excess, after)]
-    for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
-        views.append(_filled(run_label(run), centre, nothing, nothing, array(by_bin), nothing, run=run["id"]))
-    return {
-        "kind": "lines",
-        "title": "Residual power over noise against frequency",
-        "x": {"label": "frequency [Hz]", "log": True},
-        "y": {"label": "residual power over noise", "log": True},
-        "series": [
-            {"label": "noise −3σ", "role": "quiet"},
-            {"label": "noise +3σ", "role": "quiet"},
-            {"label": "nominal model", "role": "before"},
-            {"label": "with the causes", "role": "after"},
-        ],
-        "band": [2, 1],
-        "views": views,
-    }
 
 
 def _filled(label: str, centre: Array, *excesses: Array, run: str = "") -> Chart:
@@ -334,11 +331,7 @@ class Curves:
 
 
 def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
-    """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``.
-
-    Raises:
-        TunnelError: for a run that the diagnosis does not have.
-    """
+    """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
     maps = document.get("maps") or {"runs": [], "traces": []}
     unit, factor = unit_shown(maps.get("unit", "rad"))
     labels = {run["id"]: run_label(run) for run in maps["runs"]}

@@ -121,20 +121,6 @@ def shown_run(request: Request) -> ShownRun:
     from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
 
     rig = load_rig()
-    plan = _plan_of(request, rig)
-    (condition,) = plan.conditions
-    stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
-    effects = plan_effects(plan)
-    chain = EffectChain.draw(stated, effects, np.random.default_rng([plan.seed, 0]))
-    wind = f"{condition.wind_speed:g} m/s" if condition.wind_speed > 0.0 else "wind off"
-    names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
-    start = "driven" if condition.drive else f"released at {degrees(condition.release_angle):.3g}°"
-    title = f"{condition.spring_stiffness:g} N m/rad, {wind}, {start}{names}"
-    return ShownRun(rig, chain, plan.sensor, title, plan.seed)
-
-
-def _plan_of(request: Request, rig: Rig) -> CampaignPlan:
-    """The plan with the request's effects and seed, and with the one run that is shown."""
     if request.plan is None:
         dynamics = rig.dynamics
         condition = Condition(
@@ -166,18 +152,26 @@ def _plan_of(request: Request, rig: Rig) -> CampaignPlan:
                 f"has no run {request.run!r}", where=request.plan, remedy=did_you_mean(request.run, by_id)
             )
         condition = by_id[request.run]
-    wind = _number("--wind", request.wind_speed, condition.wind_speed, 0.0, 60.0, "m/s")
-    stated = degrees(condition.release_angle)
-    angle = _number("--angle", request.release_angle_deg, stated, -60.0, 60.0, "degrees")
+    speed = _number("--wind", request.wind_speed, condition.wind_speed, 0.0, 60.0, "m/s")
+    released = degrees(condition.release_angle)
+    angle = _number("--angle", request.release_angle_deg, released, -60.0, 60.0, "degrees")
     condition = replace(
         condition,
-        wind_speed=wind,
+        wind_speed=speed,
         release_angle=condition.release_angle if request.release_angle_deg is None else radians(angle),
         duration=_number("--duration", request.duration, condition.duration, 0.5, 600.0, "s"),
         spring_stiffness=condition.spring_stiffness if request.spring is None else rig.spring(request.spring),
     )
     # Keep only this run, so that effects are checked against its spring alone.
-    return replace(plan, effects=plan.effects + added, conditions=(condition,))
+    plan = replace(plan, effects=plan.effects + added, conditions=(condition,))
+    stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
+    effects = plan_effects(plan)
+    chain = EffectChain.draw(stated, effects, np.random.default_rng([plan.seed, 0]))
+    wind = f"{condition.wind_speed:g} m/s" if condition.wind_speed > 0.0 else "wind off"
+    names = "".join(f", {effect.name.replace('_', ' ')}" for effect in effects if not effect.is_null)
+    start = "driven" if condition.drive else f"released at {degrees(condition.release_angle):.3g}°"
+    title = f"{condition.spring_stiffness:g} N m/rad, {wind}, {start}{names}"
+    return ShownRun(rig, chain, plan.sensor, title, plan.seed)
 
 
 def _number(option: str, given: float | None, plan: float, low: float, high: float, unit: str) -> float:

@@ -287,15 +287,12 @@ def window_loop(
         sleep(max(0.0, FRAME_S - (clock() - now)))
 
 
-def view_in_browser(
-    run: ShownRun, *, port: int, camera: str, open_browser: bool, seconds: float | None = None
-) -> None:
+def view_in_browser(run: ShownRun, *, port: int, camera: str, open_browser: bool) -> None:
     """Serve the run to browsers until interrupted.
 
     Args:
         port: TCP port (index); 0 takes the first free one from 8080 on.
         camera: of ``mjcf/rig.xml``, from which the page looks first.
-        seconds: time until it stops, s; None runs until interrupted.
 
     Raises:
         TunnelError: when the port is taken or MuJoCo Studio is not installed.
@@ -317,11 +314,10 @@ def view_in_browser(
     )
     # The inspector lies where the trace is, and shows the copy rather than the physics.
     plugins = [app.App(app.Config(show_inspector=False)), PuppetMaster(live), Overlay(live, address)]
-    begun = time.monotonic()
     try:
         with launch_web.launch(config, plugins=plugins) as handle:
             handle.set_model(puppet.model, data=puppet.data)
-            while handle.is_running() and (seconds is None or time.monotonic() - begun < seconds):
+            while handle.is_running():
                 handle.sync()
     except RuntimeError as error:
         raise TunnelError(str(error), where="tunnel view --web", remedy="name another --port") from error

@@ -34,9 +34,6 @@ def given_campaign(path: Path) -> Campaign:
     """Read a campaign's folder, its ``campaign.toml``, or a file of any format that ``tunnel import`` reads.
 
     What was made of a file of a data logger is printed on standard error.
-
-    Raises:
-        TunnelError: for the first fault.
     """
     from tunnel_lab.terminal.outputs import say
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
@@ -84,9 +81,6 @@ def parse_effect(text: str) -> EffectSetting:
 
     Returns:
         Name and parameters; the registry checks whether they exist and are in range.
-
-    Raises:
-        TunnelError: when it does not have that form, or a value is not a number.
     """
     from tunnel_sim.vocabulary.plan import EffectSetting
 

@@ -80,7 +80,9 @@ def show_tables(*tables: Table) -> None:
         if chosen.get() is TableFormat.TEXT and is_too_wide(table, out.width):
             out.print(stacked(table, out.width), soft_wrap=True)
         elif chosen.get() is TableFormat.TEXT:
-            out.print(keep_whole(table))
+            for column in table.columns:  # so wide that only headings and sentences are wrapped
+                column.min_width = _least_width(column)
+            out.print(table)
         else:
             out.print(rendered(table, chosen.get()), soft_wrap=True, end="")
         if chosen.get() is not TableFormat.JSON:
@@ -219,13 +221,6 @@ def is_too_wide(table: Table, width: int) -> bool:
     """Whether cells other than sentences, or words of a heading, would be broken in so many columns."""
     needed = sum(_least_width(column) + _PADDING for column in table.columns)
     return needed + _BETWEEN * (len(table.columns) - 1) > width
-
-
-def keep_whole(table: Table) -> Table:
-    """The same table, with columns so wide that only headings and sentences are wrapped."""
-    for column in table.columns:
-        column.min_width = _least_width(column)
-    return table
 
 
 def _least_width(column: Column) -> int:

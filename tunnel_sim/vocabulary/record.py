@@ -132,7 +132,24 @@ def count_cycles(record: Record) -> float:
     hysteresis. The part of a heavily damped run in which the swing is lost in noise counts as well.
     """
     record = evenly_spaced(record, bridged=False)
-    reading = _without_hum(record)
+    # Less a sinusoid at each mains frequency, fitted second by second, because that frequency varies by a few
+    # hundredths of a hertz.
+    reading: Array = record.yaw_rad - record.yaw_rad.mean()
+    block = round(record.sample_rate)
+    for mains in MAINS_HZ:
+        # In a record that is too short or sampled too slowly, hum cannot be separated from the motion.
+        if reading.size < block or mains > 0.45 * record.sample_rate:
+            continue
+        phase = 2.0 * np.pi * mains * np.arange(block) / record.sample_rate
+        # A level and a slope are fitted with the hum, so that slow motion is not mistaken for hum.
+        hum_basis = np.column_stack([np.cos(phase), np.sin(phase)])
+        basis = np.column_stack([hum_basis, np.ones(block), np.linspace(-1.0, 1.0, block)])
+        # The last block has full length too: it overlaps the one before and corrects only the rest.
+        starts = [*range(0, reading.size - block, block), reading.size - block]
+        pieces = np.stack([reading[start : start + block] for start in starts])
+        hum = pieces @ np.linalg.pinv(basis).T[:, :2] @ hum_basis.T
+        overlap = len(starts) * block - reading.size
+        reading = reading - np.concatenate([hum[:-1].ravel(), hum[-1, overlap:]])
     # The reading less a fitted straight line, because a sensor's drift is not an oscillation.
     abscissa = np.linspace(-1.0, 1.0, reading.size)
     slope = float(abscissa @ reading) / float(abscissa @ abscissa)
@@ -177,27 +194,3 @@ def _count(reading: Array, width: int) -> float:
     whole = crossings[2:] - crossings[:-2]
     period = float(np.median(whole)) if whole.size else 2.0 * float(crossings[1] - crossings[0])
     return reading.size / period
-
-
-def _without_hum(record: Record) -> Array:
-    """The reading less a sinusoid at each mains frequency.
-
-    The sinusoids are fitted second by second, because the mains frequency varies by a few hundredths of a hertz.
-    """
-    reading: Array = record.yaw_rad - record.yaw_rad.mean()
-    block = round(record.sample_rate)
-    for mains in MAINS_HZ:
-        # In a record that is too short or sampled too slowly, hum cannot be separated from the motion.
-        if reading.size < block or mains > 0.45 * record.sample_rate:
-            continue
-        phase = 2.0 * np.pi * mains * np.arange(block) / record.sample_rate
-        # A level and a slope are fitted with the hum, so that slow motion is not mistaken for hum.
-        hum_basis = np.column_stack([np.cos(phase), np.sin(phase)])
-        basis = np.column_stack([hum_basis, np.ones(block), np.linspace(-1.0, 1.0, block)])
-        # The last block has full length too: it overlaps the one before and corrects only the rest.
-        starts = [*range(0, reading.size - block, block), reading.size - block]
-        pieces = np.stack([reading[start : start + block] for start in starts])
-        hum = pieces @ np.linalg.pinv(basis).T[:, :2] @ hum_basis.T
-        overlap = len(starts) * block - reading.size
-        reading = reading - np.concatenate([hum[:-1].ravel(), hum[-1, overlap:]])
-    return reading
