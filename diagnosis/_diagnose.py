@@ -20,7 +20,7 @@ from diagnosis.diagnosable import (
     Chosen,
     choose,
     gain_words,
-    reach,
+    recorded,
     refuse_undiagnosable,
     with_law,
 )
@@ -66,9 +66,9 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
-    refuse_undiagnosable(campaign, own_model=model is not None)
-    kinds = known_effects() if kinds is None else kinds
     campaign = campaign if model is None else with_law(campaign, model.law)
+    refuse_undiagnosable(campaign)
+    kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
     with answering_with(kinds):
         chosen = choose(campaign, kinds)
@@ -107,6 +107,7 @@ def read_model(
     campaign: Campaign,
     free: Sequence[str] | None = None,
     asset_dir: Path | str | None = None,
+    actuator: str | None = None,
 ) -> JointModel:
     """Read a model of one's own for the diagnosis of a campaign.
 
@@ -115,7 +116,9 @@ def read_model(
         joint: name of the joint recorded, the only one that moves.
         campaign: whose records say how far the joint moves.
         free: what is fitted, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: what matters.
+            Where nothing holds the joint, ``rest`` is a constant moment.
         asset_dir: a further folder in which its includes and meshes may be, beside the model's own.
+        actuator: name of the actuator whose control the column ``drive`` is; None: the joint has only one.
 
     Returns:
         The model with the law of its joint.
@@ -126,7 +129,7 @@ def read_model(
     from tunnel_sim.engine.joint_model import read_joint_model  # only here: MuJoCo is slow to load
 
     assets = None if asset_dir is None else Path(asset_dir)
-    return read_joint_model(Path(path), joint, reach(campaign), free, assets)
+    return read_joint_model(Path(path), joint, recorded(campaign, actuator), free, assets)
 
 
 def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnosis:

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,8 +22,14 @@ from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.rig import JointLaw
+
+if TYPE_CHECKING:
+    from tunnel_sim.engine.joint_model import Recorded
+
+_SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
 
 SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
 
@@ -37,11 +44,30 @@ def reach(campaign: Campaign) -> float:
     return max(found)
 
 
+def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
+    """What the records say of the motion of a joint: where it moves, and whether a control drives it.
+
+    Args:
+        actuator: its name; None: the only one of the joint.
+    """
+    from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
+
+    controlled = any(run.drive is not None and run.drive.column == "drive" for run in campaign.runs)
+    if not campaign.driven or campaign.sensor.derivative:
+        return Recorded(reach(campaign), None, controlled, actuator)
+    middle = float(np.median([np.nanmean(run.record.yaw_rad) for run in campaign.runs]))  # as similar campaigns
+    far = max(float(np.nanmax(np.abs(run.record.yaw_rad - middle))) for run in campaign.runs)
+    return Recorded(far, middle, controlled, actuator)
+
+
 def with_law(campaign: Campaign, law: JointLaw) -> Campaign:
     """The campaign with a joint's law in place of a spring; its runs state the stiffness at rest.
 
+    The gain of a control is that of the model's actuator.
+
     Raises:
-        TunnelError: when the runs state more than one spring, or the wind blows and a reference size is missing.
+        TunnelError: when the runs state more than one spring, the wind blows and a reference size is missing, or an
+            input cannot be that of the joint.
     """
     springs = {run.spring_stiffness for run in campaign.runs} - {None}
     if len(springs) > 1:
@@ -57,8 +83,42 @@ def with_law(campaign: Campaign, law: JointLaw) -> Campaign:
             where="--model",
             remedy="state frontal_area and reference_length under [rig] in campaign.toml",
         )
-    runs = tuple(replace(run, spring_stiffness=law.stiffness) for run in campaign.runs)
+    runs = tuple(
+        replace(run, spring_stiffness=law.stiffness, drive=run.drive and _of_joint(run, run.drive, law))
+        for run in campaign.runs
+    )
     return replace(campaign, runs=runs, law=law)
+
+
+def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
+    """The input of a run with the gain of the joint's actuator; refused where the actuator could not follow it."""
+    where, actuator = f"run {run.id}", law.actuator
+    if drive.column == "base_rad":
+        what, remedy = "the joint of a model has no root that moves", "name the input moment_nm or drive"
+        raise TunnelError(f"{what}, and the input is base_rad", where=where, remedy=remedy)
+    if drive.column == "moment_nm":
+        return drive
+    if actuator is None:
+        if drive.gain is None:
+            what = "the joint has no actuator in the model that the column drive could be the control of"
+            raise TunnelError(what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm")
+        return drive
+    said = f"actuator {one_line(actuator.name)!r}"
+    if drive.gain is not None and abs(drive.gain - actuator.gain) > _SAME_GAIN * abs(actuator.gain):
+        what = f"drive_gain = {drive.gain:g} is stated, and {said} gives {actuator.gain:g} N m per unit of control"
+        raise TunnelError(what, where=where, remedy="leave drive_gain out, or correct gear and gain of the model")
+    moments = actuator.gain * drive.values + actuator.servo[0] + actuator.servo[1] * run.record.yaw_rad
+    for values, (low, high), name, unit in (
+        (drive.values, actuator.control, "control", "of its ctrlrange"),
+        (moments, actuator.moment, "moment", "N m of its force range"),
+    ):
+        slack = _SAME_GAIN * max(abs(low), abs(high)) if np.isfinite([low, high]).any() else 0.0
+        far = values[np.argmax(np.maximum(values - high, low - values))]
+        if not low - slack <= far <= high + slack:
+            what = f"the {name} of {said} reaches {far:.4g}, outside {low:.4g} to {high:.4g} {unit}"
+            remedy = "correct the range or the unit of the input, or leave out the run: clipping is not diagnosed"
+            raise TunnelError(what, where=where, remedy=remedy)
+    return replace(drive, gain=actuator.gain)
 
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
@@ -225,6 +285,7 @@ def _of_one_spring(runs: Sequence[Run]) -> list[Run]:
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
 _MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
+_OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
 _NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
@@ -244,11 +305,8 @@ NOT_SOUGHT = (
 )
 
 
-def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
-    """Refuse driven runs that the diagnosis does not treat yet.
-
-    Args:
-        own_model: whether the nominal model is a joint of the user's own.
+def refuse_undiagnosable(campaign: Campaign) -> None:
+    """Refuse driven runs that the diagnosis does not treat yet, and free ones of a joint that nothing holds.
 
     Raises:
         TunnelError: for the first such run.
@@ -266,8 +324,6 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             )
         if run.spring_stiffness == 0.0 and run.wind_on:
             why = "is driven and has no spring, and the wind blows"
-        elif own_model:
-            why = "is driven, and a model of your own is given"
         elif campaign.sensor.derivative:
             why = f"is driven, and its sensor reads {campaign.sensor.quantity}s"
         elif not run.record.uniform:
@@ -289,6 +345,13 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
             where=campaign.name,
             remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+        )
+    free = [run for run in campaign.runs if run.drive is None]
+    if campaign.law is not None and campaign.law.stiffness == 0.0 and free:
+        raise TunnelError(
+            f"nothing holds the joint of the model, and nothing drives {_ids(free)}",
+            where=campaign.name,
+            remedy="leave these runs out, or add the spring, or gravity, that restores it",
         )
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
@@ -330,13 +393,14 @@ def refuse_motionless(campaign: Campaign) -> None:
         if run.drive is None:
             continue
         found = response_to_input(run)
-        if run.unrestrained and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+        own = campaign.law is not None  # whose resonance is known, and need not be seen
+        if (run.unrestrained or own) and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
                 remedy="check its sign, and that all moments on the body are in it; or leave the run out",
             )
-        if not run.unrestrained and (found is None or not found[1] > 0.0):
+        if not (run.unrestrained or own) and (found is None or not found[1] > 0.0):
             raise TunnelError(
                 "no resonance between input and motion",
                 where=f"run {run.id}",
@@ -358,6 +422,10 @@ def kinds_for(
     if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
         gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
         kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
+    actuator = None if campaign.law is None else campaign.law.actuator
+    if actuator is not None and actuator.servo[1] != 0.0:
+        gone[_OF_SERVO] = [kind for kind in kept if kind.on_spring]
+        kept = tuple(kind for kind in kept if kind not in gone[_OF_SERVO])
     if campaign.unrestrained:
         gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
         gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]
@@ -367,7 +435,11 @@ def kinds_for(
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
-    """The gain of the input in the fit of a campaign, in a sentence; none where the gain is known."""
+    """The gain of the input by the model or the fit, in a sentence; none where the campaign states it."""
+    actuator = None if campaign.law is None else campaign.law.actuator
+    if actuator is not None:
+        said = f"gives {actuator.gain:.5g} N m per unit of control"
+        return (f"By the model, actuator {one_line(actuator.name)!r} {said}.",)
     if "drive_gain" not in fit.problem.names:
         return ()
     data = fit.problem.data

@@ -15,6 +15,7 @@ from diagnosis.answer.held_out import FOLDS, HeldOut, fit_seen, predict_held_out
 from diagnosis.closure import NativeClosure, PatchedModel
 from diagnosis.diagnosable import reach
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
 from diagnosis.search.investigate import Study
 from tunnel_sim.engine.joint_model import JointModel
@@ -60,15 +61,20 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     assert law is not None
     chain = problem.chain(common, release, data.runs[index])
     physics = condensed(chain.physics(), data)
-    reach = max(float(np.max(np.abs(run.reading))) for run in data.runs)
+    zero = problem.zero(common, release)
+    reach = max(float(np.max(np.abs(run.reading - zero))) for run in data.runs)
     b = np.linspace(-reach, reach, _GRID)
-    rate = reach * np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
+    turn = np.sqrt(physics.spring_stiffness / physics.yaw_inertia) or 2.0 * np.pi * REFERENCE_FREQUENCY
+    rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
     notes: list[str] = []
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
-    spring = np.array([0.0, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
+    values = {**law.held, **dict(zip(problem.names, common.tolist(), strict=True))}
+    spring = np.array(
+        [-values.get("moment_offset", 0.0), physics.spring_stiffness - law.stiffness, 0.0, 0.0]
+    )
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
     program = physics.program[len(data.program) :]
@@ -131,6 +137,8 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
         notes.append("The presliding of the friction has no native element and is left out.")
     if physics.rod_twist is not None:
         notes.append("The twist of the rod is left out: it needs a body and a joint of its own.")
+    if physics.drive is not None and physics.drive.delay != 0.0:
+        notes.append("The delay of the input is no part of the model; the comparison applies the input later.")
     if problem.data.wind_on:
         notes.append("The air's moment is left out: the patched model is that of the runs with the wind off.")
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
@@ -265,7 +273,16 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
     chain = problem.chain(common, own, run)
     blocks = run.reading.size + blocks_beyond(chain.physics(), run) + 1
     measured = change.own(blocks * run.interval, "s")
-    motion = simulate(common, _start(problem, own, index), measured)
+    start, given = _start(problem, own, index), chain.physics().drive
+    if given is not None:  # without the constant moment, which is written into the model
+        bare = run.moment(1.0)
+        assert bare is not None
+        seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
+        times, delay = given.time_s * seconds, given.delay * seconds
+        start = replace(
+            start, drive=replace(given, time_s=times, values=bare.values, scale=scale, delay=delay)
+        )
+    motion = simulate(common, start, measured)
     scaled = Motion(
         motion.time_s * change.similar(1.0, "s"), motion.angle, motion.rate * change.similar(1.0, "rad/s")
     )
@@ -318,8 +335,12 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     def compiled(common: bytes) -> mujoco.MjModel:
         return patched(model, law(np.frombuffer(common)).patch)[0].compile()
 
+    actuator = None if model.law.actuator is None else model.law.actuator.index
+    moments = {run.id for run in study.campaign.runs if run.drive is None or run.drive.column == "moment_nm"}
+
     def simulate(common: Array, start: Start, duration: float) -> Motion:
-        return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration)
+        by = None if start.run in moments else actuator
+        return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration, by)
 
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
