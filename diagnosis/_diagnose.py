@@ -20,6 +20,7 @@ from diagnosis.diagnosable import (
     Chosen,
     choose,
     gain_words,
+    lead_words,
     recorded,
     refuse_undiagnosable,
     with_law,
@@ -27,7 +28,8 @@ from diagnosis.diagnosable import (
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
-from diagnosis.search.investigate import Progress, investigate
+from diagnosis.search.investigate import Progress
+from diagnosis.search.lead import investigate_joint
 from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
@@ -73,7 +75,7 @@ def diagnose(
     with answering_with(kinds):
         chosen = choose(campaign, kinds)
         try:  # noise, nominal fit, where, search
-            study = investigate(chosen.campaign, chosen.kinds, progress)
+            study = investigate_joint(chosen.campaign, chosen.kinds, progress)
         except TunnelError as error:
             if not chosen.limit_cycles:
                 raise
@@ -146,6 +148,7 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
             unpatched = (f"{UNPATCHED}: {error.what}.",)
     by_moment = (BY_MOMENT,) if study.by_moment else ()
     left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
+    left_out += lead_words(study.campaign.law, study.similarity)
     assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
     sized = replace(
         assembled,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import free_frequency, frequency, response_to_input
+from diagnosis.likelihood.nondimensional import Similarity, free_frequency, frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
@@ -453,6 +453,21 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
         return (f"Per N m of the input the angular acceleration is {value:.5g} ± {std:.2g} rad/s².",)
     per = "rad/s²" if data.normalised else "N m"
     return (f"The gain of the input is {value:.5g} ± {std:.2g} {per} per unit.",)
+
+
+def lead_words(law: JointLaw | None, similarity: Similarity) -> tuple[str, ...]:
+    """The lead of the motion in a sentence; none where there is none.
+
+    Args:
+        law: of the similar campaign.
+    """
+    if law is None or law.lead == 0.0:
+        return ()
+    lead, step = (1e3 * similarity.own(value, "s") for value in (law.lead, law.step))
+    return (
+        f"The motion leads its input by {lead:.2g} ms, at most half of the model's step of {step:.3g} ms, as the motion "
+        "of MuJoCo's integrators of first order does. This is taken off and is not counted as a cause.",
+    )
 
 
 def refuse_indefinite(fit: Fit) -> None:

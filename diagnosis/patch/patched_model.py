@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -71,10 +71,8 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
-    values = {**law.held, **dict(zip(problem.names, common.tolist(), strict=True))}
-    spring = np.array(
-        [-values.get("moment_offset", 0.0), physics.spring_stiffness - law.stiffness, 0.0, 0.0]
-    )
+    offset = dict(zip(problem.names, common.tolist(), strict=True)).get("moment_offset", 0.0)
+    spring = np.array([-offset, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
     program = physics.program[len(data.program) :]
@@ -137,8 +135,8 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
         notes.append("The presliding of the friction has no native element and is left out.")
     if physics.rod_twist is not None:
         notes.append("The twist of the rod is left out: it needs a body and a joint of its own.")
-    if physics.drive is not None and physics.drive.delay != 0.0:
-        notes.append("The delay of the input is no part of the model; the comparison applies the input later.")
+    if any(kind.driven for kind in problem.effects):
+        notes.append("The delay of the input is not part of the model; the comparison applies it to the input.")
     if problem.data.wind_on:
         notes.append("The air's moment is left out: the patched model is that of the runs with the wind off.")
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
@@ -173,6 +171,11 @@ def _own_program(
         code += replaced.get(element, ())
     return (*code, value, own(1.0, "N m"), _number("multiply"))
 
+
+_EARLY = (
+    "The model's integrator moves the joint half a step, {:.3g} ms, before its input asks for it; the integrator RK4 "
+    "and shorter steps do not."
+)
 
 Simulate = Callable[[Array, Start, float], Motion]
 """From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
@@ -278,7 +281,8 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
         bare = run.moment(1.0)
         assert bare is not None
         seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
-        times, delay = given.time_s * seconds, given.delay * seconds
+        lead = 0.0 if problem.data.law is None else problem.data.law.lead  # the engine has its own
+        times, delay = given.time_s * seconds, (given.delay + lead) * seconds
         start = replace(
             start, drive=replace(given, time_s=times, values=bare.values, scale=scale, delay=delay)
         )
@@ -346,8 +350,11 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate)
     found = law(chosen.point.common)
+    own = compiled(chosen.point.common.tobytes()).opt
+    early = study.campaign.driven and own.integrator != int(mujoco.mjtIntegrator.mjINT_RK4)
+    notes = (*found.notes, *((_EARLY.format(500.0 * own.timestep),) if early else ()))
     starts = [_start(problem, own, i) for i, own in enumerate(chosen.point.release)]
     spec, written = patched(model, found.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
-    return PatchedModel(model, spec, written, found.notes, zero, closure)
+    return PatchedModel(model, spec, written, notes, zero, closure)

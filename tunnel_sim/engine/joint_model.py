@@ -463,6 +463,7 @@ def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
         rest,
         tuple(Term(text, value, units[text]) for text, value in {**terms, **damping}.items()),
         slide=slide,
+        step=float(model.opt.timestep),
     )
 
 

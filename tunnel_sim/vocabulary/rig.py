@@ -70,6 +70,8 @@ class JointLaw:
         rest: the joint's position at rest, rad; where nothing holds it, the middle of its records.
         free: which of `FREE_PARAMETERS` are fitted; where nothing holds the joint, ``rest`` is a constant moment.
         actuator: whose control drives the runs; None: no run is driven by a control.
+        step: of the model, s.
+        lead: by which the motion leads its input, as it does in integrators of first order, s.
     """
 
     inertia: float
@@ -81,6 +83,8 @@ class JointLaw:
     free: tuple[str, ...] = ("inertia", "damping", "rest")
     slide: bool = False
     actuator: Actuator | None = None
+    step: float = 0.0
+    lead: float = 0.0
 
     @property
     def held(self) -> dict[str, float]:

@@ -286,7 +286,7 @@ PENDULUM = f"<mujocoinclude><worldbody>{ARM.format(BOB)}</worldbody></mujocoincl
 @pytest.mark.usefixtures("with_limits")
 def test_the_law_from_the_process_with_limits_is_the_same(tmp_path: Path) -> None:
     found = model(tmp_path, 'stiffness="2 0.3" springref="0.5" frictionloss="0.002"')
-    request = b'["hinge", Recorded(1.0)]\n' + found.files.to_bytes()
+    request = b'["hinge", {"reach": 1.0}]\n' + found.files.to_bytes()
     here = json.loads(joint_model.law_of_request(request))
     assert (found.law.rest, found.law.stiffness) == (here["law"]["rest"], here["law"]["stiffness"])
     assert terms(found) == {term["expression"]: term["coefficient"] for term in here["law"]["terms"]}
