@@ -53,9 +53,11 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
 
     controlled = any(run.drive is not None and run.drive.column == "drive" for run in campaign.runs)
-    if not campaign.driven or campaign.sensor.derivative:
-        return Recorded(reach(campaign), None, controlled, actuator)
-    middle = float(np.median([np.nanmean(run.record.yaw_rad) for run in campaign.runs]))  # as similar campaigns
+    if not campaign.driven or campaign.sensor.derivative:  # rates of driven runs are refused later
+        return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
+    middle = float(
+        np.median([np.nanmean(run.record.yaw_rad) for run in campaign.runs])
+    )  # as similar campaigns
     far = max(float(np.nanmax(np.abs(run.record.yaw_rad - middle))) for run in campaign.runs)
     return Recorded(far, middle, controlled, actuator)
 
@@ -101,12 +103,16 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
     if actuator is None:
         if drive.gain is None:
             what = "the joint has no actuator in the model that the column drive could be the control of"
-            raise TunnelError(what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm")
+            raise TunnelError(
+                what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm"
+            )
         return drive
     said = f"actuator {one_line(actuator.name)!r}"
     if drive.gain is not None and abs(drive.gain - actuator.gain) > _SAME_GAIN * abs(actuator.gain):
         what = f"drive_gain = {drive.gain:g} is stated, and {said} gives {actuator.gain:g} N m per unit of control"
-        raise TunnelError(what, where=where, remedy="leave drive_gain out, or correct gear and gain of the model")
+        raise TunnelError(
+            what, where=where, remedy="leave drive_gain out, or correct gear and gain of the model"
+        )
     moments = actuator.gain * drive.values + actuator.servo[0] + actuator.servo[1] * run.record.yaw_rad
     for values, (low, high), name, unit in (
         (drive.values, actuator.control, "control", "of its ctrlrange"),
@@ -116,7 +122,9 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
         far = values[np.argmax(np.maximum(values - high, low - values))]
         if not low - slack <= far <= high + slack:
             what = f"the {name} of {said} reaches {far:.4g}, outside {low:.4g} to {high:.4g} {unit}"
-            remedy = "correct the range or the unit of the input, or leave out the run: clipping is not diagnosed"
+            remedy = (
+                "correct the range or the unit of the input, or leave out the run: clipping is not diagnosed"
+            )
             raise TunnelError(what, where=where, remedy=remedy)
     return replace(drive, gain=actuator.gain)
 
@@ -465,7 +473,7 @@ def lead_words(law: JointLaw | None, similarity: Similarity) -> tuple[str, ...]:
         return ()
     lead, step = (1e3 * similarity.own(value, "s") for value in (law.lead, law.step))
     return (
-        f"The motion leads its input by {lead:.2g} ms, at most half of the model's step of {step:.3g} ms, as the motion "
+        f"The motion leads its input by {lead:.2g} ms, at most half of the model's step of {step:.3g} ms, as that "
         "of MuJoCo's integrators of first order does. This is taken off and is not counted as a cause.",
     )
 

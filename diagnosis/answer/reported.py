@@ -121,7 +121,9 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
         physics = released_by_spring_end(condensed(chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
         if run.drive is not None:  # steps end at its samples
-            late = physics.drive is not None and physics.drive.delay != 0.0  # then of second order in the step
+            late = (
+                physics.drive is not None and physics.drive.delay != 0.0
+            )  # then of second order in the step
             steps = run.block * -(-steps // run.block) * (_FINER if late else 1)
         duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
         settings.append(replace(physics, timestep=run.interval / steps, duration=duration))

@@ -139,7 +139,7 @@ def _driven_start(run: RunData) -> tuple[float, float, float] | None:
 def joint_start(data: Data) -> Point | None:
     """A starting point for driven runs of a joint of one's own, which need not show a resonance; None of others.
 
-    Inertia and damping are those of the response to known moments. The readings are taken as positions of the joint.
+    Inertia and damping are those of the response to known moments. The readings count as positions of the joint.
     """
     law = data.law
     if law is None or not data.driven or data.unrestrained or data.own_zeros:

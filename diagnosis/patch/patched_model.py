@@ -19,7 +19,14 @@ from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
 from diagnosis.search.investigate import Study
 from tunnel_sim.engine.joint_model import JointModel
-from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
+from tunnel_sim.engine.joint_patch import (
+    JointPatch,
+    Start,
+    inertia_of_steps,
+    patched,
+    patched_xml,
+    simulate_joint,
+)
 from tunnel_sim.physics.expression import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS, parse
 from tunnel_sim.physics.moment_law import operation_names
 from tunnel_sim.physics.run_settings import Motion, RunSettings
@@ -136,7 +143,9 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
     if physics.rod_twist is not None:
         notes.append("The twist of the rod is left out: it needs a body and a joint of its own.")
     if any(kind.driven for kind in problem.effects):
-        notes.append("The delay of the input is not part of the model; the comparison applies it to the input.")
+        notes.append(
+            "The delay of the input is not part of the model; the comparison applies it to the input."
+        )
     if problem.data.wind_on:
         notes.append("The air's moment is left out: the patched model is that of the runs with the wind off.")
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
@@ -173,8 +182,8 @@ def _own_program(
 
 
 _EARLY = (
-    "The model's integrator moves the joint half a step, {:.3g} ms, before its input asks for it; the integrator RK4 "
-    "and shorter steps do not."
+    "The model's integrator moves the joint half a step, {:.3g} ms, before its input asks for it; RK4 and shorter "
+    "steps do not. The inertia that dampers seem to add in such steps is taken off what is written."
 )
 
 Simulate = Callable[[Array, Start, float], Motion]
@@ -209,7 +218,7 @@ def native_closure(
         common, own = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
-        native.append(_residual(chosen.problem, common, own, i, simulate))
+        native.append(_restarted(chosen.problem, common, own, i, simulate)[1])
     ids = [] if held else [run.id for run in runs if not run.wind_on]
     if ids:
         turns = turns_of(nominal, ids)
@@ -222,7 +231,8 @@ def native_closure(
                 continue
             for i, left in enumerate(out):
                 if left.any():
-                    seen = _residual(chosen.problem, point.common, point.release[i], i, simulate, seen=~left)
+                    own = point.release[i]
+                    seen = _restarted(chosen.problem, point.common, own, i, simulate, seen=~left)[1]
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
                     native.append(seen[left])
@@ -234,15 +244,15 @@ def native_closure(
     return NativeClosure(nominal_power, fit_power, native_power, f"on {on} held out of the fit")
 
 
-def _residual(
+def _restarted(
     problem: Problem,
     common: Array,
     own: Array,
     index: int,
     simulate: Simulate,
     seen: NDArray[np.bool_] | None = None,
-) -> Array:
-    """Reading minus the engine's prediction, in noise standard deviations, its start refitted to what was seen."""
+) -> tuple[Array, Array]:
+    """A run's own parameters, its start refitted in the engine to what was seen, and the `engine_residual` then."""
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
     def left(release: Array) -> Array:
@@ -259,7 +269,7 @@ def _residual(
         if not moved[seen] @ moved[seen] < best[seen] @ best[seen]:
             break
         own, best = trial, moved
-    return best
+    return own, best
 
 
 def engine_residual(problem: Problem, common: Array, own: Array, index: int, simulate: Simulate) -> Array:
@@ -332,8 +342,14 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 
     still = next((i for i, run in enumerate(problem.data.runs) if not run.wind_on), 0)
 
+    given = model.spec().compile() if study.campaign.driven else None
+
     def law(common: Array) -> FoundLaw:
-        return found_law(problem, common, chosen.point.release[still], noise, still)
+        found = found_law(problem, common, chosen.point.release[still], noise, still)
+        if given is None:
+            return found
+        steps = inertia_of_steps(given, float(given.dof_damping[0]) + found.patch.damping[0])
+        return replace(found, patch=replace(found.patch, inertia=found.patch.inertia - steps))
 
     @lru_cache(maxsize=4)
     def compiled(common: bytes) -> mujoco.MjModel:
@@ -350,10 +366,15 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate)
     found = law(chosen.point.common)
-    own = compiled(chosen.point.common.tobytes()).opt
-    early = study.campaign.driven and own.integrator != int(mujoco.mjtIntegrator.mjINT_RK4)
-    notes = (*found.notes, *((_EARLY.format(500.0 * own.timestep),) if early else ()))
-    starts = [_start(problem, own, i) for i, own in enumerate(chosen.point.release)]
+    early = given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4)
+    notes = (
+        *found.notes,
+        *((_EARLY.format(500.0 * given.opt.timestep),) if given is not None and early else ()),
+    )
+    own = list(chosen.point.release)
+    if given is not None:  # the engine's steps and its input do not begin as those of the fit
+        own = [_restarted(problem, chosen.point.common, one, i, simulate)[0] for i, one in enumerate(own)]
+    starts = [_start(problem, one, i) for i, one in enumerate(own)]
     spec, written = patched(model, found.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest

@@ -276,7 +276,7 @@ def prepare() -> None:
 
 
 def law_of_request(request: bytes) -> bytes:
-    """The law of a joint, or what is refused, as JSON; the request is joint and `Recorded` as JSON, then the files."""
+    """The law of a joint, or what is refused, as JSON; of joint and `Recorded` as JSON, and then the files."""
     at = request.index(b"\n") + 1
     joint, given = json.loads(request[:at])
     recorded = Recorded(**given)
@@ -361,7 +361,9 @@ def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
     i = names[name]
     if model.actuator_ctrlnum[i] != 1 or model.actuator_delay[i] > 0.0:
         what = f"its actuator {one_line(name)!r} has several controls, or delays its control"
-        raise TunnelError(what, remedy="leave out the delay, which the diagnosis looks for, or record moment_nm")
+        raise TunnelError(
+            what, remedy="leave out the delay, which the diagnosis looks for, or record moment_nm"
+        )
     moments = [(-math.inf, math.inf)]
     if model.actuator_forcelimited[i]:
         moments.append(model.actuator_forcerange[i] * model.actuator_gear[i, 0])
@@ -372,12 +374,16 @@ def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
     engine, at = _Engine(model), int(model.actuator_ctrladr[i])
     places = [(0.0, 0.0), (recorded.reach, 1.0), (-2.0 * recorded.reach, -3.0)]
     found = [
-        (engine.moment(x, rate, (at, u)) - engine.moment(x, rate)) / u for x, rate in places for u in (1.0, -7.0)
+        (engine.moment(x, rate, (at, u)) - engine.moment(x, rate)) / u
+        for x, rate in places
+        for u in (1.0, -7.0)
     ]
     gain = found[0]
     if not abs(gain) > 0.0 or np.ptp(found) > _EXACT * abs(gain):
         what = f"the moment of its actuator {one_line(name)!r} is not in proportion to the control"
-        raise TunnelError(what, remedy="take a motor or servo with a fixed gain, or record the moment as moment_nm")
+        raise TunnelError(
+            what, remedy="take a motor or servo with a fixed gain, or record the moment as moment_nm"
+        )
     servo = [(engine.moment(x), float(engine.data.qfrc_actuator[0]))[1] for x in (0.0, 1.0)]
     return Actuator(
         name,

@@ -143,7 +143,9 @@ def _write_inertia(
     Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a times
     the inertia. On a slide they lose mass instead; returned is the share of the weight that remains.
     """
-    rotors = float(np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature))  # they stay as they are
+    rotors = float(
+        np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature)
+    )  # they stay as they are
     armature = float(before.dof_armature[0]) + patch.inertia - model.law.inertia
     if armature >= 0.0:
         spec.joint(model.joint).armature = armature
@@ -171,6 +173,26 @@ def _write_inertia(
         body.iquat = before.body_iquat[number]
         body.fullinertia = np.full(6, np.nan)
     return share if model.law.slide else 1.0
+
+
+def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
+    """How much more inertia a joint seems to have when it is simulated in steps, kg m².
+
+    At the end of a step of h, an integrator of first order has the moment of a damper C at the step's end or start
+    instead of that in its middle: this adds C h/2 to the inertia, or takes it off.
+
+    Args:
+        damping: of the joint itself, N m s/rad; that of its actuators is the model's own.
+    """
+    options, kinds = model.opt, mujoco.mjtIntegrator
+    if options.integrator == int(kinds.mjINT_RK4):
+        return 0.0
+    affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    servos = -float(np.sum(model.actuator_gear[affine, 0] ** 2 * model.actuator_biasprm[affine, 2]))
+    explicit = options.integrator == int(kinds.mjINT_EULER)
+    late = not explicit or not options.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    ends = (damping if late else -damping) + (-servos if explicit else servos)
+    return 0.5 * float(options.timestep) * ends
 
 
 def _write_spring(

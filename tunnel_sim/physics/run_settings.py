@@ -134,7 +134,7 @@ class DriveMoment:
             raise TunnelError("a drive needs as many finite values as times, and at least one", remedy=remedy)
 
     def means(self, ends: Array) -> Array:
-        """Means of the delayed input between successive times: its impulse is kept, what is lost is of second order.
+        """Means of the delayed input between successive times, which keep its impulse.
 
         Args:
             ends: since the run's start, shape (n + 1,), s, increasing.

@@ -87,6 +87,13 @@ class JointLaw:
     lead: float = 0.0
 
     @property
+    def hangs(self) -> bool:
+        """Whether gravity alone restores the joint, so that its angle is one with the sensor's zero."""
+        of_angle = {term.expression: term.coefficient for term in self.terms if "r" not in term.expression}
+        sine = of_angle.pop("sin(b)-b", 0.0)
+        return sine > 0.0 and not of_angle and abs(sine - self.stiffness) <= 1e-6 * sine
+
+    @property
     def held(self) -> dict[str, float]:
         """Value of every parameter that is not fitted, by its name in a fit."""
         known = {"inertia": self.inertia, "damping": self.damping, "stiffness": 0.0, "rest": self.rest}

@@ -262,7 +262,9 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
     found = read_joint_model(tmp_path / "in" / "model.xml", "hinge", Recorded(1.0))
     spec, _ = patched(found, replace(JointPatch(found.law.inertia), friction=0.1))
     (tmp_path / "out" / "out.xml").write_text(patched_xml(spec, found, tmp_path / "out"))
-    law = read_joint_model(tmp_path / "out" / "out.xml", "hinge", Recorded(1.0), asset_dir=tmp_path / "in").law
+    law = read_joint_model(
+        tmp_path / "out" / "out.xml", "hinge", Recorded(1.0), asset_dir=tmp_path / "in"
+    ).law
     assert law.friction == pytest.approx(0.1)
     assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-5)
 
