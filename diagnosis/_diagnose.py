@@ -20,12 +20,10 @@ from diagnosis.diagnosable import (
     Chosen,
     choose,
     gain_words,
-    lead_words,
-    recorded,
     refuse_undiagnosable,
-    with_law,
 )
 from diagnosis.noise.gap import noise_remarks
+from diagnosis.own_joint import lead_words, recorded, with_law
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress

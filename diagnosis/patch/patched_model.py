@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from diagnosis.answer.held_out import FOLDS, HeldOut, fit_seen, predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import NativeClosure, PatchedModel
-from diagnosis.diagnosable import reach
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
+from diagnosis.own_joint import reach
 from diagnosis.search.investigate import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (

@@ -1,8 +1,8 @@
 """How far the motion of a joint of one's own leads its input, within half a step of the model.
 
 In integrators of first order the position of a step is already moved by the rate at its end, so that all motion
-leads its input by half a step. Records simulated in this way show it, measured ones do not, and the model cannot say
-which is right. It is therefore sought only where something is missed, and is not a cause.
+leads its input by half a step. Records simulated in this way show it, measured ones do not, and the model cannot
+say which is right. It is therefore sought only where something is missed, and is not a cause.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def investigate_joint(campaign: Campaign, kinds: Sequence[type[Effect]], progres
 
 
 def _lead(study: Study) -> float:
-    """The lead with which the answer's effects, without a delay, leave least, similar s; 0 where it is not clear."""
+    """The lead with which the answer's effects, without a delay, leave least, similar s; 0 if not clear."""
     from scipy.special import chdtri  # only here: slow to load
 
     problem, point, law = study.chosen.problem, study.chosen.point, study.campaign.law

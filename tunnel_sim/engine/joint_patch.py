@@ -12,7 +12,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from tunnel_sim.engine.joint_model import JointModel, engine_refusals
+from tunnel_sim.engine.joint_model import JointModel
+from tunnel_sim.engine.model_files import engine_refusals
 from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.physics.run_settings import DriveMoment, Motion

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose, read_model, vocabulary
-from diagnosis.diagnosable import refuse_undiagnosable, with_law
+from diagnosis.diagnosable import refuse_undiagnosable
+from diagnosis.own_joint import with_law
 from diagnosis.result import Diagnosis
 from tests.reference.robot_joints import (
     GEAR,
