@@ -40,9 +40,8 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     controlled = any(run.drive is not None and run.drive.column == "drive" for run in campaign.runs)
     if not campaign.driven or campaign.sensor.derivative:  # rates of driven runs are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
-    middle = float(
-        np.median([np.nanmean(run.record.yaw_rad) for run in campaign.runs])
-    )  # as similar campaigns
+    means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]
+    middle = float(np.median(means))  # which similar campaigns take off
     far = max(float(np.nanmax(np.abs(run.record.yaw_rad - middle))) for run in campaign.runs)
     return Recorded(far, middle, controlled, actuator)
 
@@ -103,7 +102,7 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
         (drive.values, actuator.control, "control", "of its ctrlrange"),
         (moments, actuator.moment, "moment", "N m of its force range"),
     ):
-        slack = _SAME_GAIN * max(abs(low), abs(high)) if np.isfinite([low, high]).any() else 0.0
+        slack = _SAME_GAIN * max(abs(low), abs(high))
         far = values[np.argmax(np.maximum(values - high, low - values))]
         if not low - slack <= far <= high + slack:
             what = f"the {name} of {said} reaches {far:.4g}, outside {low:.4g} to {high:.4g} {unit}"
