@@ -31,7 +31,7 @@ def investigate_joint(campaign: Campaign, kinds: Sequence[type[Effect]], progres
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     found, law = investigate(campaign, kinds, progress), campaign.law
-    if law is None or not campaign.driven or not found.test.detected:
+    if law is None or not (law.step and campaign.driven and found.test.detected):
         return found
     lead = found.similarity.own(_lead(found), "s")
     if lead == 0.0:
