@@ -239,9 +239,9 @@ SERVO = '<position name="motor" joint="elbow" kp="60" kv="4"/>'
 @pytest.mark.parametrize(
     ("axis", "start", "actuators", "peaks", "damping"),
     [
-        (UPRIGHT, 0.0, MOTOR, (0.3, 0.2, 0.25), 0.4),
+        pytest.param(UPRIGHT, 0.0, MOTOR, (0.3, 0.2, 0.25), 0.4, marks=pytest.mark.slow),
         (LEVEL, math.pi / 2, MOTOR, (0.3, 0.2, 0.25), 0.4),
-        (LEVEL, 0.0, SERVO, (0.8, 0.5, 0.6), 4.4),
+        pytest.param(LEVEL, 0.0, SERVO, (0.8, 0.5, 0.6), 4.4, marks=pytest.mark.slow),
     ],
 )
 def test_dry_friction_is_named_and_the_model_with_it_closes_the_gap_by_itself(
