@@ -20,14 +20,14 @@ from diagnosis.diagnosable import (
     Chosen,
     choose,
     gain_words,
-    reach,
     refuse_undiagnosable,
-    with_law,
 )
 from diagnosis.noise.gap import noise_remarks
+from diagnosis.own_joint import lead_words, recorded, with_law
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
-from diagnosis.search.investigate import Progress, investigate
+from diagnosis.search.investigate import Progress
+from diagnosis.search.lead import investigate_joint
 from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
@@ -66,14 +66,14 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
-    refuse_undiagnosable(campaign, own_model=model is not None)
-    kinds = known_effects() if kinds is None else kinds
     campaign = campaign if model is None else with_law(campaign, model.law)
+    refuse_undiagnosable(campaign)
+    kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
     with answering_with(kinds):
         chosen = choose(campaign, kinds)
         try:  # noise, nominal fit, where, search
-            study = investigate(chosen.campaign, chosen.kinds, progress)
+            study = investigate_joint(chosen.campaign, chosen.kinds, progress)
         except TunnelError as error:
             if not chosen.limit_cycles:
                 raise
@@ -107,6 +107,7 @@ def read_model(
     campaign: Campaign,
     free: Sequence[str] | None = None,
     asset_dir: Path | str | None = None,
+    actuator: str | None = None,
 ) -> JointModel:
     """Read a model of one's own for the diagnosis of a campaign.
 
@@ -115,7 +116,9 @@ def read_model(
         joint: name of the joint recorded, the only one that moves.
         campaign: whose records say how far the joint moves.
         free: what is fitted, of ``inertia``, ``damping``, ``stiffness`` and ``rest``; None: what matters.
+            Where nothing holds the joint, ``rest`` is a constant moment.
         asset_dir: a further folder in which its includes and meshes may be, beside the model's own.
+        actuator: name of the actuator whose control the column ``drive`` is; None: the joint has only one.
 
     Returns:
         The model with the law of its joint.
@@ -126,7 +129,7 @@ def read_model(
     from tunnel_sim.engine.joint_model import read_joint_model  # only here: MuJoCo is slow to load
 
     assets = None if asset_dir is None else Path(asset_dir)
-    return read_joint_model(Path(path), joint, reach(campaign), free, assets)
+    return read_joint_model(Path(path), joint, recorded(campaign, actuator), free, assets)
 
 
 def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnosis:
@@ -143,6 +146,7 @@ def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnos
             unpatched = (f"{UNPATCHED}: {error.what}.",)
     by_moment = (BY_MOMENT,) if study.by_moment else ()
     left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
+    left_out += lead_words(study.campaign.law, study.similarity)
     assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
     sized = replace(
         assembled,

@@ -11,7 +11,7 @@ from statistics import median
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import free_frequency, frequency, response_to_input
+from diagnosis.likelihood.nondimensional import free_frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
 from identification.estimate import Status
@@ -22,45 +22,9 @@ from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import refuse_untreated
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.rig import JointLaw
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
-
-
-def reach(campaign: Campaign) -> float:
-    """The greatest displacement in the records, rad; by way of the frequency where the sensor reads a rate."""
-    found = []
-    for run in campaign.runs:
-        readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
-        turn = 2.0 * np.pi * frequency(run.record) if campaign.sensor.derivative else 1.0
-        found.append(float(np.max(np.abs(readings - np.mean(readings)))) / turn**campaign.sensor.derivative)
-    return max(found)
-
-
-def with_law(campaign: Campaign, law: JointLaw) -> Campaign:
-    """The campaign with a joint's law in place of a spring; its runs state the stiffness at rest.
-
-    Raises:
-        TunnelError: when the runs state more than one spring, or the wind blows and a reference size is missing.
-    """
-    springs = {run.spring_stiffness for run in campaign.runs} - {None}
-    if len(springs) > 1:
-        raise TunnelError(
-            f"the runs state {len(springs)} springs, and a model has one",
-            where="--model",
-            remedy="diagnose the runs of each spring separately",
-        )
-    rig = campaign.rig
-    if any(run.wind_on for run in campaign.runs) and None in (rig.frontal_area, rig.reference_length):
-        raise TunnelError(
-            "runs with a wind speed need the rig's sizes beside the model",
-            where="--model",
-            remedy="state frontal_area and reference_length under [rig] in campaign.toml",
-        )
-    runs = tuple(replace(run, spring_stiffness=law.stiffness) for run in campaign.runs)
-    return replace(campaign, runs=runs, law=law)
-
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
 
@@ -230,6 +194,7 @@ def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
 _ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
 _NOT_TRIED = "On driven runs these effects are not tried yet: {}."
 _MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
+_OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
 _NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
@@ -249,11 +214,8 @@ NOT_SOUGHT = (
 )
 
 
-def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
-    """Refuse driven runs that the diagnosis does not treat yet.
-
-    Args:
-        own_model: whether the nominal model is a joint of the user's own.
+def refuse_undiagnosable(campaign: Campaign) -> None:
+    """Refuse driven runs that the diagnosis does not treat yet, and free ones of a joint that nothing holds.
 
     Raises:
         TunnelError: for the first such run.
@@ -262,22 +224,17 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
     for run in driven:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
-        why = ""
         refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
         if run.spring_stiffness == 0.0 and run.wind_on:
-            why = "is driven and has no spring, and the wind blows"
-        elif own_model:
-            why = "is driven, and a model of your own is given"
-        elif run.record.yaw_rad.size < LEAST_SAMPLES:
+            what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
+            raise TunnelError(what, where=where, remedy="leave the run out")
+        if run.record.yaw_rad.size < LEAST_SAMPLES:
             raise TunnelError(
                 f"the run is driven and has {run.record.yaw_rad.size} samples: too few to tell its noise from its "
                 "response",
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
-        if why:
-            what = f"the run {why}, which is not diagnosed yet"
-            raise TunnelError(what, where=where, remedy="leave the run out")
     on_body = [run.drive for run in driven if run.drive is not None and run.drive.on_body]
     mixed = {drive.column == "moment_nm" or drive.gain is not None for drive in on_body}
     if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
@@ -285,6 +242,13 @@ def refuse_undiagnosable(campaign: Campaign, *, own_model: bool) -> None:
             "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
             where=campaign.name,
             remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+        )
+    free = [run for run in campaign.runs if run.drive is None]
+    if campaign.law is not None and campaign.law.stiffness == 0.0 and free:
+        raise TunnelError(
+            f"nothing holds the joint of the model, and nothing drives {_ids(free)}",
+            where=campaign.name,
+            remedy="leave these runs out, or add the spring, or gravity, that restores it",
         )
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
@@ -319,13 +283,14 @@ def refuse_motionless(campaign: Campaign) -> None:
         if run.drive is None:
             continue
         found = response_to_input(run, campaign.sensor.derivative)
-        if run.unrestrained and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+        own = campaign.law is not None  # whose resonance is known, and need not be seen
+        if (run.unrestrained or own) and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
                 remedy="check its sign, and that all moments on the body are in it; or leave the run out",
             )
-        if not run.unrestrained and (found is None or not found[1] > 0.0):
+        if not (run.unrestrained or own) and (found is None or not found[1] > 0.0):
             raise TunnelError(
                 "no resonance between input and motion",
                 where=f"run {run.id}",
@@ -347,6 +312,10 @@ def kinds_for(
     if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
         gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
         kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
+    actuator = None if campaign.law is None else campaign.law.actuator
+    if actuator is not None and actuator.servo[1] != 0.0:
+        gone[_OF_SERVO] = [kind for kind in kept if kind.on_spring]
+        kept = tuple(kind for kind in kept if kind not in gone[_OF_SERVO])
     if campaign.unrestrained:
         gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
         gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]
@@ -356,7 +325,11 @@ def kinds_for(
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
-    """The gain of the input in the fit of a campaign, in a sentence; none where the gain is known."""
+    """The gain of the input by the model or the fit, in a sentence; none where the campaign states it."""
+    actuator = None if campaign.law is None else campaign.law.actuator
+    if actuator is not None:
+        said = f"gives {actuator.gain:.5g} N m per unit of control"
+        return (f"By the model, actuator {one_line(actuator.name)!r} {said}.",)
     if "drive_gain" not in fit.problem.names:
         return ()
     data = fit.problem.data

@@ -19,6 +19,8 @@ from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
+_FINER = 4  # steps in place of one, where the input is given by its means over the steps
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -119,7 +121,10 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
         physics = released_by_spring_end(condensed(chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
         if run.drive is not None:  # steps end at its samples
-            steps = run.block * -(-steps // run.block)
+            late = (
+                physics.drive is not None and physics.drive.delay != 0.0
+            )  # then of second order in the step
+            steps = run.block * -(-steps // run.block) * (_FINER if late else 1)
         duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
         settings.append(replace(physics, timestep=run.interval / steps, duration=duration))
         simulated.setdefault(run.interval, []).append(i)

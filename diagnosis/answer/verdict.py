@@ -149,6 +149,7 @@ BLIND_SPOTS = (
 
 
 _OF_INPUT = "a common scale on the inertia and the moment of the input"
+_OF_GAIN = "a scale on the moment of the input as opposed to one on the inertia and all moments of the model"
 
 
 def blind_spots(data: Data) -> tuple[str, ...]:
@@ -161,6 +162,8 @@ def blind_spots(data: Data) -> tuple[str, ...]:
         found.append(
             "the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring"
         )
+    elif data.law is not None and data.driven:
+        found.append("structural as opposed to viscous damping: there is one spring only")
     elif springs < 2:
         found.append(
             "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
@@ -175,10 +178,12 @@ def blind_spots(data: Data) -> tuple[str, ...]:
         found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
     if data.driven:
         found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
+        scale = BLIND_SPOTS[2] if springs or data.normalised else _OF_INPUT
+        scale = _OF_GAIN if springs and data.law is not None else scale
         return (
             *found,
             BLIND_SPOTS[1],
-            BLIND_SPOTS[2] if springs or data.normalised else _OF_INPUT,
+            scale,
             BLIND_SPOTS[3],
         )
     return (*found, *BLIND_SPOTS)

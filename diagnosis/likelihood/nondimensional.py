@@ -191,6 +191,8 @@ def _law(law: JointLaw, change: Similarity) -> JointLaw:
         damping=change.similar(law.damping, "N m s/rad"),
         friction=change.similar(law.friction, "N m"),
         rest=law.rest - change.rest,
+        step=change.similar(law.step, "s"),
+        lead=change.similar(law.lead, "s"),
         terms=tuple(
             dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
             for term in law.terms

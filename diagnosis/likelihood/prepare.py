@@ -75,7 +75,8 @@ def prepare(
             derivative=campaign.sensor.derivative,
             samples=samples,
         )
-        runs.append(data if run.drive is None else _driven(data, run, normalised=normalised))
+        lead = 0.0 if campaign.law is None else campaign.law.lead
+        runs.append(data if run.drive is None else _driven(data, run, lead, normalised=normalised))
     return Data(
         runs=tuple(runs),
         frontal_area=rig.frontal_area or similarity.area,
@@ -89,8 +90,8 @@ def prepare(
     )
 
 
-def _driven(data: RunData, run: Run, *, normalised: bool) -> RunData:
-    """A driven run with its input.
+def _driven(data: RunData, run: Run, lead: float, *, normalised: bool) -> RunData:
+    """A driven run with its input, which acts earlier by ``lead`` (s).
 
     Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's root
     acts by the spring's stiffness.
@@ -103,6 +104,7 @@ def _driven(data: RunData, run: Run, *, normalised: bool) -> RunData:
         record.time_s - record.time_s[0] + begun,
         run.drive.values,
         scale=1.0 if run.drive.gain is None else run.drive.gain,
+        delay=-lead,
         held=run.drive.hold == "zero",
         on_body=run.drive.on_body,
     )

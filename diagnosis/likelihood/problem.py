@@ -105,7 +105,9 @@ class Problem:
     def effect_names(self) -> tuple[str, ...]:
         """Names of the free effect parameters, as ``effect.parameter``."""
         # in small swings the rest angle of a body that nothing else holds acts as a constant moment does
-        loose = self.data.normalised or (self.data.unrestrained and self.data.swing < SWING)
+        law = self.data.law
+        hangs = law is not None and law.hangs and "zero" not in self._held
+        loose = self.data.normalised or hangs or (self.data.unrestrained and self.data.swing < SWING)
         names = [
             f"{kind.name}.{info.name}"
             for kind in self.effects

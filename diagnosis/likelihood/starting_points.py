@@ -34,6 +34,7 @@ from tunnel_sim.vocabulary.record import Array, Record
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
 _PHASES = 64  # of a cycle, for its mean
 _NEARER = 0.02  # of the size that linear theory gives an effect
+_FEW = 5  # blocks whose readings say how fast a run begins
 _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
@@ -140,6 +141,26 @@ def _driven_start(run: RunData) -> tuple[float, float, float] | None:
     return found
 
 
+def joint_start(data: Data) -> Point | None:
+    """A starting point for driven runs of a joint of one's own, which need not show a resonance; None of others.
+
+    Inertia and damping are those of the response to known moments. The readings count as positions of the joint.
+    """
+    law = data.law
+    if law is None or not data.driven or data.unrestrained or data.own_zeros:
+        return None
+    found = [(run.drive.scale, _driven_start(run)) for run in data.runs if run.drive is not None]
+    shown = [(gain / one[2], one[0]) for gain, one in found if one is not None and gain * one[2] > 0.0]
+    inertia, loss = np.median(shown, axis=0).tolist() if shown else (law.inertia, 0.0)
+    damping = max(2.0 * loss * inertia, law.damping)
+    known = {"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}
+    release = [
+        [np.mean(r.reading[:3]) - law.rest, (r.reading[_FEW] - r.reading[0]) / (_FEW * r.interval)]
+        for r in data.runs
+    ]
+    return Point(np.array([known.get(name, 0.0) for name in Problem(data).nominal_names]), np.array(release))
+
+
 def _unrestrained_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> Point:
     """Inertia and damping of a body that nothing holds by its response to known moments, and no other moment."""
     found = [
@@ -151,7 +172,8 @@ def _unrestrained_start(data: Data, driven: Sequence[tuple[float, float, float] 
     release = [
         [np.mean(run.reading[:3]), (run.reading[1] - run.reading[0]) / run.interval] for run in data.runs
     ]
-    return Point(np.array([inertia, inertia * max(loss, _SLOW), 0.0]), np.array(release))
+    start = {"yaw_inertia": inertia, "mechanical_damping": inertia * max(loss, _SLOW)}
+    return Point(np.array([start.get(name, 0.0) for name in Problem(data).nominal_names]), np.array(release))
 
 
 @dataclass(frozen=True, eq=False)

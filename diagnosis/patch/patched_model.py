@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,12 +13,20 @@ from numpy.typing import NDArray
 
 from diagnosis.answer.held_out import FOLDS, HeldOut, fit_seen, predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import NativeClosure, PatchedModel
-from diagnosis.diagnosable import reach
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
+from diagnosis.own_joint import reach
 from diagnosis.search.investigate import Study
 from tunnel_sim.engine.joint_model import JointModel
-from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
+from tunnel_sim.engine.joint_patch import (
+    JointPatch,
+    Start,
+    inertia_of_steps,
+    patched,
+    patched_xml,
+    simulate_joint,
+)
 from tunnel_sim.physics.expression import OF_ANGLE, OF_RATE, TEXTBOOK_POWERS, parse
 from tunnel_sim.physics.moment_law import operation_names
 from tunnel_sim.physics.run_settings import Motion, RunSettings
@@ -60,15 +68,18 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     assert law is not None
     chain = problem.chain(common, release, data.runs[index])
     physics = condensed(chain.physics(), data)
-    reach = max(float(np.max(np.abs(run.reading))) for run in data.runs)
+    zero = problem.zero(common, release)
+    reach = max(float(np.max(np.abs(run.reading - zero))) for run in data.runs)
     b = np.linspace(-reach, reach, _GRID)
-    rate = reach * np.sqrt(physics.spring_stiffness / physics.yaw_inertia)
+    turn = np.sqrt(physics.spring_stiffness / physics.yaw_inertia) or 2.0 * np.pi * REFERENCE_FREQUENCY
+    rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
     notes: list[str] = []
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
-    spring = np.array([0.0, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
+    offset = dict(zip(problem.names, common.tolist(), strict=True)).get("moment_offset", 0.0)
+    spring = np.array([-offset, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
     program = physics.program[len(data.program) :]
@@ -131,6 +142,10 @@ def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
         notes.append("The presliding of the friction has no native element and is left out.")
     if physics.rod_twist is not None:
         notes.append("The twist of the rod is left out: it needs a body and a joint of its own.")
+    if any(kind.driven for kind in problem.effects):
+        notes.append(
+            "The delay of the input is not part of the model; the comparison applies it to the input."
+        )
     if problem.data.wind_on:
         notes.append("The air's moment is left out: the patched model is that of the runs with the wind off.")
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
@@ -166,6 +181,11 @@ def _own_program(
     return (*code, value, own(1.0, "N m"), _number("multiply"))
 
 
+_EARLY = (
+    "The model's integrator moves the joint half a step, {:.3g} ms, before its input asks for it; RK4 and shorter "
+    "steps do not. The inertia that dampers seem to add in such steps is taken off what is written."
+)
+
 Simulate = Callable[[Array, Start, float], Motion]
 """From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
 
@@ -198,7 +218,7 @@ def native_closure(
         common, own = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
         fitted.append(chosen_out.residuals[runs[i].id])
-        native.append(_residual(chosen.problem, common, own, i, simulate))
+        native.append(_restarted(chosen.problem, common, own, i, simulate)[1])
     ids = [] if held else [run.id for run in runs if not run.wind_on]
     if ids:
         turns = turns_of(nominal, ids)
@@ -211,7 +231,8 @@ def native_closure(
                 continue
             for i, left in enumerate(out):
                 if left.any():
-                    seen = _residual(chosen.problem, point.common, point.release[i], i, simulate, seen=~left)
+                    own = point.release[i]
+                    seen = _restarted(chosen.problem, point.common, own, i, simulate, seen=~left)[1]
                     before.append(plain[runs[i].id][left])
                     fitted.append(caused[runs[i].id][left])
                     native.append(seen[left])
@@ -223,15 +244,15 @@ def native_closure(
     return NativeClosure(nominal_power, fit_power, native_power, f"on {on} held out of the fit")
 
 
-def _residual(
+def _restarted(
     problem: Problem,
     common: Array,
     own: Array,
     index: int,
     simulate: Simulate,
     seen: NDArray[np.bool_] | None = None,
-) -> Array:
-    """Reading minus the engine's prediction, in noise standard deviations, its start refitted to what was seen."""
+) -> tuple[Array, Array]:
+    """A run's own parameters, its start refitted in the engine to what was seen, and the `engine_residual` then."""
     seen = np.ones(problem.data.runs[index].reading.size, bool) if seen is None else seen
 
     def left(release: Array) -> Array:
@@ -248,7 +269,7 @@ def _residual(
         if not moved[seen] @ moved[seen] < best[seen] @ best[seen]:
             break
         own, best = trial, moved
-    return best
+    return own, best
 
 
 def engine_residual(problem: Problem, common: Array, own: Array, index: int, simulate: Simulate) -> Array:
@@ -265,7 +286,17 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
     chain = problem.chain(common, own, run)
     blocks = run.reading.size + blocks_beyond(chain.physics(), run) + 1
     measured = change.own(blocks * run.interval, "s")
-    motion = simulate(common, _start(problem, own, index), measured)
+    start, given = _start(problem, own, index), chain.physics().drive
+    if given is not None:  # without the constant moment, which is written into the model
+        bare = run.moment(1.0)
+        assert bare is not None
+        seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
+        lead = 0.0 if problem.data.law is None else problem.data.law.lead  # the engine has its own
+        times, delay = given.time_s * seconds, (given.delay + lead) * seconds
+        start = replace(
+            start, drive=replace(given, time_s=times, values=bare.values, scale=scale, delay=delay)
+        )
+    motion = simulate(common, start, measured)
     scaled = Motion(
         motion.time_s * change.similar(1.0, "s"), motion.angle, motion.rate * change.similar(1.0, "rad/s")
     )
@@ -311,22 +342,40 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
 
     still = next((i for i, run in enumerate(problem.data.runs) if not run.wind_on), 0)
 
+    given = model.spec().compile() if study.campaign.driven else None
+
     def law(common: Array) -> FoundLaw:
-        return found_law(problem, common, chosen.point.release[still], noise, still)
+        found = found_law(problem, common, chosen.point.release[still], noise, still)
+        if given is None:
+            return found
+        steps = inertia_of_steps(given, float(given.dof_damping[0]) + found.patch.damping[0])
+        return replace(found, patch=replace(found.patch, inertia=found.patch.inertia - steps))
 
     @lru_cache(maxsize=4)
     def compiled(common: bytes) -> mujoco.MjModel:
         return patched(model, law(np.frombuffer(common)).patch)[0].compile()
 
+    actuator = None if model.law.actuator is None else model.law.actuator.index
+    moments = {run.id for run in study.campaign.runs if run.drive is None or run.drive.column == "moment_nm"}
+
     def simulate(common: Array, start: Start, duration: float) -> Motion:
-        return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration)
+        by = None if start.run in moments else actuator
+        return simulate_joint(compiled(common.tobytes()), model.law.rest, start, duration, by)
 
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate)
     found = law(chosen.point.common)
-    starts = [_start(problem, own, i) for i, own in enumerate(chosen.point.release)]
+    early = given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4)
+    notes = (
+        *found.notes,
+        *((_EARLY.format(500.0 * given.opt.timestep),) if given is not None and early else ()),
+    )
+    own = list(chosen.point.release)
+    if given is not None:  # the engine's steps and its input do not begin as those of the fit
+        own = [_restarted(problem, chosen.point.common, one, i, simulate)[0] for i, one in enumerate(own)]
+    starts = [_start(problem, one, i) for i, one in enumerate(own)]
     spec, written = patched(model, found.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
-    return PatchedModel(model, spec, written, found.notes, zero, closure)
+    return PatchedModel(model, spec, written, notes, zero, closure)

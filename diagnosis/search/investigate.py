@@ -17,7 +17,7 @@ from diagnosis.likelihood.prepare import prepare, without_long_rest, without_res
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, by_moment, mains_interval, misfit
 from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.starting_points import decays_start, misses_motion, nominal_start
+from diagnosis.likelihood.starting_points import decays_start, joint_start, misses_motion, nominal_start
 from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.noise.rounding import rounding_errors
@@ -202,8 +202,11 @@ def fit_nominal(data: Data) -> Fit:
         TunnelError: when the nominal model cannot be fitted.
     """
     try:
-        found = fit(Problem(data), nominal_start(data))
-        nearer = decays_start(data) if misses_motion(found) else None
+        own = joint_start(data)
+        found = fit(Problem(data), nominal_start(data) if own is None else own)
+        nearer = None
+        if misses_motion(found):
+            nearer = decays_start(data) if own is None else nominal_start(data)
         if nearer is not None:
             found = min(found, fit(Problem(data), nearer), key=lambda one: one.total)
     except (FitError, np.linalg.LinAlgError) as error:

@@ -76,6 +76,13 @@ def test_the_figures_for_choosing_are_those_of_the_packaged_score(tmp_path: Path
 
 
 @pytest.mark.slow
+def test_the_joint_of_a_robot_is_diagnosed_as_shown(tmp_path: Path) -> None:
+    shown = steps(PAGES / "a-joint-of-your-robot.md")
+    assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
+    assert len(shown) == 4
+
+
+@pytest.mark.slow
 def test_the_class_of_ones_own_is_found(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-an-effect.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path) == ["", "stopper\n"]

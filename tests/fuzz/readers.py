@@ -226,9 +226,10 @@ def model_file(folder: Path, rng: Rng) -> None:
     if rng.random() < STRANGE:
         estranged(folder / changed, rng)
     with patch.object(joint_model, "in_limited_process", in_fork):
-        found = joint_model.read_joint_model(
-            folder / "model.xml", "hinge", float(10.0 ** rng.uniform(-6.0, 1.0))
-        )
+        moved = float(10.0 ** rng.uniform(-6.0, 1.0))
+        driven = {"middle": float(rng.uniform(-3.0, 3.0)), "controlled": True} if rng.random() < 0.3 else {}
+        recorded = joint_model.Recorded(moved, **driven)
+        found = joint_model.read_joint_model(folder / "model.xml", "hinge", recorded)
     law = JointPatch(found.law.inertia * float(rng.uniform(0.5, 2.0)), friction=0.01)
     spec, _ = patched(found, law)
     patched_xml(spec, found, folder)

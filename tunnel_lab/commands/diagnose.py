@@ -81,8 +81,16 @@ def diagnose(
         _model(
             "--free",
             metavar="A,B",
-            help="Parameters of the model to fit: inertia, damping, stiffness, rest. Default: those that the "
-            "runs can determine.",
+            help="Parameters of the model to fit: inertia, damping, stiffness, rest (a constant moment where "
+            "nothing holds the joint). Default: those that the runs can determine.",
+        ),
+    ] = None,
+    actuator: Annotated[
+        str | None,
+        _model(
+            "--actuator",
+            metavar="NAME",
+            help="Actuator whose control the column drive is, where the joint has several.",
         ),
     ] = None,
     asset_dir: Annotated[
@@ -124,6 +132,7 @@ def diagnose(
       tunnel diagnose my-campaign --json - | jq .causes
       tunnel diagnose my-campaign --effects-file my.toml
       tunnel diagnose my-campaign --model pendulum.xml --joint hinge --patch out.xml
+      tunnel diagnose my-robot --model arm.xml --joint elbow --actuator motor --patch out.xml
       tunnel diagnose my-campaign --propose law.toml
 
     [bold]Exit status[/bold]
@@ -141,14 +150,14 @@ def diagnose(
         from tunnel_lab.report import find_browser
 
         find_browser()
-    if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir)):
-        what = "--model and --joint belong together, and --free, --patch and --asset-dir to them"
+    if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir or actuator)):
+        what = "--model and --joint belong together, and --free, --actuator, --patch and --asset-dir to them"
         raise TunnelError(what, remedy="give both")
     data = given_campaign(campaign)
     hashes = file_hashes(campaign)
     own_model = None
     if model is not None and joint is not None:
-        own_model = read_model(model, joint, data, split_names(free) or None, asset_dir)
+        own_model = read_model(model, joint, data, split_names(free) or None, asset_dir, actuator)
     if own_model is not None and patch is not None:
         from diagnosis.patch.patched_model import refuse_unpatchable
 

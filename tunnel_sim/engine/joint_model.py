@@ -1,177 +1,31 @@
-"""A model of one's own, MJCF or URDF, with one joint that moves: its files, and the law of that joint.
-
-The files are found by the names in the text, and read before MuJoCo sees any of them. MuJoCo is given their
-content, so it opens no file, and the model stays the same however often it is compiled.
-"""
+"""A model of one's own with one joint that moves: the law of that joint, and the actuator that drives it."""
 
 from __future__ import annotations
 
-import html
 import json
 import math
-import os
-import posixpath  # MuJoCo's names have slashes everywhere
-import re
-import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from tunnel_sim.engine.model import load_plugin
+from tunnel_sim.engine.model_files import ModelFiles, engine_refusals, read_model_files
 from tunnel_sim.engine.simulate import no_log
-from tunnel_sim.files.reading import check_count, decoded, read_regular, read_text
 from tunnel_sim.processes import LimitReached, in_limited_process
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 from tunnel_sim.vocabulary.record import Array
-from tunnel_sim.vocabulary.rig import FREE_PARAMETERS, JointLaw, Term
-
-_VALUE = r"\s*=\s*(\"[^\"]*\"|'[^']*')"
-_DOCUMENT = re.compile(r"<(?:include|model)\s[^<>]*?\bfile" + _VALUE)
-_FILE = re.compile(r"\bfile(?:name|up|down|left|right|front|back)?" + _VALUE)
-_FOLDER = re.compile(r"\b(?:asset|mesh|texture)dir" + _VALUE)
-_STRIPPED = re.compile(
-    r"<robot\b|\bstrippath\s*=\s*[\"']true"
-)  # MuJoCo takes the last part of a URDF's names
-_MOST_FOLDERS = 20  # of a model: each name is looked for in each
-_SMALLER = "leave out what the motion of the joint does not need"
-
-
-@dataclass(frozen=True)
-class ModelFiles:
-    """The content of a model's files: its MJCF or URDF, and further XML and assets by the name MuJoCo asks for."""
-
-    text: str
-    documents: Mapping[str, bytes]
-    assets: Mapping[str, bytes]
-
-    def spec(self) -> mujoco.MjSpec:
-        """The model's specification, read again."""
-        load_plugin()
-        with engine_refusals("MuJoCo cannot load it", "correct the file"):
-            return mujoco.MjSpec.from_string(self.text, include=self.documents, assets=dict(self.assets))
-
-    def to_bytes(self) -> bytes:
-        """The sizes in one line of JSON, then the contents."""
-        parts = [{"": self.text.encode()}, self.documents, self.assets]
-        sizes = [{name: len(content) for name, content in part.items()} for part in parts]
-        contents = [content for part in parts for content in part.values()]
-        return b"".join([json.dumps(sizes).encode(), b"\n", *contents])
-
-    @classmethod
-    def from_bytes(cls, content: bytes) -> ModelFiles:
-        """The files of `to_bytes`."""
-        at = content.index(b"\n") + 1
-        parts: list[dict[str, bytes]] = []
-        for sizes in json.loads(content[:at]):
-            parts.append({})
-            for name, size in sizes.items():
-                parts[-1][name] = content[at : at + size]
-                at += size
-        return cls(parts[0][""].decode(), parts[1], parts[2])
-
-
-def read_model_files(path: Path, asset_dir: Path | None = None) -> ModelFiles:
-    """Read a model and the files that it names, from its own folder or the further one."""
-    text, where = read_text(path, limits.MODEL_BYTES, missing="name an MJCF or URDF file"), shown(path)
-    folders, stripped = {""}, False
-    names: dict[tuple[str, str], None] = {}  # of meshes and images, with their document's folder
-    documents: dict[str, bytes] = {}
-    assets: dict[str, bytes] = {}
-    left = [("", text)]
-    while left:
-        folder, document = left.pop()
-        first, *others = document.split("<!--")
-        document = first + "".join(one.partition("-->")[2] for one in others)
-        folders.update(_values(_FOLDER, document))
-        stripped |= _STRIPPED.search(document) is not None
-        inner = _values(_DOCUMENT, document)
-        names |= dict.fromkeys((folder, name) for name in _values(_FILE, document) if name not in inner)
-        count = len(names) + len(documents) + len(inner)
-        check_count(count, limits.MODEL_FILES, "names of files", where, _SMALLER)
-        for place in (place for name in inner for place in _places(name, ("", folder), ("",))):
-            content = None if place in documents else _content(path, asset_dir, place, limits.MODEL_BYTES)
-            if content is not None:
-                documents[place] = content
-                size = sum(map(len, documents.values()))
-                check_count(size, limits.MODEL_BYTES, "bytes of XML", where, _SMALLER)
-                left.append((posixpath.dirname(place), decoded(content, shown(path.parent / place))))
-    if len(folders) > _MOST_FOLDERS:
-        raise TunnelError(f"names {len(folders) - 1} folders", where=where, remedy="use one meshdir")
-    missing = []
-    for folder, name in names:
-        own = (name, posixpath.basename(name)) if stripped else (name,)
-        places = {place: None for one in own for place in _places(one, ("", folder), folders)}
-        for place in places.keys() - assets.keys():
-            content = _content(path, asset_dir, place, limits.ASSET_BYTES)
-            if content is not None:
-                assets[place] = content
-                size = sum(map(len, assets.values()))
-                check_count(size, limits.ASSET_BYTES, "bytes of meshes and images", where, _SMALLER)
-        if not places.keys() & assets.keys():
-            missing.append(name)
-    # MuJoCo would take a file of the same name from another folder in its place.
-    taken = {posixpath.basename(place).lower() for place in assets}
-    for name in missing:
-        if posixpath.basename(name).lower() in taken:
-            what = f"names {one_line(name)!r}, which is not there"
-            raise TunnelError(what, where=where, remedy="check the path")
-    return ModelFiles(text, documents, assets)
-
-
-def _content(model: Path, asset_dir: Path | None, place: str, limit: int) -> bytes | None:
-    """The content of a file of a model; None where there is none."""
-    path = model.parent / place
-    try:
-        if not os.path.lexists(path):
-            return None
-        real = Path(os.path.realpath(path))
-    except ValueError:
-        return None
-    if path.is_dir():  # a name that is put together from a folder of other files
-        return None
-    roots = [Path(os.path.realpath(one)) for one in (model.parent, asset_dir) if one is not None]
-    if not any(real.is_relative_to(root) for root in roots):
-        what = f"names {one_line(place)!r}, which is outside the model's folder"
-        remedy = "move it there, or name its folder with --asset-dir"
-        raise TunnelError(what, where=shown(model), remedy=remedy)
-    return read_regular(path, limit)
-
-
-def _places(name: str, bases: Sequence[str], folders: Iterable[str]) -> list[str]:
-    """Where a file may be, as MuJoCo would name it from the model's folder."""
-    name = name.replace("\\", "/")
-    found = (posixpath.join(base, folder, name) for base in bases for folder in folders)
-    return list(dict.fromkeys(posixpath.normpath(one) for one in found))
-
-
-def _values(pattern: re.Pattern[str], text: str) -> set[str]:
-    """The values of an attribute, those that are empty left out."""
-    return {html.unescape(found[1][1:-1]) for found in pattern.finditer(text)} - {""}
-
-
-@contextmanager
-def engine_refusals(what: str, remedy: str, where: str = "") -> Iterator[None]:
-    """Convert what MuJoCo raises for a model; its warnings are left out."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
-        said = one_line(" ".join(str(error).split()), 300)
-        if isinstance(error, MemoryError) or "unknown exception" in said:  # std::bad_alloc, std::length_error
-            said = "not enough memory, or a size out of range"
-        raise TunnelError(f"{what} ({said})", where=where, remedy=remedy) from error
-
+from tunnel_sim.vocabulary.rig import FREE_PARAMETERS, Actuator, JointLaw, Term
 
 _GRID = 361  # positions at which the moment is tabulated
 _EXACT = 1e-8  # of the greatest moment: what the terms of the law may leave, the engine's own rounding
 _PRESENT = 1e-9  # of the greatest moment: a smaller term is rounding
+_TURN = 2.0 * math.pi  # rad/s, of a joint that nothing holds: moments are judged against those of its inertia
 _RATES = np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])  # times the rate of the motion
 _MOMENTS = (
     ("b", "N m/rad"),
@@ -182,6 +36,23 @@ _MOMENTS = (
 )
 _DAMPING = (("r", "N m s/rad"), ("abs(r)*r", "N m s2/rad2"), ("r^3", "N m s3/rad3"))
 _TYPES = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What the records say of the motion of a joint.
+
+    Args:
+        reach: greatest displacement from rest, or of driven runs from the middle, rad (m for a slide).
+        middle: of driven runs, taken as positions of the joint, rad; None: all runs are free decays.
+        controlled: whether the input of a run is the control of an actuator.
+        actuator: the name of that actuator; None: the joint has only one.
+    """
+
+    reach: float
+    middle: float | None = None
+    controlled: bool = False
+    actuator: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +70,11 @@ class JointModel:
 
 
 def read_joint_model(
-    path: Path, joint: str, reach: float, free: Sequence[str] | None = None, asset_dir: Path | None = None
+    path: Path,
+    joint: str,
+    recorded: Recorded,
+    free: Sequence[str] | None = None,
+    asset_dir: Path | None = None,
 ) -> JointModel:
     """Read a model, and the law of one joint from the engine's moments, in a process with limits.
 
@@ -207,12 +82,11 @@ def read_joint_model(
     over twice the reach).
 
     Args:
-        reach: greatest displacement from rest in the records, rad (m for a slide).
         free: which of `FREE_PARAMETERS` are fitted; None: inertia, damping and rest position, and the stiffness
-            where the joint has a spring beside gravity.
+            where the joint has a spring, beside gravity or in driven runs.
     """
     files = read_model_files(path, asset_dir)
-    request = json.dumps([joint, reach]).encode() + b"\n" + files.to_bytes()
+    request = json.dumps([joint, asdict(recorded)]).encode() + b"\n" + files.to_bytes()
     try:
         found = in_limited_process(
             law_of_request, request, prepare=prepare, seconds=limits.MODEL_SECONDS, memory=limits.MODEL_MEMORY
@@ -224,15 +98,26 @@ def read_joint_model(
     if "what" in answer:
         where = f"{shown(path)}, joint {one_line(joint)!r}"
         raise TunnelError(answer["what"], where=where, remedy=answer["remedy"])
-    law = JointLaw(**{**answer["law"], "terms": tuple(Term(**one) for one in answer["law"]["terms"])})
+    given = answer["law"].pop("actuator")
+    terms = tuple(Term(**one) for one in answer["law"].pop("terms"))
+    actuator = None
+    if given is not None:
+        pairs: dict[str, Any] = {name: tuple(given.pop(name)) for name in ("control", "moment", "servo")}
+        actuator = Actuator(**given, **pairs)
+    law = JointLaw(**answer["law"], terms=terms, actuator=actuator)
+    driven = recorded.middle is not None
     gravity = any(term.expression.startswith(("sin", "cos")) for term in law.terms)
-    usual = ("inertia", "damping", *(("stiffness",) if answer["spring"] and gravity else ()), "rest")
+    spring = answer["spring"] and (gravity or driven)
+    usual = ("inertia", "damping", *(("stiffness",) if spring else ()), "rest")
     fitted = usual if free is None else tuple(free)
     for name in fitted:
         if name not in FREE_PARAMETERS:
             what, remedy = f"unknown parameter {one_line(name)!r}", did_you_mean(name, FREE_PARAMETERS)
             raise TunnelError(what, where="--free", remedy=remedy)
-    if {"inertia", "stiffness"} <= set(fitted) and not law.terms:
+    if law.stiffness == 0.0 and "stiffness" in fitted:
+        what = "the joint has no spring whose stiffness could be fitted"
+        raise TunnelError(what, where="--free", remedy="leave out stiffness")
+    if {"inertia", "stiffness"} <= set(fitted) and not (law.terms or driven):
         what = "inertia and stiffness of a linear spring cannot both be found from free decays"
         raise TunnelError(what, where="--free", remedy="name one of the two")
     law = replace(law, free=tuple(name for name in FREE_PARAMETERS if name in fitted))
@@ -247,9 +132,10 @@ def prepare() -> None:
 
 
 def law_of_request(request: bytes) -> bytes:
-    """The law of a joint, or what is refused, as JSON; the request is joint and reach as JSON, then the files."""
+    """The law of a joint, or what is refused, as JSON; of joint and `Recorded` as JSON, and then the files."""
     at = request.index(b"\n") + 1
-    joint, reach = json.loads(request[:at])
+    joint, given = json.loads(request[:at])
+    recorded = Recorded(**given)
     try:
         with no_log(), np.errstate(all="ignore"):
             with engine_refusals("MuJoCo cannot load it", "correct the file"):
@@ -272,7 +158,8 @@ def law_of_request(request: bytes) -> bytes:
             kind = _TYPES.get(int(model.jnt_type[0]))
             if kind is None:
                 raise TunnelError("is not a hinge or slide", remedy="name the joint that the sensor reads")
-            law = _law(model, reach, slide=kind == "slide")
+            actuator = _actuator(model, recorded)  # takes its limits away
+            law = replace(_law(model, recorded, slide=kind == "slide"), actuator=actuator)
     except TunnelError as error:
         return json.dumps({"what": error.what, "remedy": error.remedy}).encode()
     return json.dumps({"law": asdict(law), "spring": bool(model.jnt_stiffness[0])}).encode()
@@ -284,9 +171,16 @@ class _Engine:
     def __init__(self, model: mujoco.MjModel) -> None:
         self.model, self.data = model, mujoco.MjData(model)
 
-    def moment(self, position: float, rate: float = 0.0) -> float:
-        """Of gravity, springs, dampers and actuators without control; constraints excluded, N m."""
+    def moment(self, position: float, rate: float = 0.0, control: tuple[int, float] = (0, 0.0)) -> float:
+        """Of gravity, springs, dampers and actuators; constraints excluded, N m.
+
+        Args:
+            control: place among the model's controls, and value; the others are zero.
+        """
         self.data.qpos[0], self.data.qvel[0] = position, rate
+        if self.model.nu:
+            self.data.ctrl[:] = 0.0
+            self.data.ctrl[control[0]] = control[1]
         mujoco.mj_forward(self.model, self.data)
         moment = float(self.data.qfrc_passive[0] + self.data.qfrc_actuator[0] - self.data.qfrc_bias[0])
         if not abs(moment) <= limits.LARGEST_NUMBER:
@@ -301,43 +195,101 @@ class _Engine:
         return float(full[0, 0])
 
 
-def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
+def _actuator(model: mujoco.MjModel, recorded: Recorded) -> Actuator | None:
+    """The actuator whose control drives the runs, its moment measured; None where no control does.
+
+    The limits of its force are taken away from the model, since they are checked along the records.
+    """
+    if not recorded.controlled and recorded.actuator is None:
+        return None
+    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    known = [i for i in range(model.nu) if model.actuator_trntype[i] in on_joint]
+    names = {model.actuator(i).name or f"{i + 1}": i for i in known}
+    if recorded.actuator is not None and recorded.actuator not in names:
+        what = f"it has no actuator {one_line(recorded.actuator)!r}"
+        raise TunnelError(what, remedy=did_you_mean(recorded.actuator, list(names)))
+    if len(names) > 1 and recorded.actuator is None:
+        what = f"it has several actuators: {one_line(', '.join(names), 200)}"
+        raise TunnelError(what, remedy="name the one that the column drive is the control of with --actuator")
+    if not names:
+        return None
+    name = recorded.actuator or next(iter(names))
+    i = names[name]
+    if model.actuator_ctrlnum[i] != 1 or model.actuator_delay[i] > 0.0:
+        what = f"its actuator {one_line(name)!r} has several controls, or delays its control"
+        raise TunnelError(
+            what, remedy="leave out the delay, which the diagnosis looks for, or record moment_nm"
+        )
+    moments = [(-math.inf, math.inf)]
+    if model.actuator_forcelimited[i]:
+        moments.append(model.actuator_forcerange[i] * model.actuator_gear[i, 0])
+    if model.jnt_actfrclimited[0]:
+        moments.append(model.jnt_actfrcrange[0])
+    control = model.actuator_ctrlrange[i].tolist() if model.actuator_ctrllimited[i] else (-math.inf, math.inf)
+    model.actuator_forcelimited[i] = model.jnt_actfrclimited[0] = model.actuator_ctrllimited[i] = 0
+    engine, at = _Engine(model), int(model.actuator_ctrladr[i])
+    places = [(0.0, 0.0), (recorded.reach, 1.0), (-2.0 * recorded.reach, -3.0)]
+    found = [
+        (engine.moment(x, rate, (at, u)) - engine.moment(x, rate)) / u
+        for x, rate in places
+        for u in (1.0, -7.0)
+    ]
+    gain = found[0]
+    if not abs(gain) > 0.0 or np.ptp(found) > _EXACT * abs(gain):
+        what = f"the moment of its actuator {one_line(name)!r} is not in proportion to the control"
+        raise TunnelError(
+            what, remedy="take a motor or servo with a fixed gain, or record the moment as moment_nm"
+        )
+    servo = [(engine.moment(x), float(engine.data.qfrc_actuator[0]))[1] for x in (0.0, 1.0)]
+    unclipped = float(max(min(m) for m in moments)), float(min(max(m) for m in moments))
+    return Actuator(name, i, gain, (control[0], control[1]), unclipped, (servo[0], servo[1] - servo[0]))
+
+
+def _rest(engine: _Engine, grid: Array, moments: Array) -> float:
+    """The stable rest position closest to the model's own configuration, rad."""
     from scipy.optimize import brentq  # only here: slow to load
 
-    engine = _Engine(model)
-    centre = float(model.qpos0[0])
-    # The stable rest position closest to the model's own configuration.
-    around = 10.0 * reach if slide else math.pi
-    grid = centre + np.linspace(-around, around, _GRID) * (1.0 + 1e-9)
-    moments = np.array([engine.moment(x) for x in grid])
-    moments[np.abs(moments) < 1e-12 * np.max(np.abs(moments))] = 0.0
+    moments = np.where(np.abs(moments) < 1e-12 * np.max(np.abs(moments)), 0.0, moments)
     falls = np.flatnonzero((moments[:-1] >= 0.0) & (moments[1:] < 0.0))
     if falls.size == 0:
         what = "does not oscillate: it has no stable rest position nearby"
         raise TunnelError(what, remedy="add the spring, or gravity, that restores it")
-    at = falls[np.argmin(np.abs(grid[falls] - centre))]
-    rest = float(grid[at])
-    if engine.moment(rest) > 0.0:  # rest lies between the grid's positions
-        rest = float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
-    span = 2.0 * reach if slide else math.pi
-    b = np.linspace(-span, span, _GRID)
-    restoring = np.array([-engine.moment(rest + x) for x in b])
-    terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
+    at = falls[np.argmin(np.abs(grid[falls] - float(engine.model.qpos0[0])))]
+    if engine.moment(grid[at]) > 0.0:  # rest lies between the grid's positions
+        return float(brentq(engine.moment, grid[at], grid[at + 1], xtol=1e-13))
+    return float(grid[at])
+
+
+def _law(model: mujoco.MjModel, recorded: Recorded, *, slide: bool) -> JointLaw:
+    engine, reach, middle = _Engine(model), recorded.reach, recorded.middle
+    around = 10.0 * reach if slide else math.pi
+    grid = float(model.qpos0[0]) + np.linspace(-around, around, _GRID) * (1.0 + 1e-9)
+    moments = np.array([engine.moment(x) for x in grid])
+    terms: dict[str, float] | None
+    if middle is not None and np.ptp(moments) < _PRESENT * engine.inertia() * _TURN**2:
+        rest, span, constant = middle, reach, -float(np.mean(moments))  # nothing holds it; a slide has weight
+        terms = {"1": constant} if abs(constant) > _PRESENT * engine.inertia() * _TURN**2 else {}
+    else:
+        rest = _rest(engine, grid, moments)
+        span = 2.0 * (reach if middle is None else reach + abs(middle - rest)) if slide else math.pi
+        b = np.linspace(-span, span, _GRID)
+        restoring = np.array([-engine.moment(rest + x) for x in b])
+        terms = _fitted(_MOMENTS, {"b": b}, restoring, float(np.max(np.abs(restoring))))
     if terms is None:
         what = "its restoring moment is not that of gravity and of springs up to the third power"
         raise TunnelError(what, remedy="write tendons, dead bands and actuators as the joint's own stiffness")
     stiffness = terms.pop("b", 0.0)
-    own = int(model.dof_frictionloss[0] > 0.0)
-    for x in np.linspace(-reach, reach, _GRID // 4):  # nothing else may act within the records' reach
-        engine.moment(rest + float(x))
+    own, centre = int(model.dof_frictionloss[0] > 0.0), rest if middle is None else middle
+    for x in np.linspace(centre - reach, centre + reach, _GRID // 4):  # nothing else may act within the reach
+        engine.moment(float(x))
         if engine.data.ncon:
             pair = [model.geom(g).name or f"geom {g}" for g in engine.data.contact.geom[0]]
             raise TunnelError(
-                f"{' and '.join(map(one_line, pair))} touch at {rest + x:.3g} rad, within the records' reach",
+                f"{' and '.join(map(one_line, pair))} touch at {x:.3g} rad, within the records' reach",
                 remedy="exclude the contact, or set contype and conaffinity to 0",
             )
         if engine.data.nefc > own:
-            what = f"a limit or another constraint acts at {rest + x:.3g} rad, within the records' reach"
+            what = f"a limit or another constraint acts at {x:.3g} rad, within the records' reach"
             raise TunnelError(what, remedy="widen the joint's range, or check the units of range and records")
     inertias = [(engine.moment(rest + x), engine.inertia())[1] for x in (0.0, 0.4 * span, -0.7 * span)]
     if not limits.SMALLEST_NUMBER <= inertias[0] <= limits.LARGEST_NUMBER:
@@ -345,9 +297,10 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
         raise TunnelError(f"its inertia is {inertias[0]:g} kg m2", remedy=remedy)
     if np.ptp(inertias) > _EXACT * inertias[0]:
         raise TunnelError("its inertia changes with its position", remedy="remove the tendon's armature")
-    if not stiffness > 0.0:
+    if not stiffness > 0.0 and (middle is None or terms.keys() - {"1"}):
         raise TunnelError("does not oscillate: nothing restores it", remedy="add the spring, or gravity")
-    rates, scale = _RATES * (math.sqrt(stiffness / inertias[0]) * reach), stiffness * reach
+    turn = math.sqrt(stiffness / inertias[0]) or _TURN
+    rates, scale = _RATES * (turn * reach), inertias[0] * turn**2 * reach
     lost = np.array([engine.moment(rest) - engine.moment(rest, r) for r in rates])
     damping = _fitted(_DAMPING, {"r": rates}, lost, scale)
     elsewhere = engine.moment(rest + 0.1) - engine.moment(rest + 0.1, rates[-1])
@@ -357,7 +310,7 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
             remedy="write them as damping, or leave them out: the diagnosis looks for them",
         )
     linear = damping.pop("r", 0.0)
-    units = dict((*_MOMENTS, *_DAMPING))
+    units = dict((("1", "N m"), *_MOMENTS, *_DAMPING))
     return JointLaw(
         inertias[0],
         stiffness,
@@ -366,6 +319,7 @@ def _law(model: mujoco.MjModel, reach: float, *, slide: bool) -> JointLaw:
         rest,
         tuple(Term(text, value, units[text]) for text, value in {**terms, **damping}.items()),
         slide=slide,
+        step=float(model.opt.timestep),
     )
 
 

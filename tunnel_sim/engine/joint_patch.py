@@ -12,10 +12,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from tunnel_sim.engine.joint_model import JointModel, engine_refusals
+from tunnel_sim.engine.joint_model import JointModel
+from tunnel_sim.engine.model_files import engine_refusals
 from tunnel_sim.engine.simulate import no_log
 from tunnel_sim.files.reading import check_count
-from tunnel_sim.physics.run_settings import Motion
+from tunnel_sim.physics.run_settings import DriveMoment, Motion
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
@@ -52,12 +53,14 @@ class Start:
     Args:
         time: since the start of the record, s.
         angle, rate: displacement from rest, rad, and its rate, rad/s.
+        drive: what drives it from there on; None: a free decay.
     """
 
     run: str
     time: float
     angle: float
     rate: float
+    drive: DriveMoment | None = None
 
 
 @dataclass(frozen=True)
@@ -141,12 +144,18 @@ def _write_inertia(
     Bodies of a times the mass at 1/a times the distance from the axis have the same moment of gravity and 1/a times
     the inertia. On a slide they lose mass instead; returned is the share of the weight that remains.
     """
+    rotors = float(
+        np.sum(before.actuator_gear[:, 0] ** 2 * before.actuator_armature)
+    )  # they stay as they are
     armature = float(before.dof_armature[0]) + patch.inertia - model.law.inertia
     if armature >= 0.0:
         spec.joint(model.joint).armature = armature
         return 1.0
     spec.joint(model.joint).armature = 0.0
-    share = patch.inertia / (model.law.inertia - float(before.dof_armature[0]))
+    share = (patch.inertia - rotors) / (model.law.inertia - float(before.dof_armature[0]) - rotors)
+    if not share > 0.0:
+        what = f"the inertia found, {patch.inertia:.4g} kg m2, is less than that of the actuators' rotors"
+        raise TunnelError(what, remedy="correct the armature of the actuators")
     data = mujoco.MjData(before)
     mujoco.mj_forward(before, data)
     axis, anchor = data.xaxis[0], data.xanchor[0]
@@ -167,6 +176,26 @@ def _write_inertia(
     return share if model.law.slide else 1.0
 
 
+def inertia_of_steps(model: mujoco.MjModel, damping: float) -> float:
+    """How much more inertia a joint seems to have when it is simulated in steps, kg m².
+
+    At the end of a step of h, an integrator of first order has the moment of a damper C at the step's end or start
+    instead of that in its middle: this adds C h/2 to the inertia, or takes it off.
+
+    Args:
+        damping: of the joint itself, N m s/rad; that of its actuators is the model's own.
+    """
+    options, kinds = model.opt, mujoco.mjtIntegrator
+    if options.integrator == int(kinds.mjINT_RK4):
+        return 0.0
+    affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    servos = -float(np.sum(model.actuator_gear[affine, 0] ** 2 * model.actuator_biasprm[affine, 2]))
+    explicit = options.integrator == int(kinds.mjINT_EULER)
+    late = not explicit or not options.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    ends = (damping if late else -damping) + (-servos if explicit else servos)
+    return 0.5 * float(options.timestep) * ends
+
+
 def _write_spring(
     spec: mujoco.MjSpec, before: mujoco.MjModel, model: JointModel, patch: JointPatch, weight: float
 ) -> None:
@@ -176,7 +205,10 @@ def _write_spring(
     total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
     total -= (1.0 - weight) * own(offset)  # the spring carries the weight
     total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
-    roots = total.roots() if total.degree() else np.array([0.0])
+    if not total.degree():  # a moment that does not depend on the position
+        _write_constant(spec, model, -float(total.coef[0]))
+        return
+    roots = total.roots()
     real = roots.real[np.abs(roots.imag) < 1e-6]
     if real.size == 0:
         remedy = "give it a spring of its own"
@@ -190,6 +222,22 @@ def _write_spring(
     joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
 
 
+def _write_constant(spec: mujoco.MjSpec, model: JointModel, moment: float) -> None:
+    """A constant moment (N m) as the bias of the actuator that drives the joint, or of one that is added."""
+    if moment == 0.0:
+        return
+    own = model.law.actuator
+    if own is None:
+        name, kind = f"{model.joint}_moment", mujoco.mjtTrn.mjTRN_JOINT
+        actuator = spec.add_actuator(name=name, trntype=kind, target=model.joint)
+        actuator.gainprm[0] = 0.0
+    else:
+        actuator = spec.actuators[own.index]
+    if actuator.biastype == mujoco.mjtBias.mjBIAS_NONE:
+        actuator.biastype, actuator.biasprm[:] = mujoco.mjtBias.mjBIAS_AFFINE, 0.0
+    actuator.biasprm[0] += moment / actuator.gear[0]
+
+
 def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
     """What may be written into a model, by name and unit."""
     moving = [i for i in range(model.nbody) if model.body_weldid[i]]
@@ -201,6 +249,7 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
         ("joint springref", "rad"): [model.qpos_spring[0]],
         ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): damping,
         ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
+        ("actuator moment without control", "N m"): [_unbidden(model)],
         **{(f"body {model.body(i).name or i} mass", "kg"): [model.body_mass[i]] for i in moving},
         ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
         ("plugin vwt.yaw_moment", "1"): [model.nplugin],
@@ -208,12 +257,23 @@ def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...
     return {name: tuple(map(float, values)) for name, values in found.items()}
 
 
-def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duration: float) -> Motion:
+def _unbidden(model: mujoco.MjModel) -> float:
+    """The constant part of the actuators' moments, N m."""
+    affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    return float(np.sum(model.actuator_gear[affine, 0] * model.actuator_biasprm[affine, 0]))
+
+
+def simulate_joint(
+    model: mujoco.MjModel, law_rest: float, start: Start, duration: float, actuator: int | None = None
+) -> Motion:
     """Simulate one run of a patched model, by displacement from rest, with the model's own integrator and steps.
+
+    In every step the input has its mean over the step.
 
     Args:
         law_rest: the joint's position at rest, rad.
         duration: s.
+        actuator: whose control the input is; None: it is a moment on the joint (``qfrc_applied``).
     """
     steps = duration / model.opt.timestep
     remedy = "lengthen the model's timestep"
@@ -221,10 +281,14 @@ def simulate_joint(model: mujoco.MjModel, law_rest: float, start: Start, duratio
     count = math.ceil(steps) + 1
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = law_rest + start.angle, start.rate
-    angle, rate = np.empty(count), np.empty(count)
+    angle, rate, given = np.empty(count), np.empty(count), np.zeros(count)
+    if start.drive is not None:
+        given = start.drive.means(model.opt.timestep * np.arange(count + 1))
+        given = given * start.drive.scale if actuator is None else given
+    pushed, at = (data.qfrc_applied, 0) if actuator is None else (data.ctrl, model.actuator_ctrladr[actuator])
     with no_log():
         for i in range(count):
-            angle[i], rate[i] = data.qpos[0], data.qvel[0]
+            angle[i], rate[i], pushed[at] = data.qpos[0], data.qvel[0], given[i]
             mujoco.mj_step(model, data)
     if data.time < 0.5 * count * model.opt.timestep:  # the engine has reset a motion that grew without bound
         what = "the patched model's motion grows without bound"

@@ -315,15 +315,9 @@ def numerics(rig: Rig, settings: RunSettings) -> dict[str, tuple[float, ...]]:
     if drive is None:
         return values
     times, given, held, step = drive.time_s, drive.values, drive.held, settings.timestep
-    if not drive.at_steps(step):
-        # As its mean over every step: its impulse is kept, and what is lost is of second order.
-        ends = step * np.arange(round((times[-1] + max(drive.delay, 0.0)) / step) + 3) - drive.delay
-        before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
-        now = given[before] if held else np.interp(ends, times, given)
-        until = np.diff(times) * (given[:-1] if held else 0.5 * (given[:-1] + given[1:]))
-        integral = np.append(0.0, np.cumsum(until))[before]
-        integral += 0.5 * (given[before] + now) * (ends - times[before])
-        given, held = np.diff(integral) / step, True
+    if not drive.at_steps(step):  # by its means over the steps, which is of second order
+        given = drive.means(step * np.arange(round((times[-1] + max(drive.delay, 0.0)) / step) + 3))
+        held = True
         times = step * np.arange(given.size, dtype=np.float64)
     return values | {
         "drive": tuple((drive.scale * given).tolist()),

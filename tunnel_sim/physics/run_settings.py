@@ -148,6 +148,23 @@ class DriveMoment:
         )
         return bool(even) and abs(apart - round(apart)) <= 1e-6 * apart
 
+    def means(self, ends: Array) -> Array:
+        """Means of the delayed input between successive times, which keep its impulse.
+
+        Args:
+            ends: since the run's start, shape (n + 1,), s, increasing.
+
+        Returns:
+            In the unit of the values, shape (n,).
+        """
+        times, given, ends = self.time_s, self.values, ends - self.delay
+        before = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, times.size - 1)
+        now = given[before] if self.held else np.interp(ends, times, given)
+        until = np.diff(times) * (given[:-1] if self.held else 0.5 * (given[:-1] + given[1:]))
+        integral = np.append(0.0, np.cumsum(until))[before]
+        integral += 0.5 * (given[before] + now) * (ends - times[before])
+        return np.asarray(np.diff(integral) / np.diff(ends), np.float64)
+
 
 @dataclass(frozen=True)
 class RunSettings:

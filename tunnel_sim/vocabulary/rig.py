@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, pi, radians, sin, tan
+from math import cos, inf, pi, radians, sin, tan
 
 import numpy as np
 
@@ -35,6 +35,27 @@ class Term:
 
 
 @dataclass(frozen=True)
+class Actuator:
+    """An actuator of a joint, whose moment is in proportion to its control.
+
+    Args:
+        name: as in the model, or its number.
+        index: place among the model's actuators.
+        gain: N m per unit of the control.
+        control: least and greatest control that are not clipped.
+        moment: least and greatest moment that are not clipped, N m.
+        servo: what it gives without control at position 0, N m, and per position, N m/rad; part of the joint's law.
+    """
+
+    name: str
+    index: int
+    gain: float
+    control: tuple[float, float] = (-inf, inf)
+    moment: tuple[float, float] = (-inf, inf)
+    servo: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class JointLaw:
     """The equation of motion about the joint's stable rest position.
 
@@ -43,11 +64,14 @@ class JointLaw:
 
     Args:
         inertia: I, kg m².
-        stiffness: K, slope of the whole restoring moment at rest, N m/rad.
+        stiffness: K, slope of the whole restoring moment at rest, N m/rad; 0: nothing holds the joint.
         damping: C, N m s/rad.
         friction: moment of dry friction, N m.
-        rest: the joint's position at rest, rad.
-        free: which of `FREE_PARAMETERS` are fitted.
+        rest: the joint's position at rest, rad; where nothing holds it, the middle of its records.
+        free: which of `FREE_PARAMETERS` are fitted; where nothing holds the joint, ``rest`` is a constant moment.
+        actuator: whose control drives the runs; None: no run is driven by a control.
+        step: of the model, s.
+        lead: by which the motion leads its input, as it does in integrators of first order, s.
     """
 
     inertia: float
@@ -58,12 +82,25 @@ class JointLaw:
     terms: tuple[Term, ...] = ()
     free: tuple[str, ...] = ("inertia", "damping", "rest")
     slide: bool = False
+    actuator: Actuator | None = None
+    step: float = 0.0
+    lead: float = 0.0
+
+    @property
+    def hangs(self) -> bool:
+        """Whether gravity alone restores the joint, so that its angle is one with the sensor's zero."""
+        of_angle = {term.expression: term.coefficient for term in self.terms if "r" not in term.expression}
+        sine = of_angle.pop("sin(b)-b", 0.0)
+        return sine > 0.0 and not of_angle and abs(sine - self.stiffness) <= 1e-6 * sine
 
     @property
     def held(self) -> dict[str, float]:
         """Value of every parameter that is not fitted, by its name in a fit."""
         known = {"inertia": self.inertia, "damping": self.damping, "stiffness": 0.0, "rest": self.rest}
-        return {FREE_PARAMETERS[name]: value for name, value in known.items() if name not in self.free}
+        found = {FREE_PARAMETERS[name]: value for name, value in known.items() if name not in self.free}
+        if self.stiffness == 0.0 and "zero" in found:
+            return {**found, "moment_offset": 0.0}
+        return found
 
 
 _SLANT_DROP = 0.4  # height of the slant over that of the body: the paper gives its angle, not its length

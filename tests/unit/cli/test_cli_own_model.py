@@ -1,6 +1,6 @@
 """``tunnel diagnose --model``: what is refused in one line, and the patched model that is written.
 
-Truth: a linear decay in closed form.
+Truth: a linear decay in closed form, where no test says otherwise.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import pytest
 
 from diagnosis.closure import UNPATCHED
 from tests.reference.free_decays import Setting, campaign
+from tests.reference.robot_joints import LEVEL, MOTOR, robot, robot_campaign
 from tunnel_lab.commands import diagnose as commands
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -121,3 +122,36 @@ def test_a_slide_says_so(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
     assert "The joint slides: read m for rad, N for N m and kg for kg m2 throughout." in document["cautions"]
     (mass,) = next(w["after"] for w in document["model"]["written"] if w["name"].endswith("mass"))
     assert mass == pytest.approx(document["coefficients"]["after"]["yaw_inertia"]["value"])
+
+
+def test_the_control_of_a_robots_joint_from_its_folder(tunnel: Tunnel, tmp_path: Path) -> None:
+    """The truth is that of MuJoCo's own steps: friction and a rotor that the model lacks."""
+    truth = 'armature="0.05" damping="0.4" frictionloss="0.6" solreffriction="0.002 1"'
+    folder = write_campaign(robot_campaign(robot(truth, axis=LEVEL), start=1.57), tmp_path / "arm")
+    two = f'{MOTOR}<motor name="other" joint="elbow"/>'
+    (tmp_path / "arm.xml").write_text(robot(axis=LEVEL, actuators=two))
+    given = ("diagnose", folder, "--effects", "coulomb_friction", "--model", tmp_path / "arm.xml")
+    status, _, err = tunnel(*given, "--joint", "elbow")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "name the one that the column drive is the control of with --actuator" in err
+    answer, report, out = (tmp_path / name for name in ("answer.json", "report.html", "out.xml"))
+    options = (
+        "--joint",
+        "elbow",
+        "--actuator",
+        "motor",
+        "--json",
+        answer,
+        "--report",
+        report,
+        "--patch",
+        out,
+    )
+    status, shown, _ = tunnel(*given, *options)
+    assert status == 0
+    assert "By the model, actuator 'motor' gives 20 N m per unit of control." in " ".join(shown.split())
+    document = json.loads(answer.read_text())
+    assert document["causes"] == ["coulomb_friction"]
+    assert document["model"]["closed"] > 0.99
+    assert "joint frictionloss" in report.read_text()
+    assert 'armature="0.05' in out.read_text()

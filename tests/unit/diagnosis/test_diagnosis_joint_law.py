@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from diagnosis import read_model
-from diagnosis.diagnosable import with_law
 from diagnosis.likelihood.least_squares import scaled_residuals
 from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.own_joint import with_law
 from diagnosis.patch.patched_model import engine_residual, found_law
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.closure import NativeClosure
-from diagnosis.diagnosable import reach, with_law
 from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.likelihood.prepare import prepare
+from diagnosis.own_joint import reach, with_law
 from diagnosis.search.investigate import fit_nominal, investigate
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties

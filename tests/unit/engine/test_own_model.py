@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tunnel_sim.engine import joint_model
-from tunnel_sim.engine.joint_model import JointModel, read_joint_model
+from tunnel_sim.engine.joint_model import JointModel, Recorded, read_joint_model
 from tunnel_sim.engine.joint_patch import JointPatch, Start, patched, patched_xml, simulate_joint
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.processes import in_limited_process
@@ -55,7 +55,7 @@ def model(
         f'<mujoco><compiler angle="radian"/><option gravity="0 0 {-gravity}" {option}/><worldbody>'
         f"{body.format(joint, BOB)}{more}</worldbody></mujoco>"
     )
-    return read_joint_model(path, "hinge", reach, **rest)
+    return read_joint_model(path, "hinge", Recorded(reach), **rest)
 
 
 def terms(found: JointModel) -> dict[str, float]:
@@ -122,7 +122,7 @@ def test_a_urdf_is_read(tmp_path: Path) -> None:
         '<joint name="hinge" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>'
         '<dynamics damping="0.1" friction="0.01"/></joint></robot>'
     )
-    law = read_joint_model(path, "hinge", 1.0).law
+    law = read_joint_model(path, "hinge", Recorded(1.0)).law
     assert (law.inertia, law.damping, law.friction) == pytest.approx((0.01 + 0.4 * 0.09, 0.1, 0.01))
 
 
@@ -162,7 +162,7 @@ def test_a_spring_of_tendons_is_refused(tmp_path: Path) -> None:
         '<spatial stiffness="30" springlength="0.1"><site site="a"/><site site="b"/></spatial></tendon></mujoco>'
     )
     with pytest.raises(TunnelError, match="its restoring moment is not that of gravity and of springs"):
-        read_joint_model(path, "hinge", 1.0)
+        read_joint_model(path, "hinge", Recorded(1.0))
 
 
 def reread(found: JointModel, patch: JointPatch, folder: Path) -> JointModel:
@@ -170,7 +170,7 @@ def reread(found: JointModel, patch: JointPatch, folder: Path) -> JointModel:
     path = folder / "out.xml"
     path.write_text(patched_xml(spec, found, folder))
     assert 'armature="-' not in path.read_text()
-    return read_joint_model(path, "hinge", 0.05 if found.law.slide else 1.0)
+    return read_joint_model(path, "hinge", Recorded(0.05 if found.law.slide else 1.0))
 
 
 @pytest.mark.parametrize("share", [0.6, 0.98, 1.3])
@@ -208,7 +208,7 @@ def test_degrees_stay_degrees(tmp_path: Path) -> None:
     found = model(tmp_path, 'ref="30"', body=BODY)
     text = (tmp_path / "model.xml").read_text().replace('angle="radian"', 'angle="degree"')
     (tmp_path / "model.xml").write_text(text)
-    found = read_joint_model(tmp_path / "model.xml", "hinge", 1.0)
+    found = read_joint_model(tmp_path / "model.xml", "hinge", Recorded(1.0))
     assert found.law.rest == pytest.approx(math.radians(30.0))
     new = reread(found, JointPatch(found.law.inertia, (0.0, 0.5, 0.0, 0.0)), tmp_path)
     assert new.law.rest == pytest.approx(math.radians(30.0), abs=1e-5)
@@ -259,10 +259,12 @@ def test_meshes_are_found_from_another_folder(tmp_path: Path) -> None:
         '<mujoco><compiler meshdir="assets"/><asset><mesh name="arm" file="arm.obj"/></asset><worldbody><body>'
         '<joint name="hinge" axis="0 1 0"/><geom type="mesh" mesh="arm"/></body></worldbody></mujoco>'
     )
-    found = read_joint_model(tmp_path / "in" / "model.xml", "hinge", 1.0)
+    found = read_joint_model(tmp_path / "in" / "model.xml", "hinge", Recorded(1.0))
     spec, _ = patched(found, replace(JointPatch(found.law.inertia), friction=0.1))
     (tmp_path / "out" / "out.xml").write_text(patched_xml(spec, found, tmp_path / "out"))
-    law = read_joint_model(tmp_path / "out" / "out.xml", "hinge", 1.0, asset_dir=tmp_path / "in").law
+    law = read_joint_model(
+        tmp_path / "out" / "out.xml", "hinge", Recorded(1.0), asset_dir=tmp_path / "in"
+    ).law
     assert law.friction == pytest.approx(0.1)
     assert law.stiffness == pytest.approx(found.law.stiffness, rel=1e-5)
 
@@ -286,7 +288,7 @@ PENDULUM = f"<mujocoinclude><worldbody>{ARM.format(BOB)}</worldbody></mujocoincl
 @pytest.mark.usefixtures("with_limits")
 def test_the_law_from_the_process_with_limits_is_the_same(tmp_path: Path) -> None:
     found = model(tmp_path, 'stiffness="2 0.3" springref="0.5" frictionloss="0.002"')
-    request = b'["hinge", 1.0]\n' + found.files.to_bytes()
+    request = b'["hinge", {"reach": 1.0}]\n' + found.files.to_bytes()
     here = json.loads(joint_model.law_of_request(request))
     assert (found.law.rest, found.law.stiffness) == (here["law"]["rest"], here["law"]["stiffness"])
     assert terms(found) == {term["expression"]: term["coefficient"] for term in here["law"]["terms"]}
@@ -310,7 +312,7 @@ def test_a_model_that_takes_too_much_is_refused(
 ) -> None:
     monkeypatch.setattr(limits, "MODEL_SECONDS", 0.2)
     with pytest.raises(TunnelError, match=said):
-        read_joint_model(written(tmp_path, text), "hinge", 1.0)
+        read_joint_model(written(tmp_path, text), "hinge", Recorded(1.0))
 
 
 def long(path: Path) -> None:
@@ -351,7 +353,7 @@ def test_only_small_regular_files_beside_the_model_are_read(
     if name:
         make(tmp_path / "in" / name)
     with pytest.raises(TunnelError) as refusal:
-        read_joint_model(tmp_path / "in" / "model.xml", "hinge", 1.0)
+        read_joint_model(tmp_path / "in" / "model.xml", "hinge", Recorded(1.0))
     assert said in str(refusal.value)
     assert refusal.value.remedy
 
@@ -362,7 +364,7 @@ def test_a_file_that_is_named_in_no_usual_way_is_not_opened(tmp_path: Path) -> N
     text = '<mujoco><include a=">" file="more.xml"/></mujoco>'
     (tmp_path / "more.xml").write_text(PENDULUM)
     with pytest.raises(TunnelError, match="MuJoCo cannot load it"):
-        read_joint_model(written(tmp_path, text), "hinge", 1.0)
+        read_joint_model(written(tmp_path, text), "hinge", Recorded(1.0))
 
 
 @pytest.mark.parametrize(
@@ -389,7 +391,7 @@ def test_its_files_are_found_as_mujoco_finds_them(tmp_path: Path, text: str, nam
     for name, content in names.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(content)
-    found = read_joint_model(written(tmp_path, text), "hinge", 1.0)
+    found = read_joint_model(written(tmp_path, text), "hinge", Recorded(1.0))
     direct = mujoco.MjModel.from_xml_path(str(tmp_path / "model.xml")) if "home" not in text else None
     assert found.law.stiffness > 0.0
     if direct is not None:
@@ -405,7 +407,7 @@ def test_another_file_of_the_same_name_is_not_taken(tmp_path: Path) -> None:
         .replace("arm.obj", "a.obj")
     )
     with pytest.raises(TunnelError, match=r"names 'a\.obj', which is not there"):
-        read_joint_model(written(tmp_path, text), "hinge", 1.0)
+        read_joint_model(written(tmp_path, text), "hinge", Recorded(1.0))
 
 
 def test_files_of_another_folder_where_it_is_named(tmp_path: Path) -> None:
@@ -414,16 +416,16 @@ def test_files_of_another_folder_where_it_is_named(tmp_path: Path) -> None:
     (tmp_path / "parts" / "arm.obj").write_text(MESH)
     path = written(tmp_path / "in", OF_MESH.format('<compiler meshdir="../parts"/>'))
     with pytest.raises(TunnelError, match="--asset-dir"):
-        read_joint_model(path, "hinge", 1.0)
-    assert read_joint_model(path, "hinge", 1.0, asset_dir=tmp_path / "parts").law.stiffness > 0.0
+        read_joint_model(path, "hinge", Recorded(1.0))
+    assert read_joint_model(path, "hinge", Recorded(1.0), asset_dir=tmp_path / "parts").law.stiffness > 0.0
 
 
 def test_names_and_numbers_that_no_text_holds(tmp_path: Path) -> None:
     (tmp_path / "model.xml").write_bytes(BODY.format("", "").encode().replace(b"hinge", b"h\xff"))
     with pytest.raises(TunnelError, match="not UTF-8 text"):
-        read_joint_model(tmp_path / "model.xml", "h\udcff", 1.0)
+        read_joint_model(tmp_path / "model.xml", "h\udcff", Recorded(1.0))
     model(tmp_path)
     with pytest.raises(TunnelError, match="there is no such joint; did you mean 'hinge'"):
-        read_joint_model(tmp_path / "model.xml", "hing\udcff", 1.0)
+        read_joint_model(tmp_path / "model.xml", "hing\udcff", Recorded(1.0))
     with pytest.raises(TunnelError, match="its moment overflows"):
         model(tmp_path, gravity=1e308)
