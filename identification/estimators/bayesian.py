@@ -133,7 +133,9 @@ class Forced:
         """The response at all points of a grid, shape (m², 3, n), from Chebyshev polynomials through few of them.
 
         Args:
-            centre, scale, axis: as of `DecayPosterior`.
+            centre: of the grid, shape (2,), 1/s and 1/s².
+            scale: as of `DecayPosterior`, shape (2, 2).
+            axis: of both coordinates, shape (m,), dimensionless.
         """
         nodes = chebyshev.chebpts1(_NODES)
         decays = centre[:, None] + scale @ _points(axis[-1] * nodes)
