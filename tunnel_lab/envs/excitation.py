@@ -1,0 +1,70 @@
+"""A policy for the operator preset of ``FreeDecay-v0``: it keeps the body swinging, which tells most of the damping.
+
+A drive that is planned beforehand is tuned to the resonance that the plan expects. Feedback finds it: the moment has the
+sign of the rate, as long as the swing is smaller than wanted.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tunnel_sim.envs.conditions import FreeDecayConfig
+from tunnel_sim.envs.engines import operator_action
+from tunnel_sim.envs.information import propagator
+
+_FOLLOWS = 0.5  # gain of the observer in a sixth of a cycle
+_BAND = 0.05  # of the amplitude, within which the moment is reduced
+
+
+class Resonant:
+    """Push with the rate below an amplitude, and against it above.
+
+    Angle and rate are followed by an observer: an undamped oscillator, moved by the applied moment and corrected by every
+    reading. The moment is that of the period to come, for which they are predicted.
+
+    Args:
+        config: of the environment.
+        stiffness: of spring and air together, N m/rad; a few per cent off do not matter.
+        inertia: Izz, kg m², in the same way.
+        wind_speed: set-point, m/s.
+        amplitude: of the swing, rad.
+    """
+
+    def __init__(
+        self,
+        config: FreeDecayConfig,
+        *,
+        stiffness: float,
+        inertia: float,
+        wind_speed: float,
+        amplitude: float,
+    ) -> None:
+        self.config, self.wind_speed, self.amplitude = config, wind_speed, amplitude
+        self.stiffness, self.omega = stiffness, float(np.sqrt(stiffness / inertia))
+        still, square = np.zeros(1), np.array([self.omega**2])
+        interval = 1.0 / config.sample_rate
+        self._step = np.array(propagator(still, square, interval)).reshape(2, 2)
+        self._ahead = np.array(propagator(still, square, 0.5 * config.control_period)).reshape(2, 2)
+        share = 1.0 - (1.0 - _FOLLOWS) ** (self.omega * interval)  # a radian is a sixth of a cycle
+        self._gain = share * np.array([1.0, self.omega])
+        self.state: np.ndarray[Any, Any] | None = None
+        self._centre = 0.0  # to which the moment of the last period shifts the oscillation, rad
+
+    def __call__(self, observation: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """The action for the period after an observation, shape (2,)."""
+        readings = observation[:-2]
+        if self.state is None:  # held at its angle
+            self.state = np.array([float(np.mean(readings)), 0.0])
+        else:
+            shift = np.array([self._centre, 0.0])
+            for reading in readings:
+                self.state = self.state + self._gain * (reading - self.state[0])
+                self.state = shift + self._step @ (self.state - shift)
+        swing = float(np.hypot(self.state[0], self.state[1] / self.omega))
+        rate = (self._ahead @ self.state)[1]
+        short = np.clip((1.0 - swing / self.amplitude) / _BAND, -1.0, 1.0)
+        moment = float(self.config.moment_limit * short * np.sign(rate))
+        self._centre = moment / self.stiffness
+        return operator_action(self.config, wind_speed=self.wind_speed, moment=moment)
