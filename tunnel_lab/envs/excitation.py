@@ -1,7 +1,7 @@
-"""A policy for the operator preset of ``FreeDecay-v0``: it keeps the body swinging, which tells most of the damping.
+"""A policy for the operator preset of ``FreeDecay-v0``: it keeps the body swinging.
 
-A drive that is planned beforehand is tuned to the resonance that the plan expects. Feedback finds it: the moment has the
-sign of the rate, as long as the swing is smaller than wanted.
+A drive that is planned beforehand is tuned to the resonance that the plan expects. Feedback finds it: the moment has
+the sign of the rate, as long as the swing is smaller than wanted.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _BAND = 0.05  # of the amplitude, within which the moment is reduced
 class Resonant:
     """Push with the rate below an amplitude, and against it above.
 
-    Angle and rate are followed by an observer: an undamped oscillator, moved by the applied moment and corrected by every
-    reading. The moment is that of the period to come, for which they are predicted.
+    Angle and rate are followed by an observer: an undamped oscillator, moved by the applied moment and corrected by
+    every reading. The moment is that of the period to come, for which they are predicted.
 
     Args:
         config: of the environment.
