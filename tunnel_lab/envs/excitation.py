@@ -1,7 +1,7 @@
 """A policy for the operator preset of ``FreeDecay-v0``: it keeps the body swinging.
 
-A drive that is planned beforehand is tuned to the resonance that the plan expects. Feedback finds it: the moment has
-the sign of the rate, as long as the swing is smaller than wanted.
+A drive that is planned beforehand is tuned to the resonance that the plan expects. Feedback finds it: the moment
+has the sign of the rate, as long as the swing is smaller than wanted.
 """
 
 from __future__ import annotations
