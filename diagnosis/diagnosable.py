@@ -225,6 +225,11 @@ def refuse_undiagnosable(campaign: Campaign) -> None:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
         refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
+        if campaign.law is not None and campaign.sensor.derivative:
+            what = (
+                "the run is driven and its sensor reads rates, which do not say where the model's joint moves"
+            )
+            raise TunnelError(what, where=where, remedy="record the angle, or leave --model out")
         if run.spring_stiffness == 0.0 and run.wind_on:
             what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
             raise TunnelError(what, where=where, remedy="leave the run out")

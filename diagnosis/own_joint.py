@@ -38,7 +38,7 @@ def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
     from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
 
     controlled = any(run.drive is not None and run.drive.column == "drive" for run in campaign.runs)
-    if not campaign.driven or campaign.sensor.derivative:  # rates of driven runs are refused later
+    if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
         return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
     means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]
     middle = float(np.median(means))  # which similar campaigns take off

@@ -178,6 +178,10 @@ def test_inputs_that_are_not_the_joints_are_refused_in_one_line(tmp_path: Path, 
     free = replace(swung, runs=(*swung.runs, replace(swung.runs[0], id="free", drive=None)))
     with pytest.raises(TunnelError, match="nothing holds the joint of the model, and nothing drives free"):
         refuse_undiagnosable(with_law(free, law))
+    rates = replace(swung, sensor=replace(swung.sensor, quantity="rate"))
+    sprung = replace(law, stiffness=5.0)  # else the spring is missing
+    with pytest.raises(TunnelError, match="do not say where the model's joint moves"):
+        refuse_undiagnosable(with_law(rates, sprung))
 
 
 def test_a_step_has_the_mean_of_the_input_over_it() -> None:
