@@ -216,7 +216,8 @@ def in_stretches(data: Data, length: int | None = None) -> Stretches:
         count = max(1, round(run.reading.size / length))
         begins = [k * length for k in range(count)]
         for begin, end in zip(begins, [*begins[1:], run.reading.size], strict=True):
-            parts.append(dataclasses.replace(run.part(begin, end), id=f"{run.id} from block {begin}"))
+            name = f"{run.id} from block {begin}"
+            parts.append(dataclasses.replace(run.part(begin, end), id=name, stretch_of=run.id))
             places.append((number, begin))
     return Stretches(data.with_runs(tuple(parts)), tuple(places), length)
 

@@ -119,6 +119,7 @@ class RunData:
             which begins at rest with the run; None where there is no such moment.
         drive: the moment of a driven run, its times since the start of the record; None of a free decay.
         gain_free: whether the common gain multiplies that moment.
+        stretch_of: id of the run that this is a stretch of; None of a whole run.
     """
 
     id: str
@@ -137,6 +138,7 @@ class RunData:
     innovations: tuple[Array, Array] | None = None
     drive: DriveMoment | None = None
     gain_free: bool = False
+    stretch_of: str | None = None
 
     @property
     def conditions(self) -> tuple[object, ...]:

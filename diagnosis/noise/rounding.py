@@ -51,7 +51,7 @@ def repeated(
         if run.block > 1 or run.samples is not None:  # samples from block means
             seen = slice(None) if run.samples is None else run.samples.count > 0
             motion = np.asarray(CubicSpline(run.times[seen], motion[seen])(run.sample_times), np.float64)
-        reading = motion + white[run.id] * rng.standard_normal((count, motion.size))
+        reading = motion + white[run.stretch_of or run.id] * rng.standard_normal((count, motion.size))
         if step > 0.0 and levels is None:
             shift = step * rng.uniform(size=(count, 1))
             # back to the angle: the origin belongs to the lattice, not to the motion

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.prepare import prepare
+from diagnosis.likelihood.prepare import in_stretches, prepare
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.noise.rounding import rounding_errors, with_rounding
 from diagnosis.noise.sensor_noise import (
@@ -90,6 +90,18 @@ def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
         assert run.block == 4
         assert np.mean(error**2) == pytest.approx(DEGREE**2 / 12.0, rel=0.3)
         assert run.noise_variance > 0.7 * noise.variance[run.id]
+
+
+def test_the_errors_of_stretches_are_those_of_their_runs():
+    """The power of the errors does not depend on where the runs are cut."""
+    data = decays(200.0, DEGREE)
+    noise = campaign_noise(data)
+    whole = prepare(data, noise.variance)
+    powers = []
+    for part in (whole, in_stretches(whole).data):
+        errors = rounding_errors(fit_nominal(part), noise.white(DEGREE), DEGREE)
+        powers.append(np.mean(np.concatenate(errors, axis=1) ** 2))
+    assert powers[1] == pytest.approx(powers[0], rel=0.1)
 
 
 @pytest.mark.parametrize("step", [DEGREE, 5e-4])
