@@ -31,8 +31,11 @@ def test_the_figures_of_the_blind_check_are_those_of_its_page() -> None:
         r"^\| all \| \d+/\d+, .*? \| (\d+)/(\d+), .*? \| (\d+)/(\d+), ", BLIND
     )
     assert f"{caught} of {acting} were found, and {false} of {named} named causes were false" in TEXT
-    for row in ("none acts", "outside the vocabulary"):
-        assert found(rf"^\| {row} \| (\d+) \| (\d+) \|", BLIND) == ("14", "14")
+    right, of = found(r"^\| none acts \| (\d+) \| (\d+) \|", BLIND)
+    assert right == of
+    assert f"All {of} campaigns without an effect" in TEXT
+    right, of = found(r"^\| outside the vocabulary \| (\d+) \| (\d+) \|", BLIND)
+    assert f"{right} of {of} with an effect outside the vocabulary" in TEXT
 
 
 def test_the_figures_of_the_real_records_are_those_of_their_page() -> None:
