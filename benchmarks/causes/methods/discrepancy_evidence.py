@@ -55,7 +55,9 @@ def answer(folder: Path) -> dict[str, Any]:
     stated = {n if n == (UNKNOWN,) else tuple(sorted({*n, *found.read_off})): p for n, p in weights.items()}
     best = max(weights, key=weights.__getitem__)
     causes = max(stated, key=stated.__getitem__)
-    inclusion = {n: min(sum(p for s, p in stated.items() if n in s), 1.0) for n in {n for s in stated for n in s}}
+    inclusion = {
+        n: min(sum(p for s, p in stated.items() if n in s), 1.0) for n in {n for s in stated for n in s}
+    }
     fitted = {one.names: one.coefficients for one in found.sets}
     order = sorted(stated.items(), key=lambda one: -one[1])[:40]
     return answer_of(causes, inclusion, order, {"before": before, "after": fitted.get(best, before)})
