@@ -1,15 +1,17 @@
 """Errors of a model as a basis of changes of the readings, and the log evidence of a fit beside them.
 
-r = J δ + B a + e: residuals of a fit, its sensitivities, and a basis with coefficients a of standard deviation η. B has
-moments of the angle and the rate, the same in the wind, moments that change in time, errors of the reading, and slow
-modulations of every run's own harmonics. Each of these five kinds has an equal part of the prior power, and
-η² is the power of the model's error over that of the gap. Rows are averages of the residuals, 24 in a cycle.
+r = J δ + B a + e: residuals of a fit, its sensitivities, and a basis with coefficients a of standard deviation η.
+B has moments of the angle and the rate, the same in the wind, moments that change in time, errors of the reading,
+and slow modulations of every run's own harmonics. Each of these five kinds has an equal part of the prior power. η²
+is the power of the model's error over that of the gap. Rows are averages of the residuals, 24 in a cycle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,14 +46,14 @@ class Linear:
     own: Array
 
 
-def linear(fit: object, along: Sequence[Path]) -> Linear:
+def linear(fit: Any, along: Sequence[Path]) -> Linear:
     """Rows of a fit: its common parameters first, then those of every run.
 
     Args:
         fit: of the diagnosis, to the runs of ``along``.
         along: paths of the nominal fit, which say how residuals are averaged.
     """
-    residuals, slopes, problem = fit.residuals, fit.jacobian, fit.problem  # type: ignore[attr-defined]
+    residuals, slopes, problem = fit.residuals, fit.jacobian, fit.problem
     common = np.concatenate([p.rows(c) for p, (c, _) in zip(along, slopes, strict=True)])
     own = block_diag(*[p.rows(o) for p, (_, o) in zip(along, slopes, strict=True)])
     runs, width = len(along), slopes[0][1].shape[1]
@@ -81,27 +83,44 @@ class Evidence:
     occam: float
 
 
+@dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """The error of a nominal model in one campaign."""
+    """The error of a nominal model in one campaign.
 
-    def __init__(self, nominal: object) -> None:
-        """Basis and prior powers from the nominal fit of the diagnosis."""
-        self.along = paths(nominal)  # type: ignore[arg-type]
-        base = linear(nominal, self.along)
-        self.gap = max(nominal.total - nominal.count, 1e-3 * nominal.count)  # type: ignore[attr-defined]
+    Args:
+        along: paths of the nominal fit, which say how residuals are averaged.
+        gap: χ² of the nominal fit beyond that of noise.
+        nominal_std: prior standard deviations of the nominal parameters, as in `Linear`.
+        basis: B, of the power of the gap beside the nominal parameters, shape (rows, k).
+    """
+
+    along: Sequence[Path]
+    gap: float
+    nominal_std: Array
+    basis: Array
+
+    @classmethod
+    def of(cls, nominal: Any) -> Discrepancy:
+        """The error of a nominal model, by its fit of the diagnosis."""
+        along = paths(nominal)
+        base = linear(nominal, along)
+        gap = max(nominal.total - nominal.count, 1e-3 * nominal.count)
         power = np.sum(base.slopes**2, axis=0)
-        self._nominal_std = np.sqrt(_NUISANCE * self.gap / np.maximum(power, 1e-300))
         known = np.linalg.qr(base.slopes / np.maximum(np.sqrt(power), 1e-150))[0]
         kinds = []
-        for columns in _kinds(self.along):
+        for columns in _kinds(along):
             left = float(np.sum((columns - known @ (known.T @ columns)) ** 2))
             if left > 0.0:
                 kinds.append(columns / np.sqrt(left))
-        basis = np.column_stack(kinds) * np.sqrt(self.gap / len(kinds))
+        basis = np.column_stack(kinds) * np.sqrt(gap / len(kinds))
         beside = basis - known @ (known.T @ basis)
         values, axes = np.linalg.eigh(beside.T @ beside)
-        self._basis = basis @ axes[:, np.flatnonzero(values > 1e-6 * values[-1])[-_DIRECTIONS:]]
-        self._own = self._basis.T @ self._basis
+        kept = np.flatnonzero(values > 1e-6 * values[-1])[-_DIRECTIONS:]
+        return cls(along, gap, np.sqrt(_NUISANCE * gap / np.maximum(power, 1e-300)), basis @ axes[:, kept])
+
+    @cached_property
+    def _own(self) -> Array:
+        return np.asarray(self.basis.T @ self.basis)
 
     def evidence(self, given: Linear) -> Evidence:
         """Log evidence of a fit, a further parameter's prior power being the gap's.
@@ -109,7 +128,7 @@ class Discrepancy:
         Args:
             given: from `linear`, with the nominal parameters in the order of the nominal fit.
         """
-        scaled, r, basis = given.slopes * self._prior(given), given.residual, self._basis
+        scaled, r, basis = given.slopes * self._prior(given), given.residual, self.basis
         root = np.linalg.cholesky(scaled.T @ scaled + np.eye(scaled.shape[1]))
         seen = solve_triangular(root, scaled.T @ r, lower=True)
         cross = solve_triangular(root, scaled.T @ basis, lower=True)
@@ -125,7 +144,7 @@ class Discrepancy:
     def _prior(self, given: Linear) -> Array:
         """Prior standard deviations of the parameters, shape (p,)."""
         found = np.empty(given.nominal.size)
-        found[given.nominal] = self._nominal_std
+        found[given.nominal] = self.nominal_std
         own = given.slopes[:, given.nominal]
         own = own / np.maximum(np.linalg.norm(own, axis=0), 1e-300)
         causes = given.slopes[:, ~given.nominal]

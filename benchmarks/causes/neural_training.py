@@ -1,8 +1,8 @@
-"""Training campaigns of the neural classifier and its training: ``python -m benchmarks.causes.neural_training FOLDER``.
+"""Campaigns for the neural classifier, and its training: ``python -m benchmarks.causes.neural_training FOLDER``.
 
-The campaigns are drawn as the benchmark's are, by the same tracks in the same proportions, from another seed. Effects
-are scaled as there; motions are integrated in one step per sample, which is within 0.004 noise standard deviations
-of the benchmark's ten. FOLDER keeps the campaigns, so that an interrupted run continues.
+The campaigns are drawn as the benchmark's are, by the same tracks in the same proportions, from another seed.
+Effects are scaled as there; motions are integrated in one step per sample, which is within 0.004 noise standard
+deviations of the benchmark's ten. FOLDER keeps the campaigns, so that an interrupted run continues.
 """
 
 from __future__ import annotations

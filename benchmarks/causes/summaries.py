@@ -1,8 +1,8 @@
 """Summary statistics of a campaign for the neural classifier: fixed, from the records alone and not from any fit of
 the project.
 
-They describe the residuals of the nominal model in its weak form (moments.py), run by run in stretches of time and by
-harmonic, and of all runs together by cause. Numbers of a large range are compressed by arcsinh or a logarithm.
+They describe the residuals of the nominal model in its weak form (moments.py), run by run in stretches of time and
+by harmonic, and of all runs together by cause. Numbers of a large range are compressed by arcsinh or a logarithm.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _stretches(found: Equations, left: Array, number: int) -> Array:
 
 
 def _of_reading(run: Run, resolution: float) -> Array:
-    """Of the reading itself: lines above the motion and beside it, the lattice of the readings, stops, time stamps."""
+    """Of the reading itself: lines above the motion and beside it, its lattice, its ends, the time stamps."""
     y, dt = run.record.yaw_rad, run.record.sample_interval
     f0 = frequency(run) / (2.0 * np.pi)
     width = max(2 * round(np.pi * 0.25 / (2.0 * np.pi * f0 * dt)) + 1, 7)
@@ -111,7 +111,7 @@ def _of_reading(run: Run, resolution: float) -> Array:
 
 
 def _line(values: Array, dt: float, low: float, high: float) -> tuple[float, float]:
-    """The largest line of a spectrum between two frequencies, Hz: log of its power over the median, frequency in Hz."""
+    """The largest line between two frequencies, Hz: log of its power over the median, and its frequency, Hz."""
     power = np.abs(np.fft.rfft(values * np.hanning(values.size))) ** 2
     hertz = np.fft.rfftfreq(values.size, dt)
     inside = (hertz > low) & (hertz < high)
@@ -122,7 +122,7 @@ def _line(values: Array, dt: float, low: float, high: float) -> tuple[float, flo
 
 
 def _by_cause(left: Array, causes: dict[str, Array]) -> Array:
-    """Share of the residual that each cause closes alone, that all others cannot close, and both in noise, (4 n,)."""
+    """Shares of the residual that a cause closes alone and beside all others, and both in noise, shape (4 n,)."""
     bases = {}
     for name, columns in causes.items():
         u, size, _ = np.linalg.svd(columns, full_matrices=False)

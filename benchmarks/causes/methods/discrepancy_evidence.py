@@ -1,7 +1,8 @@
 """Evidence with the model's error integrated out, on the sets of causes that the project's diagnosis grows.
 
-Every set has its log evidence beside an error of the model of rms η; η has a half-Cauchy prior; every cause after the
-first has the same prior odds. Where the error of the model takes more than a fifth of the gap, the cause is unknown.
+Every set has its log evidence beside an error of the model of rms η; η has a half-Cauchy prior; every cause after
+the first has the same prior odds. Where the error of the model takes more than a fifth of the gap, the cause is
+unknown.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ SCALE, ODDS, LEFT = 0.05, 0.1, 0.2
 RANDOM_NUMBERS = 9.0  # nats, of the three numbers of a random moment
 ABOUT = About(
     "discrepancy evidence",
-    f"on all sets that `tunnel diagnose` fits; half-Cauchy η of scale {SCALE:g} of the gap's rms, prior odds {ODDS:g} "
-    f"for every cause after the first, `unknown` where the model's error takes {LEFT:g} of the gap, as chosen on other "
-    "campaigns before; the test of the gap is that of `tunnel diagnose`",
+    f"on all sets that `tunnel diagnose` fits, with its test of the gap; half-Cauchy η of scale {SCALE:g} of the "
+    f"gap's rms, prior odds {ODDS:g} for every cause after the first, `unknown` where the model's error takes "
+    f"{LEFT:g} of the gap, as set before on other campaigns",
 )
 
 Names = tuple[str, ...]
@@ -47,7 +48,7 @@ def answer(folder: Path) -> dict[str, Any]:
             [(found.settled, sure), ((UNKNOWN,), 1.0 - sure)] if found.settled != (UNKNOWN,) else (),
             {"before": before, "after": before},
         )
-    error = Discrepancy(found.nominal.fit)
+    error = Discrepancy.of(found.nominal.fit)
     alone = error.evidence(linear(found.nominal.fit, error.along))
     sets = {one.names: error.evidence(linear(one.fit, error.along)) for one in found.sets}
     random = {names: (sets.get(beside, alone), drop) for names, beside, drop in found.random}

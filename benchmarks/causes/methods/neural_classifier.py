@@ -14,9 +14,9 @@ _FACTS = read_classifier().facts
 ABOUT = About(
     "simulation-based inference, neural classifier",
     f"trained on {_FACTS['campaigns']:.0f} campaigns drawn as the benchmark's are, from another seed: "
-    f"{(_FACTS['simulation_s']) / 60.0:.0f} min of processor time for simulating, "
-    f"{_FACTS['training_s'] / 60.0:.0f} min for training, about as long as `tunnel diagnose` takes for all answers; "
-    "fixed summary statistics of runs and harmonics (summaries.py); "
+    f"{_FACTS['simulation_s'] / 60.0:.0f} min of processor time for simulating, "
+    f"{_FACTS['training_s'] / 60.0:.0f} min for training; fixed summary statistics of runs and harmonics "
+    "(summaries.py); "
     f"five networks of width {_FACTS['width']:.0f}, chosen on held-out training campaigns; a cause is named above "
     f"{NAMED:g}",
 )
