@@ -1,17 +1,21 @@
-"""The project's own fits, for methods that choose causes otherwise: the only file here that knows how "
-"they are made."""
+"""The project's own fits, for methods that choose causes otherwise: the only file here that knows how
+they are made.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
-from diagnosis.search.investigate import nominal_study
+from diagnosis.likelihood.run_data import Data
+from diagnosis.search.investigate import fit_nominal, investigate, nominal_study
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.vocabulary.campaign import Campaign
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +66,70 @@ def nominal(folder: Path) -> tuple[Fitted, tuple[str, ...], bool]:
     Raises:
         TunnelError: when the records are refused.
     """
-    campaign, _ = comparable_runs(diagnosable(read_campaign(folder)).campaign)
-    study = nominal_study(campaign, known_effects())
+    study = nominal_study(_campaign(folder), known_effects())
     return _fitted((), study.nominal), tuple(study.read_off), bool(study.test.detected)
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """The sets of causes that `tunnel diagnose` fits to a campaign.
+
+    Args:
+        nominal: the nominal model fitted to the same readings.
+        sets: fitted sets with names sorted; of two with the same names the better one.
+        random: causes with a random moment among them: names, those beside it, and the fall of −2 ln L by it.
+        read_off: causes that are read off the records before any fit.
+        settled: the answer where no set is weighed: there is no gap, or the noise explains it; else None.
+    """
+
+    nominal: Fitted
+    sets: tuple[Fitted, ...]
+    random: tuple[tuple[tuple[str, ...], tuple[str, ...], float], ...]
+    read_off: tuple[str, ...]
+    settled: tuple[str, ...] | None
+
+
+def grown(folder: Path) -> Grown:
+    """All fits of `tunnel diagnose` to a campaign, before its own weights.
+
+    Args:
+        folder: of the campaign.
+
+    Raises:
+        TunnelError: when the records are refused.
+    """
+    study = investigate(_campaign(folder), known_effects())
+    weighed = study.weighed
+    sets = study.by_moment or study.hypotheses
+    settled = not sets or not weighed or weighed[0].probability == 1.0
+    data = _most_common([h.fit.problem.data for h in sets]) or study.nominal.problem.data
+    nominal = study.nominal if data is study.nominal.problem.data else fit_nominal(data)
+    best: dict[tuple[str, ...], Fitted] = {}
+    for h in sets:
+        one = _fitted(h.names, h.fit)
+        if h.fit.problem.data is data and (h.names not in best or one.chi2 < best[h.names].chi2):
+            best[h.names] = one
+    random = tuple(
+        (tuple(sorted(a.effects)), () if a.beside is None else a.beside.names, a.process.drop)
+        for a in study.random
+    )
+    return Grown(
+        _fitted((), nominal),
+        tuple(best.values()),
+        random,
+        tuple(study.read_off),
+        study.causes if settled else None,
+    )
+
+
+def _most_common(given: Sequence[Data]) -> Data | None:
+    """The readings to which most of the sets are fitted."""
+    return max(given, key=lambda one: sum(other is one for other in given), default=None)
+
+
+def _campaign(folder: Path) -> Campaign:
+    campaign, _ = comparable_runs(diagnosable(read_campaign(folder)).campaign)
+    return campaign
 
 
 def candidates() -> tuple[str, ...]:

@@ -88,7 +88,11 @@ def equations(folder: Path) -> Equations:
     Raises:
         TunnelError: when the campaign cannot be read.
     """
-    campaign = read_campaign(folder)
+    return equations_of(read_campaign(folder))
+
+
+def equations_of(campaign: Campaign) -> Equations:
+    """The equations of a campaign."""
     swing = max(float(np.ptp(run.record.yaw_rad)) / 2.0 for run in campaign.runs)
     springs = sorted({stiffness(run) for run in campaign.runs})
     decays = [own_decay(run) for run in campaign.runs]

@@ -91,7 +91,7 @@ def page_text(found: Sequence[Mapping[str, Any]], image: str) -> str:
         "The columns and the threshold that LISDD's recipe, the spike-and-slab regression and PySINDy use "
         "were chosen with the truths of the first 40 campaigns in sight; no other setting was tuned on the set, "
         "unless its row says so.\n",
-        *[_about(r) for r in found],
+        *[_about(r, found) for r in found],
     ]
     return "\n".join(parts).rstrip() + "\n"
 
@@ -103,20 +103,23 @@ def _where_others_win(found: Sequence[Mapping[str, Any]]) -> list[str]:
         return ["`tunnel diagnose` has not been run on this set yet."]
     said = []
     for r in found:
-        both = sorted(set(r["cases"]) & set(ours["cases"]))
-        mine = sum(ours["cases"][n]["right"] for n in both)
-        other = sum(r["cases"][n]["right"] for n in both)
-        if r is not ours and other > mine:
+        both = sorted(set(r["cases"]) & set(ours["cases"])) if r is not ours else []
+        other, mine = _right(r, both), _right(ours, both)
+        if other > mine:
             said.append(
                 f"- **{r['title']}** has more exact sets: {other} against {mine} of the {len(both)} that "
                 f"both answered."
             )
         for track in r["tracks"]:
-            a, b = r["tracks"][track]["exact"], ours["tracks"].get(track, {}).get("exact")
-            if r is not ours and b and a["total"] == b["total"] and a["count"] > b["count"]:
-                name = track.replace("_", " ")
+            members = [n for n in both if r["cases"][n]["track"] == track]
+            other, mine = _right(r, members), _right(ours, members)
+            if other > mine:
+                name, part = (
+                    track.replace("_", " "),
+                    "" if r["answered"] == r["of"] else " that both answered",
+                )
                 said.append(
-                    f"- **{r['title']}** is ahead on *{name}*: {a['count']} against {b['count']} of {a['total']}."
+                    f"- **{r['title']}** is ahead on *{name}*: {other} against {mine} of {len(members)}{part}."
                 )
         if (
             r is not ours
@@ -130,6 +133,10 @@ def _where_others_win(found: Sequence[Mapping[str, Any]]) -> list[str]:
     if ours["answered"] < ours["of"]:
         head = f"`tunnel diagnose` has answered {ours['answered']} of {ours['of']} campaigns so far. {head}"
     return [head, *said]
+
+
+def _right(r: Mapping[str, Any], names: Sequence[str]) -> int:
+    return sum(bool(r["cases"][name]["right"]) for name in names)
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -190,11 +197,17 @@ def _coefficients(r: Mapping[str, Any]) -> list[str]:
     return row
 
 
-def _about(r: Mapping[str, Any]) -> str:
+def _about(r: Mapping[str, Any], found: Sequence[Mapping[str, Any]]) -> str:
+    ours = next((one for one in found if one["method"] == OURS and r["answered"] < r["of"]), None)
+    both = sorted(set(r["cases"]) & set(ours["cases"])) if ours is not None else []
+    same = "" if ours is None else (
+        f" On the {len(both)} campaigns that both answered it has {_right(r, both)} exact sets, and "
+        f"`tunnel diagnose` {_right(ours, both)}."
+    )  # fmt: skip
     can = f" It can name {len(r['names'])} of 26 answers." if len(r["names"]) < 26 else ""
     return (
         f"- **{r['title']}** ([program](../benchmarks/causes/methods/{r['method']}.py), "
-        f"[result](../benchmarks/causes/results/{r['method']}.json)): {r['setting']}.{can} Processor "
+        f"[result](../benchmarks/causes/results/{r['method']}.json)): {r['setting']}.{can}{same} Processor "
         f"time of all answers: "
         f"{r['all']['seconds']['sum'] / 3600:.2f} h. No answer: {r['all']['no_answer']}. Answers sha256 "
         f"`{r['answers_sha256'][:16]}…`, key `{r['key_sha256'][:16]}…`."

@@ -218,6 +218,11 @@ def score(
         "found_of_nameable": Proportion.of(nameable).to_json_dict(),
         "tracks": tracks,
         "cases": {
-            c.name: {"right": c.right, "causes": None if c.causes is None else list(c.causes)} for c in every
+            c.name: {
+                "track": key["truths"][c.name]["track"],
+                "right": c.right,
+                "causes": None if c.causes is None else list(c.causes),
+            }
+            for c in every
         },
     }

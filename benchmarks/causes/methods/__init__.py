@@ -3,6 +3,8 @@
 METHODS = (
     "ours",
     "forward_bic",
+    "discrepancy_evidence",
+    "neural_classifier",
     "mujoco_sysid",
     "pysindy_ensemble",
     "spike_and_slab",

@@ -199,6 +199,11 @@ def test_the_page_says_first_where_another_method_is_ahead(small):
     ours = score(small, check(small), worst, "ours", About("tunnel diagnose", ""))
     text = page_text([best, ours], "figure.png")
     assert text.index("**best** has more exact sets: 3 against 0") < text.index("## Sets exactly right")
+    first = next(name for name, truth in check(small)["truths"].items() if truth["track"] == "none")
+    part = score(small, check(small), {first: answers[first]}, "part", About("part", ""))
+    said = page_text([part, ours], "figure.png")
+    assert "**part** is ahead on *none*: 1 against 0 of 1 that both answered." in said
+    assert "On the 1 campaigns that both answered it has 1 exact sets, and `tunnel diagnose` 0." in said
     assert "No other method is ahead" in page_text(
         [score(small, check(small), answers, "ours", About("", ""))], ""
     )
