@@ -14,7 +14,7 @@ from benchmarks.causes.entry import NAMES, UNKNOWN
 from benchmarks.causes.moments import Array
 from tunnel_sim.files.reading import as_described
 
-WEIGHTS = Path(__file__).parent / "neural_weights.npz"
+WEIGHTS = Path(__file__).parent / "neural_weights.safetensors"
 LABELS = (*NAMES, UNKNOWN)
 LAYERS = ("run 1", "run 2", "all 1", "all 2")
 
@@ -48,19 +48,19 @@ class Classifier:
         return dict(zip(LABELS, np.mean(found, axis=0).tolist(), strict=True))
 
     def save(self, path: Path) -> None:
-        """Write the classifier as arrays, without objects.
+        """Write the classifier as safetensors.
 
         Args:
-            path: of the file, ``.npz``.
+            path: of the file, ``.safetensors``.
         """
+        from safetensors.numpy import save_file
+
         given = {
             f"{i} {n}": w.astype(np.float32) for i, net in enumerate(self.networks) for n, w in net.items()
         }
         facts = {f"fact {name}": np.array(value) for name, value in self.facts.items()}
-        np.savez_compressed(
-            path, **given, **facts, run=self.scaling[0], whole=self.scaling[1],
-            temperature=np.array(self.temperature), count=np.array(len(self.networks)),
-        )  # fmt: skip
+        rest = {"run": self.scaling[0], "whole": self.scaling[1], "temperature": np.array(self.temperature)}
+        save_file(given | facts | rest | {"count": np.array(len(self.networks))}, path)
 
 
 def read_classifier(path: Path = WEIGHTS) -> Classifier:
@@ -73,12 +73,16 @@ def read_classifier(path: Path = WEIGHTS) -> Classifier:
         TunnelError: when the file is missing or is not one.
     """
     remedy = "train it: python -m benchmarks.causes.neural_training FOLDER"
-    with (
-        as_described("is not a trained classifier", str(path), remedy),
-        np.load(path, allow_pickle=False) as f,
-    ):
+    from safetensors import SafetensorError
+    from safetensors.numpy import load_file
+
+    with as_described("is not a trained classifier", str(path), remedy):
+        try:
+            f = load_file(path)
+        except SafetensorError as error:
+            raise ValueError(str(error)) from error
         networks = [{n: f[f"{i} {n}"].astype(np.float64) for n in LAYERS} for i in range(int(f["count"]))]
-        facts = {name.removeprefix("fact "): float(f[name]) for name in f.files if name.startswith("fact ")}
+        facts = {name.removeprefix("fact "): float(f[name]) for name in f if name.startswith("fact ")}
         return Classifier(networks, (f["run"], f["whole"]), float(f["temperature"]), facts)
 
 

@@ -137,8 +137,8 @@ def test_the_network_learns_a_label_and_is_read_back(tmp_path):
     samples = Samples(runs, there, rng.standard_normal((count, 4)), acts, asked)
     found = trained(samples, 5, [Setting(16, 1e-2, 0.1)], epochs=25)
     assert found.facts["held_out"] < 0.5  # nats; 0.7 without the statistic
-    replace(found, facts=found.facts | {"simulation_s": 1.0}).save(tmp_path / "w.npz")
-    again = read_classifier(tmp_path / "w.npz")
+    replace(found, facts=found.facts | {"simulation_s": 1.0}).save(tmp_path / "w.safetensors")
+    again = read_classifier(tmp_path / "w.safetensors")
     assert again.facts["campaigns"] == count
     one, whole = np.zeros((2, 88)), np.zeros(4)
     for sign in (-1.0, 1.0):
@@ -148,6 +148,6 @@ def test_the_network_learns_a_label_and_is_read_back(tmp_path):
         assert (p[LABELS[0]] > 0.5) == (sign > 0.0)
         assert again.probabilities(one[::-1], whole) == pytest.approx(p)
     assert isinstance(again, Classifier)
-    (tmp_path / "bad.npz").write_bytes(b"no")
+    (tmp_path / "bad.safetensors").write_bytes(b"no")
     with pytest.raises(TunnelError, match="not a trained classifier"):
-        read_classifier(tmp_path / "bad.npz")
+        read_classifier(tmp_path / "bad.safetensors")
