@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,6 +48,7 @@ WAVES = {
 }
 
 
+@cache
 def driven(kind: str, column: str = "moment_nm", *, held: bool = False, gain: float = 1.0) -> Campaign:
     """Four runs without noise, their input scaled to move the rig by about 0.1 rad."""
     rng = np.random.default_rng(2)
@@ -80,7 +82,7 @@ def test_an_unknown_gain_and_a_moving_root_are_taken(column: str, gain: float, e
 
 
 @pytest.mark.parametrize("estimator", [FrequencyResponse(), Bayesian()], ids=lambda e: e.name)
-@pytest.mark.parametrize("kind", ["multisine", "random"])
+@pytest.mark.parametrize("kind", [pytest.param("multisine", marks=pytest.mark.slow), "random"])
 def test_stated_deviations_are_those_of_the_estimates(kind: str, estimator: Estimator) -> None:
     clean, noise, deviations = driven(kind), 1e-3, []
     omega = np.sqrt(RIG.spring_stiffness / 0.1)

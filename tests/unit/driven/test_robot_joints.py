@@ -215,8 +215,10 @@ def near(answer: Diagnosis, name: str, truth: float, extra: float = 0.0) -> bool
     return abs(given.value - truth) < 3.0 * given.std + extra * truth
 
 
-@pytest.mark.parametrize("hold", ["zero", "linear"])
-@pytest.mark.parametrize(("axis", "start"), [(UPRIGHT, 0.0), (LEVEL, math.pi / 2)])
+@pytest.mark.parametrize("hold", ["zero", pytest.param("linear", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("axis", "start"), [pytest.param(UPRIGHT, 0.0, marks=pytest.mark.slow), (LEVEL, math.pi / 2)]
+)
 def test_a_joint_that_lacks_nothing_but_armature_and_damping_has_no_gap(
     tmp_path: Path, axis: str, start: float, hold: Hold
 ) -> None:
@@ -270,6 +272,7 @@ def test_dry_friction_is_named_and_the_model_with_it_closes_the_gap_by_itself(
     assert written.dof_damping[0] == pytest.approx(0.4, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_payload_is_an_error_of_gravity(tmp_path: Path) -> None:
     truth, given = robot(TRUE, axis=LEVEL, tip=0.6), robot(TRUE, axis=LEVEL)
     data = robot_campaign(truth, start=math.pi / 2)
@@ -282,6 +285,7 @@ def test_a_payload_is_an_error_of_gravity(tmp_path: Path) -> None:
     assert left_by_plain_mujoco(xml, data, key=True) < 1.5 * NOISE
 
 
+@pytest.mark.slow
 def test_a_constant_moment_is_the_bias_of_the_actuator(tmp_path: Path) -> None:
     biased = '<general name="motor" joint="elbow" gear="20" biastype="affine" biasprm="0.004 0 0"/>'
     data = robot_campaign(robot(TRUE, actuators=biased))
@@ -295,6 +299,7 @@ def test_a_constant_moment_is_the_bias_of_the_actuator(tmp_path: Path) -> None:
     assert left_by_plain_mujoco(xml, data, key=True) < 1.1 * NOISE
 
 
+@pytest.mark.slow
 def test_a_known_moment_needs_no_actuator(tmp_path: Path) -> None:
     biased = '<general joint="elbow" biastype="affine" biasprm="0.08 0 0"/>'
     data = robot_campaign(robot(TRUE, actuators=biased), (6.0, 4.0, 5.0), column="moment_nm")
@@ -309,6 +314,7 @@ def test_a_known_moment_needs_no_actuator(tmp_path: Path) -> None:
     assert left_by_plain_mujoco(xml, data, key=True, column="moment_nm") < 1.1 * NOISE
 
 
+@pytest.mark.slow
 def test_gear_play_before_a_spring_is_written_for_the_plugin(tmp_path: Path) -> None:
     spring = '<fixed springlength="-0.02 0.02" stiffness="40"><joint joint="elbow" coef="1"/></fixed>'
     truth = robot('damping="0.4"').replace("<actuator>", f"<tendon>{spring}</tendon><actuator>")
@@ -322,6 +328,7 @@ def test_gear_play_before_a_spring_is_written_for_the_plugin(tmp_path: Path) -> 
     assert any("vwt.yaw_moment adds it" in note for note in answer.model.notes)
 
 
+@pytest.mark.slow
 def test_a_delay_of_the_input_is_named_and_stays_out_of_the_model(tmp_path: Path) -> None:
     data = robot_campaign(robot(TRUE), delay=2)
     answer = diagnose(data, kinds=vocabulary(KINDS), model=own_model(tmp_path, data, robot()))

@@ -121,6 +121,7 @@ def test_the_statistics_of_a_mirrored_campaign_are_the_mirrored_statistics(train
     np.testing.assert_allclose(other_whole, whole, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_network_learns_a_label_and_is_read_back(tmp_path):
     """The first label acts where the mean of one statistic over the runs is positive."""
     rng = np.random.default_rng(1)
