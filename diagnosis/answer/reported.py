@@ -66,11 +66,13 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
         predicted, failure = mujoco_blocks(problem, each, release), ""
     except TunnelError as error:
         predicted, failure = before, error.what
+    # a run held out of a fit may grow without bound in both models
+    apart = [np.zeros_like(p) if failure else p - f for p, f in zip(predicted, before, strict=True)]
     return Comparison(
         ids=tuple(run.id for run in runs),
         residuals=[run.scaled(run.reading - p) for run, p in zip(runs, predicted, strict=True)],
-        shifts=[run.scaled(p - f) for run, p, f in zip(runs, predicted, before, strict=True)],
-        differences=[p - f for p, f in zip(predicted, before, strict=True)],
+        shifts=[run.scaled(difference) for run, difference in zip(runs, apart, strict=True)],
+        differences=apart,
         noise=tuple(run.noise_std for run in runs),
         failure=failure,
     )
