@@ -20,8 +20,8 @@ LOCAL_FALSE_ALARM_RATE = 0.01
 #: open, what a further term or another kind of law closes. Judgement: far below what could be told apart.
 AS_MUCH = 0.02
 #: Share that counts as most of a thing: of the excess in a stated interval, of what laws of single runs close, of a
-#: line that the other half of a run predicts, of an unstated spring that gravity cancels. Judgement: the text says
-#: four fifths.
+#: line that the other half of a run predicts, of an unstated spring that gravity cancels (made with Silverbox in
+#: sight, 0029). Judgement: the text says four fifths.
 MOST = 0.8
 
 # ---- Is there a gap? ------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_FINER = 4  # steps in place of one, where the input is given by its means over the steps
+_FINER = 4  # steps in place of one, where the input is delayed
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +123,8 @@ def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array
         physics = released_by_spring_end(condensed(chain.physics(), problem.data))
         steps = report_substeps(physics, run.interval)
         if run.drive is not None:  # steps end at its samples
-            late = (
-                physics.drive is not None and physics.drive.delay != 0.0
-            )  # then of second order in the step
+            # a delayed input is given by its means over the steps, which is of second order
+            late = physics.drive is not None and physics.drive.delay != 0.0
             steps = run.block * -(-steps // run.block) * (_FINER if late else 1)
         duration = (run.reading.size + blocks_beyond(physics, run) + 1) * run.interval
         settings.append(replace(physics, timestep=run.interval / steps, duration=duration))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.engines import operator_action
 from tunnel_sim.envs.information import propagator
@@ -30,6 +31,9 @@ class Resonant:
         inertia: Izz, kg m², in the same way.
         wind_speed: set-point, m/s.
         amplitude: of the swing, rad.
+
+    Raises:
+        EnvError: when stiffness, inertia or amplitude is not a positive number.
     """
 
     def __init__(
@@ -41,6 +45,9 @@ class Resonant:
         wind_speed: float,
         amplitude: float,
     ) -> None:
+        for name, value in (("stiffness", stiffness), ("inertia", inertia), ("amplitude", amplitude)):
+            if not 0.0 < value < np.inf:
+                raise EnvError(f"{name} = {value!r} is not a positive number", remedy="give it in SI units")
         self.config, self.wind_speed, self.amplitude = config, wind_speed, amplitude
         self.stiffness, self.omega = stiffness, float(np.sqrt(stiffness / inertia))
         still, square = np.zeros(1), np.array([self.omega**2])

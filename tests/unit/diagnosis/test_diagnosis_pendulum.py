@@ -15,7 +15,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import misses_motion, starting_points
 from diagnosis.remainder.paths import COMMON, SINGLE, paths, ranges
 from diagnosis.search.grow import _of_each, grow_in_stretches
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, is_plausible
 from diagnosis.search.investigate import fit_nominal, investigate
 from identification import identify
 from tests.unit.gap_campaigns import campaign, nominal
@@ -198,6 +198,18 @@ def test_gravity_keeps_its_sign():
     similar = found.similarity.moment * GRAVITY
     assert best.value("gravity_stiffness.stiffness") == pytest.approx(similar, rel=1e-3)
     assert best.value("zero") + found.similarity.rest == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("spring", "gravity", "plausible"),
+    [(0.0, GRAVITY, True), (2.0 * GRAVITY, -GRAVITY, True), (25.0 * GRAVITY, -24.0 * GRAVITY, False)],
+)
+def test_gravity_that_cancels_most_of_a_spring_is_not_called_gravity(spring, gravity, plausible):
+    """All three rigs swing alike at small angles; what the last leaves is a hardening spring."""
+    problem = Problem(prepared(pendulum(0.3, 6.0)), (effect_class("gravity_stiffness"),))
+    value = {"stiffness": spring, "mechanical_damping": VISCOUS, "gravity_stiffness.stiffness": gravity}
+    common = np.array([value.get(name, 0.0) for name in problem.names])
+    assert is_plausible(fit_at(problem, Point(common, np.array([[0.3, 0.0]])))) is plausible
 
 
 @cache
