@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -257,17 +258,30 @@ def _loss(logits: Array, samples: Samples) -> float:
     return float(np.sum(each * samples.asked) / len(logits))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command.
 
     Args:
         arguments: of the command line; None: the process's own.
+
+    Returns:
+        The exit status.
     """
     parser = argparse.ArgumentParser(prog="python -m benchmarks.causes.neural_training", description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--campaigns", type=int, default=800)
-    parser.add_argument("--out", type=Path, default=WEIGHTS)
+    parser.add_argument("folder", type=Path, help="where the training campaigns are kept")
+    parser.add_argument("--campaigns", type=int, default=800, help="number of them, at least 40")
+    parser.add_argument("--out", type=Path, default=WEIGHTS, help="weights, a .safetensors file")
     given = parser.parse_args(arguments)
+    what = ""
+    if given.campaigns < 40:
+        what = f"--campaigns: {given.campaigns} are too few to hold some out; give 40 or more"
+    elif given.folder.exists() and not given.folder.is_dir():
+        what = f"{given.folder}: is not a folder; give one for the training campaigns"
+    elif not given.out.absolute().parent.is_dir():
+        what = f"{given.out}: its folder does not exist; make it first"
+    if what:
+        print(what, file=sys.stderr)
+        return 2
     simulation = make_campaigns(given.folder, given.campaigns)
     begun = time.process_time()
     samples = read_samples(given.folder)
@@ -276,7 +290,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     facts = {**found.facts, "simulation_s": simulation, "training_s": found.facts["training_s"] + statistics}
     replace(found, facts=facts).save(given.out)
     print(f"{given.out}: {facts}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -152,3 +152,14 @@ def test_the_network_learns_a_label_and_is_read_back(tmp_path):
     (tmp_path / "bad.safetensors").write_bytes(b"no")
     with pytest.raises(TunnelError, match="not a trained classifier"):
         read_classifier(tmp_path / "bad.safetensors")
+
+
+@pytest.mark.parametrize(
+    "given", [["few", "--campaigns", "0"], ["file"], ["new", "--out", "nowhere/w.safetensors"]]
+)
+def test_training_refuses_bad_input_in_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, given):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert neural_training.main(given) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
