@@ -17,7 +17,6 @@ from diagnosis.closure import UNPATCHED, PatchedModel
 from diagnosis.diagnosable import (
     BY_MOMENT,
     NOT_SOUGHT,
-    Chosen,
     choose,
     gain_words,
     refuse_undiagnosable,
@@ -36,7 +35,6 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from diagnosis.search.investigate import Study
     from tunnel_sim.engine.joint_model import JointModel
 
 
@@ -78,8 +76,28 @@ def diagnose(
             if not chosen.limit_cycles:
                 raise
             raise refused_limit_cycles(chosen.remarks) from error
-        say("how far it closes")
-        answer = _answered(study, chosen, model)
+        say("how far it closes")  # where it is, and the answer without what no effect explains
+        where, maps = localise(study)
+        patched: PatchedModel | None = None
+        unpatched: tuple[str, ...] = ()
+        if model is not None:
+            from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
+
+            try:
+                patched = patched_model(study, model)
+            except TunnelError as error:
+                unpatched = (f"{UNPATCHED}: {error.what}.",)
+        by_moment = (BY_MOMENT,) if study.by_moment else ()
+        left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
+        left_out += lead_words(study.campaign.law, study.similarity)
+        assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
+        sized = replace(
+            assembled,
+            remarks=(*chosen.remarks, *noise_remarks(study.noise, study.trend, study.test)),
+            sizes=cause_sizes(study) if study.named else (),
+            data=chosen.examined,
+        )
+        answer = in_own_units(sized, study.similarity)
         if chosen.limit_cycles:
             return limit_cycle_answer(answer, chosen.remarks)
         if chosen.campaign.driven:  # the remainder's laws are sought along free decays
@@ -130,31 +148,6 @@ def read_model(
 
     assets = None if asset_dir is None else Path(asset_dir)
     return read_joint_model(Path(path), joint, recorded(campaign, actuator), free, assets)
-
-
-def _answered(study: Study, chosen: Chosen, model: JointModel | None) -> Diagnosis:
-    """The answer in the units of the measured campaign, without what no effect explains."""
-    where, maps = localise(study)
-    patched: PatchedModel | None = None
-    unpatched: tuple[str, ...] = ()
-    if model is not None:
-        from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
-
-        try:
-            patched = patched_model(study, model)
-        except TunnelError as error:
-            unpatched = (f"{UNPATCHED}: {error.what}.",)
-    by_moment = (BY_MOMENT,) if study.by_moment else ()
-    left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
-    left_out += lead_words(study.campaign.law, study.similarity)
-    assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
-    sized = replace(
-        assembled,
-        remarks=(*chosen.remarks, *noise_remarks(study.noise, study.trend, study.test)),
-        sizes=cause_sizes(study) if study.named else (),
-        data=chosen.examined,
-    )
-    return in_own_units(sized, study.similarity)
 
 
 def vocabulary(include: Sequence[str] = (), exclude: Sequence[str] = ()) -> tuple[type[Effect], ...]:

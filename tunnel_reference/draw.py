@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tunnel_reference.catalogue import Form, Group
-from tunnel_reference.conditions import Array, Conditions
+from tunnel_reference.conditions import Conditions
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
 from tunnel_reference.inputs import draw_inputs
 from tunnel_reference.outside import OUTSIDE_FORMS
@@ -240,7 +240,24 @@ def _draw_effect(
 
 def draw_conditions(rng: np.random.Generator) -> Conditions:
     """Draws springs, speeds, releases, truth and sensor: mostly the plan of twelve runs, otherwise another plan."""
-    stiffness, speed, release = _twelve_runs(rng) if rng.random() < 0.8 else _other_design(rng)
+    if rng.random() < 0.8:  # three springs at three speeds from 20°, two small releases, one medium release
+        low = float(rng.choice([16.12, 21.02]))
+        middle = float(rng.choice([21.02, 35.02] if low < 20.0 else [35.02]))
+        high = float(rng.choice([44.84, 51.88, 67.98]))
+        rows = [(k, v, 20.0) for k in (low, middle, high) for v in (0.0, 15.0, 25.0)]
+        rows += [(low, 0.0, 8.0), (low, 25.0, 8.0), (middle, 20.0, 14.0)]
+    else:  # two to four springs, two to four speeds including still air, 6 to 16 runs at two release angles
+        table = [12.0, 16.12, 21.02, 28.0, 35.02, 44.84, 51.88, 60.0, 67.98, 80.0]
+        springs = np.sort(rng.choice(np.array(table), size=int(rng.integers(2, 5)), replace=False))
+        speeds = np.concatenate(
+            [[0.0], np.sort(rng.choice([10.0, 12.5, 15.0, 20.0, 25.0], int(rng.integers(1, 4)), False))]
+        )
+        big = float(rng.choice([10.0, 15.0, 20.0]))
+        rows = [(float(k), float(v), big) for k in springs for v in speeds]
+        rows += [(float(springs[0]), float(v), big * 0.4) for v in (speeds[0], speeds[-1])]
+        rows = rows[:16]
+    stiffness, speed, degrees = (np.array(column) for column in zip(*rows, strict=True))
+    release = np.round(np.radians(degrees), 4)
     duration = 10.0 if rng.random() < 0.85 else float(rng.choice([8.0, 12.0, 15.0, 20.0]))
     noise = float(rng.uniform(3e-4, 6e-4))
     start = release * (1.0 + 0.03 * rng.standard_normal(release.size))
@@ -269,32 +286,3 @@ def with_defaults(conditions: Conditions) -> Conditions:
         stiffness_scale=np.broadcast_to(conditions.stiffness_scale, (n,)).copy(),
         speed_offset=np.broadcast_to(conditions.speed_offset, (n,)).copy(),
     )
-
-
-def _twelve_runs(rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """Three springs at three speeds from 20°, two small releases, one medium release."""
-    low = float(rng.choice([16.12, 21.02]))
-    middle = float(rng.choice([21.02, 35.02] if low < 20.0 else [35.02]))
-    high = float(rng.choice([44.84, 51.88, 67.98]))
-    rows = [(k, v, 20.0) for k in (low, middle, high) for v in (0.0, 15.0, 25.0)]
-    rows += [(low, 0.0, 8.0), (low, 25.0, 8.0), (middle, 20.0, 14.0)]
-    return _columns(rows)
-
-
-def _other_design(rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """Two to four springs, two to four speeds including still air, 6 to 16 runs at two release angles."""
-    table = [12.0, 16.12, 21.02, 28.0, 35.02, 44.84, 51.88, 60.0, 67.98, 80.0]
-    springs = np.sort(rng.choice(np.array(table), size=int(rng.integers(2, 5)), replace=False))
-    speeds = np.concatenate(
-        [[0.0], np.sort(rng.choice([10.0, 12.5, 15.0, 20.0, 25.0], int(rng.integers(1, 4)), False))]
-    )
-    big = float(rng.choice([10.0, 15.0, 20.0]))
-    rows = [(float(k), float(v), big) for k in springs for v in speeds]
-    rows += [(float(springs[0]), float(v), big * 0.4) for v in (speeds[0], speeds[-1])]
-    return _columns(rows[:16])
-
-
-def _columns(rows: Sequence[tuple[float, float, float]]) -> tuple[Array, Array, Array]:
-    """Stiffness, speed and release in radians, as arrays."""
-    stiffness, speed, degrees = (np.array(column) for column in zip(*rows, strict=True))
-    return stiffness, speed, np.round(np.radians(degrees), 4)

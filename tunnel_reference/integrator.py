@@ -278,36 +278,32 @@ class _Batch:
             return
         at = rows + (3 if self.flexible else 1) * self.size
         crossed = rows[self.state[at] * self.sign[rows] < 0.0]
-        if crossed.size:
-            self._cross(crossed, before, k1, h)
+        if crossed.size:  # after the crossing, friction acts the other way, or sticks
+            angle_at = crossed + (2 if self.flexible else 0) * self.size
+            rate_at = angle_at + self.size
+            v0, v1, a0 = before[rate_at], self.state[rate_at], k1[rate_at]
+            bend = v1 - v0 - a0 * h
+            # v(u) = v0 + a0 h u + bend u²; its root by two Newton steps, starting from the root of the chord.
+            u = np.clip(v0 / np.where(v0 == v1, 1.0, v0 - v1), 0.0, 1.0)
+            for _ in range(2):
+                gradient = a0 * h + 2.0 * bend * u
+                gradient = np.where(np.abs(gradient) < 1e-300, 1.0, gradient)
+                u = np.clip(u - (v0 + a0 * h * u + bend * u * u) / gradient, 0.0, 1.0)
+            left = (1.0 - u) * h
+            level, net = self.stage.level[crossed], self.stage.top[crossed]
+            stick = np.abs(net) <= level
+            turned = np.where(stick, 0.0, np.sign(net))
+            push = (self.sign[crossed] - turned) * level / self.top_inertia[crossed]
+            at_rest = before[angle_at] + h * (v0 * u + a0 * h * u**2 / 2.0 + bend * u**3 / 3.0)
+            slid_angle = self.state[angle_at] + push * left**2 / 2.0
+            slid_rate = v1 + push * left
+            self.state[angle_at] = np.where(stick, at_rest, slid_angle)
+            self.state[rate_at] = np.where(stick, 0.0, slid_rate)
+            self.sign[crossed] = turned
+            self.moving[crossed] = np.where(stick, 0.0, 1.0)
         resting = rows[self.moving[rows] == 0.0]
         if resting.size:
             self._leave_rest(resting)
-
-    def _cross(self, rows: Places, before: Array, slope: Array, h: float) -> None:
-        """After the crossing, friction acts the other way, or sticks."""
-        angle_at = rows + (2 if self.flexible else 0) * self.size
-        rate_at = angle_at + self.size
-        v0, v1, a0 = before[rate_at], self.state[rate_at], slope[rate_at]
-        bend = v1 - v0 - a0 * h
-        # v(u) = v0 + a0 h u + bend u²; its root by two Newton steps, starting from the root of the chord.
-        u = np.clip(v0 / np.where(v0 == v1, 1.0, v0 - v1), 0.0, 1.0)
-        for _ in range(2):
-            gradient = a0 * h + 2.0 * bend * u
-            gradient = np.where(np.abs(gradient) < 1e-300, 1.0, gradient)
-            u = np.clip(u - (v0 + a0 * h * u + bend * u * u) / gradient, 0.0, 1.0)
-        left = (1.0 - u) * h
-        level, net = self.stage.level[rows], self.stage.top[rows]
-        stick = np.abs(net) <= level
-        turned = np.where(stick, 0.0, np.sign(net))
-        push = (self.sign[rows] - turned) * level / self.top_inertia[rows]
-        at_rest = before[angle_at] + h * (v0 * u + a0 * h * u**2 / 2.0 + bend * u**3 / 3.0)
-        slid_angle = self.state[angle_at] + push * left**2 / 2.0
-        slid_rate = v1 + push * left
-        self.state[angle_at] = np.where(stick, at_rest, slid_angle)
-        self.state[rate_at] = np.where(stick, 0.0, slid_rate)
-        self.sign[rows] = turned
-        self.moving[rows] = np.where(stick, 0.0, 1.0)
 
     def _leave_rest(self, rows: Places) -> None:
         """Rows at rest slip once the other moments exceed the level."""

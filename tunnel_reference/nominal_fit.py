@@ -33,21 +33,6 @@ class NominalFit:
     residual: Array
 
 
-def _rates(c: Conditions, p: Array) -> tuple[Array, Array, Array, Array]:
-    """σ and ωd per run, and their gradients with respect to (Izz, Cr, Cnβ, Cnr), shapes (R,) and (R, 4)."""
-    inertia, damping, cn_beta, cn_r = p
-    moment = 0.5 * c.air_density * c.wind_speed**2 * FRONTAL_AREA * REFERENCE_LENGTH
-    lever = 0.5 * c.air_density * c.wind_speed * FRONTAL_AREA * REFERENCE_LENGTH**2
-    sigma = (damping - lever * cn_r) / (2.0 * inertia)
-    square = (c.spring_stiffness - moment * cn_beta) / inertia
-    omega = np.sqrt(np.maximum(square - sigma**2, 0.25))
-    ones = np.ones_like(sigma)
-    d_sigma = np.stack([-sigma / inertia, ones / (2 * inertia), 0 * ones, -lever / (2 * inertia)], axis=1)
-    d_square = np.stack([-square / inertia, 0 * ones, -moment / inertia, 0 * ones], axis=1)
-    d_omega = (d_square / 2.0 - sigma[:, None] * d_sigma) / omega[:, None]
-    return sigma, omega, d_sigma, d_omega
-
-
 def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     """Fit Izz, Cr, Cnβ, Cnr, the zero and the initial state of every run to the readings.
 
@@ -66,7 +51,17 @@ def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     step: NDArray[np.float64] = np.zeros(4)
     kept: tuple[Array, float, Array, Array] | None = None
     for _ in range(_ITERATIONS):
-        sigma, omega, d_sigma, d_omega = _rates(c, p)
+        # σ and ωd per run, shape (R,), and their gradients with respect to the four coefficients, shape (R, 4)
+        inertia, damping, cn_beta, cn_r = p
+        moment = 0.5 * c.air_density * c.wind_speed**2 * FRONTAL_AREA * REFERENCE_LENGTH
+        lever = 0.5 * c.air_density * c.wind_speed * FRONTAL_AREA * REFERENCE_LENGTH**2
+        sigma = (damping - lever * cn_r) / (2.0 * inertia)
+        square = (c.spring_stiffness - moment * cn_beta) / inertia
+        omega = np.sqrt(np.maximum(square - sigma**2, 0.25))
+        ones = np.ones_like(sigma)
+        d_sigma = np.stack([-sigma / inertia, ones / (2 * inertia), 0 * ones, -lever / (2 * inertia)], axis=1)
+        d_square = np.stack([-square / inertia, 0 * ones, -moment / inertia, 0 * ones], axis=1)
+        d_omega = (d_square / 2.0 - sigma[:, None] * d_sigma) / omega[:, None]
         decay = np.exp(-sigma[:, None] * time)
         phase = omega[:, None] * time
         cosine, sine = decay * np.cos(phase), decay * np.sin(phase)  # shape (R, n)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,16 +96,6 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
 
 
-def _excess(alone: CampaignDraw, motion: Motion) -> float:
-    """Excess of a campaign; infinite where its motion grows without bound or is nothing like a free decay."""
-    if not np.all(np.isfinite(motion.angle)):
-        return np.inf
-    try:
-        return read_and_fit(alone, motion).excess
-    except (np.linalg.LinAlgError, ValueError):
-        return np.inf
-
-
 class _Search:
     """The search for one effect's severity parameter."""
 
@@ -120,7 +111,11 @@ class _Search:
     def try_out(self) -> None:
         """Compute the excess at the present value and choose the next; only sensor effects can reuse the motion."""
         assert self.motion is not None
-        self.learn(_excess(self.alone, self.motion))
+        excess = np.inf  # where its motion grows without bound or is nothing like a free decay
+        if np.all(np.isfinite(self.motion.angle)):
+            with suppress(np.linalg.LinAlgError, ValueError):
+                excess = read_and_fit(self.alone, self.motion).excess
+        self.learn(excess)
         if not self.sensor:
             self.motion = None
 
@@ -208,18 +203,19 @@ def size_separably(draws: Sequence[CampaignDraw], *, progress: bool = False) -> 
         sized = own_excesses(size_effects([found[i] for i in left], progress=progress))
         for number, draw in zip(left, sized, strict=True):
             found[number] = draw
-        left = [i for i in left if not _separable(found[i])]
+        # those of which an effect that matters has no excess of its own
+        left = [
+            i
+            for i in left
+            if not all(
+                e.own is None or e.own >= max(OWN_EXCESS, OWN_SHARE * e.target) for e in found[i].effects
+            )
+        ]
         if not left or attempt == ATTEMPTS - 1:
             break
         for number in left:
             found[number] = redraw(found[number])
     return found
-
-
-def _separable(draw: CampaignDraw) -> bool:
-    """Whether every effect that matters has an excess of its own."""
-    owns = [(e.own, e.target) for e in draw.effects if e.own is not None]
-    return all(own >= max(OWN_EXCESS, OWN_SHARE * target) for own, target in owns)
 
 
 def own_excesses(draws: Sequence[CampaignDraw]) -> list[CampaignDraw]:

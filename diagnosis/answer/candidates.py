@@ -17,7 +17,6 @@ from diagnosis.policy import EVEN_SHARE, FALSE_ALARM_RATE, UNDETERMINED_FACTOR
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study
 from diagnosis.search.process_noise import LONGEST_BANDWIDTH
-from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import known_effects
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -154,33 +153,26 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:
-        found |= _random_parameters(random)
+        process, spectrum = random.process, random.process.spectrum
+        severity, place = (f"{random.kind.name}.{info.name}" for info in random.kind.parameters())
+        # their spread follows from the number of correlation times in the runs
+        seconds = process.interval * sum(i.size for i in process.innovations)
+        independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
+        relative = float(np.sqrt(0.5 / independent))
+        if spectrum.strouhal_number > 0.0:
+            size = float(np.sqrt(2.0)) * spectrum.intensity
+            width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
+            spread = spectrum.strouhal_number * width * relative
+            found[severity] = ParameterEstimate(size, size * relative, "1")
+            found[place] = ParameterEstimate(spectrum.strouhal_number, spread, "1")
+        else:
+            # a corner above the rig's frequencies looks white: only the size over its square root is known there
+            limit = "upper" if spectrum.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
+            found[severity] = ParameterEstimate(spectrum.intensity, spectrum.intensity * relative, "1")
+            found[place] = ParameterEstimate(spectrum.bandwidth, None, "Hz", limit)
     own = own_parameters(found, study.campaign, study.similarity)
     single = len({name.split(".")[0] for name in own}) == 1
     return {name.split(".")[1] if single else name: value for name, value in own.items()}
-
-
-def _random_parameters(answer: RandomAnswer) -> dict[str, ParameterEstimate]:
-    """Parameters of a random moment; their spread follows from the number of correlation times in the runs."""
-    process, spectrum = answer.process, answer.process.spectrum
-    severity, place = (f"{answer.kind.name}.{info.name}" for info in answer.kind.parameters())
-    seconds = process.interval * sum(i.size for i in process.innovations)
-    independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
-    relative = float(np.sqrt(0.5 / independent))
-    if spectrum.strouhal_number > 0.0:
-        amplitude = float(np.sqrt(2.0)) * spectrum.intensity
-        width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
-        spread = spectrum.strouhal_number * width * relative
-        return {
-            severity: ParameterEstimate(amplitude, amplitude * relative, "1"),
-            place: ParameterEstimate(spectrum.strouhal_number, spread, "1"),
-        }
-    # a corner above the rig's frequencies looks white: only the size over its square root is known there
-    bound = "upper" if spectrum.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-    return {
-        severity: ParameterEstimate(spectrum.intensity, spectrum.intensity * relative, "1"),
-        place: ParameterEstimate(spectrum.bandwidth, None, "Hz", bound),
-    }
 
 
 _CYCLES = 3.0

@@ -378,10 +378,26 @@ def score_set(
     campaigns = campaign_folders(folder)
     answers, answers_sha256 = _checked_answers(folder, campaigns, excluded, effects_file)
     if (folder / SEAL).exists():
-        document, key_sha256 = _checked_key(folder, campaigns, answers, key)
-        with as_described(
-            "is no key", shown(folder / KEY if key is None else key), "name the key with --key"
-        ):
+        hashes = read_hashes(folder / SEAL, "campaigns_sha256", "restore it")
+        key_sha256 = read_json(folder / SEAL, remedy="restore it").get("key_sha256")
+        if set(hashes) != {path.name for path in campaigns}:
+            raise TunnelError("campaigns were added or removed", where=str(folder), remedy="restore the set")
+        for path in campaigns:
+            if folder_hash(path) != hashes[path.name]:
+                raise TunnelError("is not the campaign that was sealed", where=str(path), remedy="restore it")
+            if answers[path.name].get("data_sha256") != hashes[path.name]:
+                raise TunnelError(
+                    "was answered from other data",
+                    where=str(path),
+                    remedy="remove the answers and answer again",
+                )
+        source = folder / KEY if key is None else key
+        document = read_json(source, remedy="name the key with --key")
+        if file_hash(source) != key_sha256:
+            raise TunnelError(
+                "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
+            )
+        with as_described("is no key", shown(source), "name the key with --key"):
             truths, made_with = dict(document["truths"]), document["made_with"] or {}
             if made_with:
                 made_with = {
@@ -430,30 +446,6 @@ def _checked_answers(
         if file_hash(file) != hashes[path.name]:
             raise TunnelError("is not the answer that was given", where=str(file), remedy="restore it")
     return answers, file_hash(target / SEAL)
-
-
-def _checked_key(
-    folder: Path, campaigns: Sequence[Path], answers: dict[str, dict[str, Any]], key: Path | None
-) -> tuple[dict[str, Any], str]:
-    """The key, once everything is what it was when it was sealed."""
-    hashes = read_hashes(folder / SEAL, "campaigns_sha256", "restore it")
-    key_sha256 = read_json(folder / SEAL, remedy="restore it").get("key_sha256")
-    if set(hashes) != {path.name for path in campaigns}:
-        raise TunnelError("campaigns were added or removed", where=str(folder), remedy="restore the set")
-    for path in campaigns:
-        if folder_hash(path) != hashes[path.name]:
-            raise TunnelError("is not the campaign that was sealed", where=str(path), remedy="restore it")
-        if answers[path.name].get("data_sha256") != hashes[path.name]:
-            raise TunnelError(
-                "was answered from other data", where=str(path), remedy="remove the answers and answer again"
-            )
-    source = folder / KEY if key is None else key
-    document = read_json(source, remedy="name the key with --key")
-    if file_hash(source) != key_sha256:
-        raise TunnelError(
-            "is not the key that was sealed", where=str(source), remedy="name the right one: --key"
-        )
-    return document, key_sha256
 
 
 def _truth(c: Case) -> str:

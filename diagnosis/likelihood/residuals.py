@@ -359,31 +359,29 @@ def ringing(fit: Fit) -> PerRunParameters | None:
     if not free.any():
         return None
     shortest = min(run.duration for run in runs)
-    tried = [(rate, _amplitudes(fit, grid, rate)) for rate in np.array(_DECAYS) / shortest]
-    drops = [np.where(free, np.sum(drop * beside, axis=0), 0.0) for _, (_, drop) in tried]
+    tried, drops = [], []
+    for rate in np.array(_DECAYS) / shortest:
+        # complex amplitudes (rad) of exp(−rate t) cos on the grid, and the drops of χ², by run
+        amplitudes, by_run = [], []
+        for run, residual in zip(runs, fit.residuals, strict=True):
+            decay = np.exp(-rate * run.interval * np.arange(residual.size))
+            size = 2 ** int(np.ceil(np.log2(2 * _RINGING_PADDING * residual.size)))
+            transform = np.conj(np.fft.rfft(residual * decay, size))
+            index = np.round(grid * size * run.interval).astype(int)
+            power = float(decay @ decay)
+            amplitude = 2.0 * np.conj(transform[index]) / power
+            amplitudes.append(amplitude * np.sqrt(run.noise_variance) / run.response(grid))
+            by_run.append(0.5 * np.abs(amplitude) ** 2 * power)
+        tried.append((rate, np.array(amplitudes)))
+        drops.append(np.where(free, np.sum(np.array(by_run) * beside, axis=0), 0.0))
     best = int(np.argmax([drop.max() for drop in drops]))
     at = int(np.argmax(drops[best]))
-    rate, (amplitude, _) = tried[best]
+    rate, amplitude = tried[best]
     exponent = complex(-rate, 2.0 * np.pi * grid[at])
     omega = abs(exponent)
     found = amplitude[:, at] / exponent ** runs[0].derivative
-    size = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
-    return PerRunParameters((size, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
-
-
-def _amplitudes(fit: Fit, grid: Array, rate: float) -> tuple[np.ndarray, Array]:
-    """Complex amplitudes (rad) of exp(−rate t) cos on a grid of frequencies (Hz), and the drops of χ², by run."""
-    amplitudes, drops = [], []
-    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
-        decay = np.exp(-rate * run.interval * np.arange(residual.size))
-        size = 2 ** int(np.ceil(np.log2(2 * _RINGING_PADDING * residual.size)))
-        transform = np.conj(np.fft.rfft(residual * decay, size))
-        index = np.round(grid * size * run.interval).astype(int)
-        power = float(decay @ decay)
-        found = 2.0 * np.conj(transform[index]) / power
-        amplitudes.append(found * np.sqrt(run.noise_variance) / run.response(grid))
-        drops.append(0.5 * np.abs(found) ** 2 * power)
-    return np.array(amplitudes), np.array(drops)
+    mean = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
+    return PerRunParameters((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
 
 def skip(fit: Fit) -> PerRunParameters | None:
@@ -395,28 +393,23 @@ def skip(fit: Fit) -> PerRunParameters | None:
     runs = [_Skipping(fit, number) for number in range(len(fit.problem.data.runs))]
     if any(run.left.size < 4 * _EDGE for run in runs):
         return None
-    found = [_skips(runs, count) for count in range(1, _MOST_SKIPS + 1)]
+    found = []
+    for count in range(1, _MOST_SKIPS + 1):  # so many skips in every run, all of one time
+        steps, lost = [run.steps(count) for run in runs], 0.0
+        for number in range(_ROUNDS):
+            if number > 0:  # two skips close together were one of twice the time, and another one of nothing
+                steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
+            times, weights = (
+                np.array([[getattr(step, name) for step in of_run] for of_run in steps])
+                for name in ("time", "weight")
+            )
+            lost = max(float(np.sum(times * weights) / np.sum(weights)), 0.0)
+        drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
+        shares = [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
+        found.append(PerRunParameters((lost * count,), np.array(shares), drop))
     # of an instant, which is sought among as many blocks
     cost = 2.0 * sum(np.log(run.left.size) for run in runs)
     return max(found, key=lambda one: one.drop - cost * one.numbers.shape[1])
-
-
-def _skips(runs: list[_Skipping], count: int) -> PerRunParameters:
-    """So many skips in every run, all of one time."""
-    steps, lost = [run.steps(count) for run in runs], 0.0
-    for number in range(_ROUNDS):
-        if number > 0:  # two skips close together were one of twice the time, and another one of nothing
-            steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
-        times, weights = (
-            np.array([[getattr(step, name) for step in of_run] for of_run in steps])
-            for name in ("time", "weight")
-        )
-        lost = max(float(np.sum(times * weights) / np.sum(weights)), 0.0)
-    drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
-    numbers = np.array(
-        [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
-    )
-    return PerRunParameters((lost * count,), numbers, drop)
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,20 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
 
     cleaned, squares, powers = [], [], []
     curvature, scatter = 0.0, 0.0
-    swells = _swells([run.record for run in campaign.runs], frequency, variance)
+    gained, freedom = 0.0, 0  # whether the hum's amplitude varies within the runs beyond chance
+    for record in [run.record for run in campaign.runs]:
+        if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
+            continue
+        steady, swelling = _lines(record, frequency), _swell(record, frequency)
+        window = np.hanning(record.time_s.size)
+        clear, reading = _without_motion(record, window)
+        both = np.linalg.qr(clear(np.column_stack([steady, swelling])))[0][:, steady.shape[1] :]
+        # windowed white noise has the window's mean square
+        share = both.T @ (both * window[:, None] ** 2)
+        found = both.T @ reading
+        gained += float(found @ np.linalg.solve(share, found)) / variance
+        freedom += swelling.shape[1]
+    swells = freedom > 0 and gained > float(chdtri(freedom, SWELL_FALSE_ALARM_RATE))
     for run in campaign.runs:
         record = run.record
         flat = np.hanning(record.time_s.size)
@@ -145,24 +158,6 @@ def _swell(record: Record, frequency: float) -> Array:
     slow = [np.cos(np.pi * k * time / time[-1]) for k in orders]
     phase = 2.0 * np.pi * frequency * time
     return np.stack([wave * s for s in slow for wave in (np.sin(phase), np.cos(phase))], axis=1)
-
-
-def _swells(records: list[Record], frequency: float, variance: float) -> bool:
-    """Whether the hum's amplitude varies within the runs beyond chance (`SWELL_FALSE_ALARM_RATE`)."""
-    power, count = 0.0, 0
-    for record in records:
-        if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
-            continue
-        steady, swelling = _lines(record, frequency), _swell(record, frequency)
-        window = np.hanning(record.time_s.size)
-        clear, reading = _without_motion(record, window)
-        both = np.linalg.qr(clear(np.column_stack([steady, swelling])))[0][:, steady.shape[1] :]
-        # windowed white noise has the window's mean square
-        share = both.T @ (both * window[:, None] ** 2)
-        found = both.T @ reading
-        power += float(found @ np.linalg.solve(share, found)) / variance
-        count += swelling.shape[1]
-    return count > 0 and power > float(chdtri(count, SWELL_FALSE_ALARM_RATE))
 
 
 def _without_motion(record: Record, window: Array) -> tuple[Callable[[Array], Array], Array]:

@@ -301,7 +301,18 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
         lambda f: -_drops(unexplained, f).sum(), bounds=(start - width, start + width), method="bounded"
     )
     frequency = float(found.x)
-    if _steadiness(unexplained, frequency, floor) < MOST:
+    # Share of the line in a half of a run that the other half predicts: 1 where phase and amplitude are kept.
+    # Chance lowers what is predicted by 2 in every half, and raises what is fitted.
+    predicted, fitted = 0.0, 0.0
+    for path in unexplained.paths:
+        waves, residual = _waves(path, frequency)
+        first = np.arange(residual.size) < residual.size // 2
+        ways = [np.linalg.lstsq(waves[own], residual[own], rcond=None)[0] for own in (first, ~first)]
+        for own, mine, other in ((first, *ways), (~first, *ways[::-1])):
+            before = float(residual[own] @ residual[own])
+            predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
+            fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
+    if predicted / max(fitted, 1e-300) < MOST:
         return None
     drops = _drops(unexplained, frequency)
     whole = float(drops.sum())
@@ -378,17 +389,3 @@ def _drops(unexplained: Unexplained, frequency: float) -> Array:
         seen = waves.T @ residual
         found.append(float(seen @ np.linalg.solve(waves.T @ waves, seen)))
     return np.array(found)
-
-
-def _steadiness(unexplained: Unexplained, frequency: float, floor: float) -> float:
-    """Share of the line in a half of a run that the other half predicts; 1 where phase and amplitude are kept."""
-    predicted, fitted = 0.0, 0.0
-    for path in unexplained.paths:
-        waves, residual = _waves(path, frequency)
-        first = np.arange(residual.size) < residual.size // 2
-        ways = [np.linalg.lstsq(waves[own], residual[own], rcond=None)[0] for own in (first, ~first)]
-        for own, mine, other in ((first, *ways), (~first, *ways[::-1])):
-            before = float(residual[own] @ residual[own])
-            predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
-            fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
-    return predicted / max(fitted, 1e-300)  # chance lowers the one by 2 in every half, and raises the other

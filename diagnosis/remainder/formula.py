@@ -85,15 +85,38 @@ def terms(kind: str, r: Ranges) -> list[Term]:
     Their own numbers are near enough to each other for a fit to find the one between. There are no terms for kinds
     that no formula explains.
     """
-    makers = {
-        "angle": (_of_angle,),
-        "rate": (_of_rate,),
-        "state": (_of_angle, _of_rate, _of_state),
-        "wind": (_of_angle, _of_rate, _of_state),
-        "time": (_of_time,),
-        "reading": (_of_reading,),
-    }
-    return [term for maker in makers.get(kind, ()) for term in maker(r)]
+    found: list[Term] = []
+    if kind in ("angle", "state", "wind"):
+        found += map(Term, _ANGLE)
+        found += _grid(_ANGLE_WIDE, w=_widths(r, 9))
+        found += _grid(_ANGLE_PLACE, c=_places(r))
+        found += _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
+        found += _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
+        found += _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
+    if kind in ("rate", "state", "wind"):
+        found += map(Term, _RATE)
+        found += _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
+    if kind in ("state", "wind"):
+        found += map(Term, _STATE)
+        found += _grid(_STATE_WIDE, w=_widths(r))
+        places = np.linspace(-0.85, 0.85, 18) * r.angle
+        found += _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
+    if kind == "time":
+        found += map(Term, _TIME)
+        found += _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
+        found += _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
+        instants = np.linspace(0.04, 0.96, 24) * r.time
+        found += _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
+        often = np.arange(0.1, 0.98 * r.time / r.cycle, 0.2) * r.cycle
+        found += _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
+    if kind == "reading":
+        found += map(Term, _READING)
+        found += _grid(_READING_PLACE, c=_places(r))
+        found += _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
+        instants = np.linspace(0.04, 0.96, 47) * r.time
+        found += _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
+        found += _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
+    return found
 
 
 def _grid(texts: tuple[str, ...], **inner: Array) -> Iterator[Term]:
@@ -108,46 +131,6 @@ def _widths(r: Ranges, count: int = 6) -> Array:
 
 def _places(r: Ranges) -> Array:
     return np.linspace(0.08, 0.92, 15) * r.angle
-
-
-def _of_angle(r: Ranges) -> Iterator[Term]:
-    yield from map(Term, _ANGLE)
-    yield from _grid(_ANGLE_WIDE, w=_widths(r, 9))
-    yield from _grid(_ANGLE_PLACE, c=_places(r))
-    yield from _grid(("sin(n*b)",), n=np.arange(1.0, 10.1, 0.35) * np.pi / r.angle)
-    yield from _grid(("tanh(max(abs(b)-c,0)/w)*sign(b)",), c=_places(r)[::2], w=_widths(r, 3))
-    yield from _grid(("exp(-((b-c)/w)^2)",), c=np.linspace(-0.8, 0.8, 9) * r.angle, w=_widths(r, 3))
-
-
-def _of_rate(r: Ranges) -> Iterator[Term]:
-    yield from map(Term, _RATE)
-    yield from _grid(("tanh(r/v)",), v=np.geomspace(0.02, 0.5, 6) * r.rate)
-
-
-def _of_state(r: Ranges) -> Iterator[Term]:
-    yield from map(Term, _STATE)
-    yield from _grid(_STATE_WIDE, w=_widths(r))
-    places = np.linspace(-0.85, 0.85, 18) * r.angle
-    yield from _grid(("exp(-((b-c)/w)^2)*sign(r)",), c=places, w=_widths(r, 5)[:3])
-
-
-def _of_time(r: Ranges) -> Iterator[Term]:
-    yield from map(Term, _TIME)
-    yield from _grid(_TIME_SLOW, q=np.geomspace(0.04, 1.5, 9) * r.time)
-    yield from _grid(_TIME_WAVE, f=2.0 * np.pi * np.arange(0.1, 2.0, 0.05) / (2.0 * r.cycle))
-    instants = np.linspace(0.04, 0.96, 24) * r.time
-    yield from _grid(("b*tanh((t-d)/q)", "r*tanh((t-d)/q)"), d=instants, q=np.array([0.1 * r.cycle]))
-    often = np.arange(0.1, 0.98 * r.time / r.cycle, 0.2) * r.cycle
-    yield from _grid(("exp(-((t-d)/q)^2)",), d=often, q=np.array([0.06, 0.2]) * r.cycle)
-
-
-def _of_reading(r: Ranges) -> Iterator[Term]:
-    yield from map(Term, _READING)
-    yield from _grid(_READING_PLACE, c=_places(r))
-    yield from _grid(("sin(n*y)",), n=np.arange(1.0, 14.1, 0.35) * np.pi / r.angle)
-    instants = np.linspace(0.04, 0.96, 47) * r.time
-    yield from _grid(("tanh((t-d)/q)", "y*tanh((t-d)/q)"), d=instants, q=np.array([0.02 * r.cycle]))
-    yield from _grid(("exp(-t/q)", "y*exp(-t/q)"), q=np.geomspace(0.04, 1.5, 9) * r.time)
 
 
 _MOST_TERMS = 3
@@ -228,12 +211,39 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         columns.append(path.seen(values) if of_reading else path.response(values))
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = unexplained.normals([c / size for c in columns])
-    chosen, gained = _greedy(unexplained, parts, len(candidates), closable)
+    # terms are added as long as each pays on held-out runs
+    whole = total(parts)
+    c = whole.free
+    own = np.diag(whole.matrix)[c:]
+    threshold = float(chdtri(1, FALSE_ALARM_RATE / len(candidates)))
+    before = float(unexplained.before[unexplained.seen].sum())
+    chosen: list[int] = []
+    gained = 0.0
+    while len(chosen) < _MOST_TERMS and gained < LAW_REACHES * closable:
+        known = [*range(c), *(c + i for i in chosen)]
+        inner = whole.matrix[np.ix_(known, known)]
+        width = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / width[:, None]
+        solved = np.linalg.pinv(inner / np.outer(width, width), rcond=1e-11, hermitian=True) @ cross
+        left = own - np.sum(cross * solved, axis=0)
+        along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / width)
+        # what the others explain to within rounding gains nothing
+        drops = np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
+        order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
+        tried = []
+        for i in order:
+            some = [_of(part, [*chosen, i]) for part in parts]
+            after = held_out(some, unexplained.groups, None)
+            tried.append((before - float(after[unexplained.seen].sum()), i))
+        if not tried or max(tried)[0] - gained < max(AS_MUCH * closable, threshold):
+            break
+        gained, best = max(tried)
+        chosen.append(best)
     while sum(1 + len(candidates[i].inner) for i in chosen) > limits.OWN_PARAMETERS:
         chosen.pop()
     if not chosen:
         return None
-    solution = Ridge(_of(total(parts), chosen), 0.0).solution
+    solution = Ridge(_of(whole, chosen), 0.0).solution
     common = unexplained.size.size
     return Formula(
         tuple(candidates[i] for i in chosen),
@@ -248,40 +258,6 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
     """The normal equations of the model's parameters and some of the terms, none with a prior."""
     keep = [*range(whole.free), *(whole.free + i for i in chosen)]
     return Normal(whole.matrix[np.ix_(keep, keep)], whole.gradient[keep], whole.power, len(keep))
-
-
-def _greedy(
-    unexplained: Unexplained, parts: Sequence[Normal], count: int, closable: float
-) -> tuple[list[int], float]:
-    """Terms added as long as each pays on held-out runs."""
-    whole = total(parts)
-    c = whole.free
-    own = np.diag(whole.matrix)[c:]
-    threshold = float(chdtri(1, FALSE_ALARM_RATE / count))
-    before = float(unexplained.before[unexplained.seen].sum())
-    chosen: list[int] = []
-    gained = 0.0
-    while len(chosen) < _MOST_TERMS and gained < LAW_REACHES * closable:
-        known = [*range(c), *(c + i for i in chosen)]
-        inner = whole.matrix[np.ix_(known, known)]
-        size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-        cross = whole.matrix[np.ix_(known, range(c, len(whole.matrix)))] / size[:, None]
-        solved = np.linalg.pinv(inner / np.outer(size, size), rcond=1e-11, hermitian=True) @ cross
-        left = own - np.sum(cross * solved, axis=0)
-        along = whole.gradient[c:] - solved.T @ (whole.gradient[known] / size)
-        # what the others explain to within rounding gains nothing
-        drops = np.where(left > 1e-6 * np.maximum(own, 1e-300), along**2 / np.maximum(left, 1e-300), 0.0)
-        order = [int(i) for i in np.argsort(-drops)[:_TRIED] if drops[i] > threshold]
-        tried = []
-        for i in order:
-            some = [_of(part, [*chosen, i]) for part in parts]
-            after = held_out(some, unexplained.groups, None)
-            tried.append((before - float(after[unexplained.seen].sum()), i))
-        if not tried or max(tried)[0] - gained < max(AS_MUCH * closable, threshold):
-            break
-        gained, best = max(tried)
-        chosen.append(best)
-    return chosen, gained
 
 
 def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal | None:

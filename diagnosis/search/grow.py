@@ -281,44 +281,30 @@ def grow_in_stretches(
     level, found = [_Grown(Hypothesis((), nominal), Hypothesis((), first))], []
     able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
     while level:
-        grown = _longer_sets(level, short, data, able, progress)
+        # sets with one effect more, from the better of two starts where there are two
+        tried = sets_with_one_more([g.short for g in level if g.short is not None], able, progress)
+        grown: dict[tuple[str, ...], _Grown] = {}
+        for h in sorted(tried, key=lambda h: h.fit.total)[: policy.LENGTHENED]:
+            with suppress(FitError, np.linalg.LinAlgError):
+                longer, _ = fit_longer(h.fit, short, data, long_stretch(short))
+                grown[h.names] = _Grown(replace(h, fit=longer), h)
+        following = [g.long for g in level if g.long.effects and not misses_motion(g.long.fit)]
+        for child in sets_with_one_more(following, able, progress):
+            other = grown.get(child.names)
+            if other is None or child.fit.total < other.long.fit.total:
+                grown[child.names] = _Grown(child, None if other is None else other.short)
         least = min(
             policy.AS_MUCH * level[0].long.fit.excess, policy.MODEL_ERROR**2 * gap.motion / nominal.count
         )
         children = with_forms([child.long for child in grown.values()], gap, least)
         found += children
         parents = [g.long for g in level]
-        going = _of_each(parents, going_on(children, parents, gap))
+        # the best child of each parent comes first: what fits better at first may be a dead end
+        ranked = going_on(children, parents, gap)
+        going: list[Hypothesis] = []
+        for parent in parents:
+            own = [h for h in ranked if h not in going and set(parent.effects) < set(h.effects)]
+            going += own[:1]
+        going += [h for h in ranked if h not in going]
         level = [replace(grown[h.names], long=h) for h in going[: policy.GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
-
-
-def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The best child of each parent, then the others: what fits better at first may be a dead end."""
-    first: list[Hypothesis] = []
-    for parent in parents:
-        own = [h for h in ranked if h not in first and set(parent.effects) < set(h.effects)]
-        first += own[:1]
-    return first + [h for h in ranked if h not in first]
-
-
-def _longer_sets(
-    level: Sequence[_Grown],
-    short: Stretches,
-    data: Data,
-    kinds: Sequence[type[Effect]],
-    progress: Progress | None,
-) -> dict[tuple[str, ...], _Grown]:
-    """The sets with one effect more, by their names, from the better of two starts where there are two."""
-    tried = sets_with_one_more([g.short for g in level if g.short is not None], kinds, progress)
-    grown = {}
-    for h in sorted(tried, key=lambda h: h.fit.total)[: policy.LENGTHENED]:
-        with suppress(FitError, np.linalg.LinAlgError):
-            longer, _ = fit_longer(h.fit, short, data, long_stretch(short))
-            grown[h.names] = _Grown(replace(h, fit=longer), h)
-    following = [g.long for g in level if g.long.effects and not misses_motion(g.long.fit)]
-    for child in sets_with_one_more(following, kinds, progress):
-        other = grown.get(child.names)
-        if other is None or child.fit.total < other.long.fit.total:
-            grown[child.names] = _Grown(child, None if other is None else other.short)
-    return grown

@@ -15,7 +15,6 @@ from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coeff
 from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, MOST, NEEDLESS_SPRING, OWN_EVIDENCE
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from tunnel_sim.effects.base import IN_RUNS
-from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
@@ -262,12 +261,13 @@ def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | No
         return None
     freed = dataclasses.replace(problem, free_forms=tuple(kind.name for kind in kinds))
     values = dict(zip(problem.names, fitted.point.common.tolist(), strict=True))
-    defaults = {f"{k.name}.{i.name}": _within(i) for k in kinds for i in k.parameters() if i.form}
+    # a form starts at the textbook value, or half a step inside a bound, where its slope may vanish
+    defaults = {
+        f"{k.name}.{i.name}": i.default + 0.5 * i.scale if i.default == i.lower else i.default
+        for k in kinds
+        for i in k.parameters()
+        if i.form
+    }
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     found = try_fit(freed, start, tolerance=tolerance)
     return found if found is not None and found.total < fitted.total and is_plausible(found) else None
-
-
-def _within(info: ParameterInfo) -> float:
-    """Where a form starts: at the textbook value, or half a step inside a bound, where its slope may vanish."""
-    return info.default + 0.5 * info.scale if info.default == info.lower else info.default

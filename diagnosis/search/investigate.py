@@ -38,7 +38,6 @@ from diagnosis.where.place import Place, locate
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array
 
 #: The effects that are read off the records before any is fitted.
 HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
@@ -283,7 +282,11 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
-    if _noise_explains(found, weighed):
+    # effects of a few numbers close little of any noise, however it misbehaves
+    block = found.nominal.problem.data.runs[0].block
+    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
+    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
+    if found.nominal.chance > 1.0 or (small and not closed):
         answer = Weighed((), 1.0, 1.0) if found.read_off else Weighed(UNKNOWN, 1.0, 1.0)
         others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
         weighed = [answer, *others]
@@ -366,26 +369,12 @@ def _best(found: Study, weighed: Sequence[Weighed]) -> Hypothesis | None:
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
     """The answers with their probabilities, the answer first; shares of the gap that ``base`` leaves."""
-    nominal, own = misfit(base), _of_read_off(found, base)
-    sets = [h.fitted_set(base) for h in found.hypotheses]
-    sets += [answer.left for answer in found.random]
-    if found.read_off:  # it may be the only cause, and is part of the gap
-        sets.append(FittedSet((), 1.0, nominal.excess))
+    nominal = misfit(base)
+    # χ² by channel that causes read off the records leave under any set of effects: the error of a coarse step is
+    # not white, and follows a slow motion, and a hum that is not a pure line leaves a small share of itself
+    own = np.zeros(len(CHANNELS))
     if found.hum is not None:
-        removed = found.hum.excess * base.count * _IN_HARMONICS
-        nominal = replace(nominal, chi2=nominal.chi2 + removed)
-    return weigh([replace(one, excess=one.excess - own) for one in sets], nominal)
-
-
-def _of_read_off(found: Study, base: Fit) -> Array:
-    """χ² by channel that causes read off the records leave under any set of effects, shape (6,).
-
-    The error of a coarse step is not white, and follows a slow motion. A hum that is not a pure line leaves a small
-    share of itself.
-    """
-    left = np.zeros(len(CHANNELS))
-    if found.hum is not None:
-        left += policy.HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
+        own += policy.HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
     errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
@@ -398,8 +387,15 @@ def _of_read_off(found: Study, base: Fit) -> Array:
             misfit(base, [run.scaled(e[k]) for run, e in zip(base.problem.data.runs, errors, strict=True)])
             for k in range(len(errors[0]))
         ]
-        left += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
-    return left
+        own += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
+    sets = [h.fitted_set(base) for h in found.hypotheses]
+    sets += [answer.left for answer in found.random]
+    if found.read_off:  # it may be the only cause, and is part of the gap
+        sets.append(FittedSet((), 1.0, nominal.excess))
+    if found.hum is not None:
+        removed = found.hum.excess * base.count * _IN_HARMONICS
+        nominal = replace(nominal, chi2=nominal.chi2 + removed)
+    return weigh([replace(one, excess=one.excess - own) for one in sets], nominal)
 
 
 def _polished(
@@ -409,17 +405,6 @@ def _polished(
     if any(moment.effects == answer.effects for moment in random):
         return tuple(hypotheses)
     return tuple(polish(h) if h.names == answer.effects else h for h in hypotheses)
-
-
-def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
-    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
-
-    Effects of a few numbers close little of any noise, however it misbehaves.
-    """
-    block = found.nominal.problem.data.runs[0].block
-    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
-    return found.nominal.chance > 1.0 or (small and not closed)
 
 
 class _Clock:

@@ -74,23 +74,25 @@ class _Pairing:
         on = [i for i, found in partners.items() if found]
         return cls(stiffness, np.array([load for _, load in sprung]), off, on, [partners[i] for i in on])
 
-
-def _outcome(pairing: _Pairing, frequency: Array, rate: Array, *, with_line: bool) -> Array:
-    # Izz and Cr, then Ka of each paired run, then Ca of each: the quantities that are propagated.
-    off = pairing.off
-    omega = np.hypot(2.0 * np.pi * frequency[off], rate[off])
-    inertia = inertia_of_springs(pairing.stiffness[off], omega**2, with_line=with_line)
-    damping = 2.0 * inertia * float(rate[off].mean())
-    moments = np.zeros((2, len(pairing.on)))
-    for place, (i, partners) in enumerate(zip(pairing.on, pairing.partners, strict=True)):
-        half_time = LN2 / rate[i] if rate[i] != 0.0 else np.inf
-        rate_off = float(rate[partners].mean())
-        half_time_off = LN2 / rate_off if rate_off != 0.0 else np.inf
-        frequency_off = float(np.sqrt(np.mean(frequency[partners] ** 2)))
-        change = float(frequency[i]) ** 2 - frequency_off**2
-        n_beta = -(4.0 * np.pi**2 * change + LN2**2 * (1.0 / half_time**2 - 1.0 / half_time_off**2))
-        moments[:, place] = n_beta * inertia, -2.0 * LN2 * (1.0 / half_time - 1.0 / half_time_off) * inertia
-    return np.concatenate(([inertia, damping], moments[0], moments[1]))
+    def outcome(self, frequency: Array, rate: Array, *, with_line: bool) -> Array:
+        # Izz and Cr, then Ka of each paired run, then Ca of each: the quantities that are propagated.
+        off = self.off
+        omega = np.hypot(2.0 * np.pi * frequency[off], rate[off])
+        inertia = inertia_of_springs(self.stiffness[off], omega**2, with_line=with_line)
+        damping = 2.0 * inertia * float(rate[off].mean())
+        moments = np.zeros((2, len(self.on)))
+        for place, (i, partners) in enumerate(zip(self.on, self.partners, strict=True)):
+            half_time = LN2 / rate[i] if rate[i] != 0.0 else np.inf
+            rate_off = float(rate[partners].mean())
+            half_time_off = LN2 / rate_off if rate_off != 0.0 else np.inf
+            frequency_off = float(np.sqrt(np.mean(frequency[partners] ** 2)))
+            change = float(frequency[i]) ** 2 - frequency_off**2
+            n_beta = -(4.0 * np.pi**2 * change + LN2**2 * (1.0 / half_time**2 - 1.0 / half_time_off**2))
+            moments[:, place] = (
+                n_beta * inertia,
+                -2.0 * LN2 * (1.0 / half_time - 1.0 / half_time_off) * inertia,
+            )
+        return np.concatenate(([inertia, damping], moments[0], moments[1]))
 
 
 def _mean_std(values: Array) -> float:
@@ -110,7 +112,7 @@ def _filled(estimate: Estimate, pairing: _Pairing, seen: Sequence[PairedRun], ri
     assert inertia is not None
     frequency = np.array([one.frequency for one in seen])
     rate = np.array([one.rate for one in seen])
-    outcome = partial(_outcome, pairing, with_line=estimate.wind_off_intercept is not None)
+    outcome = partial(pairing.outcome, with_line=estimate.wind_off_intercept is not None)
     centre = outcome(frequency, rate)
     moved = []
     for one, unit in zip(seen, np.eye(len(seen)), strict=True):

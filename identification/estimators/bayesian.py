@@ -167,7 +167,24 @@ def posterior_of(
         axis = np.arange(-width, width + 0.5 * step, step, dtype=np.float64)
         decays = centre[:, None] + scale @ _points(axis)
         rows = None if forced is None else forced.over(centre, scale, axis)
-        likelihood, prior = _log_terms(thin, decays, knowledge, rows, forced is not None and forced.by_root)
+        by_root = forced is not None and forced.by_root
+        # Log-likelihood and log-prior at each (a, k), in slices that stay in the cache.
+        count = decays.shape[1]
+        likelihood, prior = np.empty(count), np.empty(count)
+        slice_size = max(1, 60_000 // thin.time.size)
+        for begin in range(0, count, slice_size):
+            part = slice(begin, begin + slice_size)
+            driven = None if rows is None else rows[part]
+            squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part], driven, by_root)
+            # Positive stiffness, and neither decay nor growth within a sample.
+            real = (decays[1, part] > 0.0) & (np.abs(decays[0, part]) * float(thin.time[-1]) < _STEEPEST)
+            squares = np.where(real & np.isfinite(squares), squares, np.inf)
+            total = knowledge.samples * squares + knowledge.within
+            if knowledge.variance is None:
+                likelihood[part] = -0.5 * knowledge.freedom * np.log(total)
+            else:
+                likelihood[part] = -0.5 * total / knowledge.variance
+        prior = np.where(np.isfinite(prior), prior, 0.0)
         shape = (axis.size, axis.size)
         if not np.isfinite(likelihood.max()):
             return None
@@ -195,28 +212,6 @@ def _spline(axis: Array, values: Array) -> RectBivariateSpline:
     # A spline overshoots where the prior cuts off the posterior; linear interpolation does not.
     degree = 1 if np.any(np.abs(np.diff(values, axis=0)) > -_FLOOR / 4.0) else 3
     return RectBivariateSpline(axis, axis, values, kx=degree, ky=degree)
-
-
-def _log_terms(
-    thin: Reading, decays: Array, knowledge: NoiseKnowledge, forced: Array | None, by_root: bool
-) -> tuple[Array, Array]:
-    # Log-likelihood and log-prior at each (a, k), in slices that stay in the cache.
-    count = decays.shape[1]
-    likelihood, prior = np.empty(count), np.empty(count)
-    slice_size = max(1, 60_000 // thin.time.size)
-    for begin in range(0, count, slice_size):
-        part = slice(begin, begin + slice_size)
-        driven = None if forced is None else forced[part]
-        squares, prior[part] = _squares_and_prior(thin, decays[0, part], decays[1, part], driven, by_root)
-        # Positive stiffness, and neither decay nor growth within a sample.
-        real = (decays[1, part] > 0.0) & (np.abs(decays[0, part]) * float(thin.time[-1]) < _STEEPEST)
-        squares = np.where(real & np.isfinite(squares), squares, np.inf)
-        total = knowledge.samples * squares + knowledge.within
-        if knowledge.variance is None:
-            likelihood[part] = -0.5 * knowledge.freedom * np.log(total)
-        else:
-            likelihood[part] = -0.5 * total / knowledge.variance
-    return likelihood, np.where(np.isfinite(prior), prior, 0.0)
 
 
 def _squares_and_prior(

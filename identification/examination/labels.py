@@ -33,6 +33,7 @@ from tunnel_sim.vocabulary.record import Array
 
 _CANDIDATES = 12  # runs that fit worst, each tried against all others
 _LEAST_RUNS = 2
+_SPRINGS = "spring_stiffness"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +85,11 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     if len(known) < _LEAST_RUNS:
         return ()
     labels = Labels.of(known)
-    for what, misfit, exchange in (
-        ("spring_stiffness", _of_springs, _springs_exchanged),
-        ("wind_speed", _of_winds, _winds_exchanged),
-    ):
-        stated, away = misfit(labels)
+    for what in (_SPRINGS, "wind_speed"):
+        stated, away = _misfit(labels, what)
         if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, REFUSAL_RATE))):
             continue
-        trials = [(places, misfit(other)[0]) for places, other in exchange(labels, away)]
+        trials = [(places, _misfit(other, what)[0]) for places, other in _exchanged(labels, away, what)]
         mended = []  # that agree, or agree better than what is stated by more than chance
         for places, found in trials:
             ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
@@ -121,7 +119,7 @@ def other_fits(swings: Sequence[Swing]) -> list[tuple[float, float | None]]:
     found = [_fitted(labels, labels.spring != spring) for spring in np.unique(labels.spring)]
     found.append(_fitted(labels, labels.spring > 0.0, common=True))
     for _, exchanged in _speeds_exchanged(labels):
-        if _of_springs(exchanged)[0].agrees:
+        if _misfit(exchanged, _SPRINGS)[0].agrees:
             found.append(_fitted(exchanged, labels.spring > 0.0))
     return [one for one in found if one is not None and one[0] > 0.0]
 
@@ -144,56 +142,55 @@ def _fitted(
     return float(solution[0]), float(solution[1]) if windy else None
 
 
-def _of_springs(labels: Labels) -> tuple[_Misfit, Array]:
-    """Misfit of Kr = Izz k + C ½ρV² to all runs, weighted by their frequencies and the springs' tolerance.
+def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
+    """Misfit of all runs, and how far each is off.
 
-    The runs of one spring share its error, so they count once together.
+    Of stated springs: of Kr = Izz k + C ½ρV², weighted by the frequencies and the springs' tolerance. The runs of
+    one spring share its error, so they count once together. Of stated wind speeds: of k = k0(spring) - c ½ρV².
     """
-    columns = labels.seen[:, None]
-    if np.any(labels.pressure > 0.0):
-        columns = np.column_stack((columns, labels.pressure))
     springs, place, count = np.unique(labels.spring, return_inverse=True, return_counts=True)
-    std = labels.spring * np.hypot(SPRING_TOLERANCE, labels.std / labels.seen) * np.sqrt(count[place])
-    away = _left(columns / std[:, None], labels.spring / std)
-    return _Misfit(float(away @ away), springs.size - 1), np.abs(away)
-
-
-def _of_winds(labels: Labels) -> tuple[_Misfit, Array]:
-    """Misfit of k = k0(spring) - c ½ρV² to all runs."""
-    springs, place = np.unique(labels.spring, return_inverse=True)
-    columns = np.zeros((labels.seen.size, springs.size + 1))
-    columns[np.arange(labels.seen.size), place] = 1.0
-    columns[:, -1] = labels.pressure
-    freedom = labels.seen.size - int(np.linalg.matrix_rank(columns / np.maximum(columns.max(axis=0), 1e-300)))
-    away = _left(columns / labels.std[:, None], labels.seen / labels.std)
+    if what == _SPRINGS:
+        columns, target = labels.seen[:, None], labels.spring
+        if np.any(labels.pressure > 0.0):
+            columns = np.column_stack((columns, labels.pressure))
+        std = labels.spring * np.hypot(SPRING_TOLERANCE, labels.std / labels.seen) * np.sqrt(count[place])
+        freedom = springs.size - 1
+    else:
+        columns, target, std = np.zeros((labels.seen.size, springs.size + 1)), labels.seen, labels.std
+        columns[np.arange(labels.seen.size), place] = 1.0
+        columns[:, -1] = labels.pressure
+        rank = np.linalg.matrix_rank(columns / np.maximum(columns.max(axis=0), 1e-300))
+        freedom = labels.seen.size - int(rank)
+    columns, target = columns / std[:, None], target / std
+    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    solution = np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0]
+    away = np.asarray(target - columns / scale @ solution)
     return _Misfit(float(away @ away), freedom), np.abs(away)
 
 
-def _left(columns: Array, target: Array) -> Array:
-    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    solution = np.linalg.lstsq(columns / scale, target, rcond=1e-10)[0]
-    return np.asarray(target - columns / scale @ solution)
-
-
-def _springs_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int, ...], Labels]]:
-    """The springs of two runs exchanged, and those of all runs of two springs."""
-    for i, j in _pairs(away):
-        if labels.spring[i] != labels.spring[j]:
-            yield (i, j), replace(labels, spring=_swapped(labels.spring, i, j))
+def _exchanged(labels: Labels, away: Array, what: str) -> Iterator[tuple[tuple[int, ...], Labels]]:
+    """The statements of two runs, one of which fits badly, exchanged, and those of all runs of two settings."""
+    worst: NDArray[np.intp] = np.argsort(-away)[:_CANDIDATES]
+    pairs = sorted({(min(i, j), max(i, j)) for i in worst.tolist() for j in range(away.size) if i != j})
+    values = labels.spring if what == _SPRINGS else labels.pressure
+    for i, j in pairs:
+        low, high = sorted((values[i], values[j]))
+        if high - low > (0.0 if what == _SPRINGS else SAME_PRESSURE * high):
+            other = values.copy()
+            other[[i, j]] = other[[j, i]]
+            yield (
+                (i, j),
+                replace(labels, spring=other) if what == _SPRINGS else replace(labels, pressure=other),
+            )
+    if what != _SPRINGS:
+        yield from _speeds_exchanged(labels)
+        return
     for a, b in itertools.combinations(np.unique(labels.spring).tolist(), 2):
         places = np.flatnonzero((labels.spring == a) | (labels.spring == b))
         if places.size > 2:
             other = labels.spring.copy()
             other[places] = a + b - other[places]
             yield tuple(places.tolist()), replace(labels, spring=other)
-
-
-def _winds_exchanged(labels: Labels, away: Array) -> Iterator[tuple[tuple[int, ...], Labels]]:
-    for i, j in _pairs(away):
-        low, high = sorted((labels.pressure[i], labels.pressure[j]))
-        if high - low > SAME_PRESSURE * high:
-            yield (i, j), replace(labels, pressure=_swapped(labels.pressure, i, j))
-    yield from _speeds_exchanged(labels)
 
 
 def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]]:
@@ -207,18 +204,6 @@ def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]
         other = labels.pressure.copy()
         other[one], other[two] = other[two].mean(), other[one].mean()
         yield tuple(np.sort(np.concatenate([one, two])).tolist()), replace(labels, pressure=other)
-
-
-def _pairs(away: Array) -> list[tuple[int, int]]:
-    """Pairs of runs, one of which fits badly."""
-    worst: NDArray[np.intp] = np.argsort(-away)[:_CANDIDATES]
-    return sorted({(min(i, j), max(i, j)) for i in worst.tolist() for j in range(away.size) if i != j})
-
-
-def _swapped(values: Array, i: int, j: int) -> Array:
-    other = values.copy()
-    other[[i, j]] = other[[j, i]]
-    return other
 
 
 _LEAST = 3  # springs needed to say which one is wrong

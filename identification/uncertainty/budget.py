@@ -242,7 +242,22 @@ def make_budget(
     places = [budget.names.index(name) for name in estimate.parameters]
     covariance[np.ix_(places, places)] = estimate.covariance_matrix
     noise = Component("noise of the readings", "A", covariance)
-    common = _common(budget, inputs, any(run.wind_on for run in campaign.runs))
+    # an error common to all runs scales the coefficients in closed form, whatever the method
+    given = tuple(name for name in _POWERS if inputs.common.get(name, 0.0) > 0.0)
+    columns = [_NAMES.index(name) for name in budget.names]
+    moves = np.array(
+        [budget.values * np.array(_POWERS[name])[columns] * inputs.common[name] for name in given]
+    ).reshape(len(given), len(budget.names))
+    notes = {"yaw_inertia": "the nominal inertia is not used"}
+    if not any(run.wind_on for run in campaign.runs):
+        notes |= dict.fromkeys(("wind_speed", "air_density"), "no wind-on run")
+    common = [
+        Component(f"{name}, common", "B", np.outer(move, move), notes.get(name, ""))
+        for name, move in zip(given, moves, strict=True)
+    ]
+    correlation = inputs.correlation(given) - np.eye(len(given))
+    if np.any(correlation != 0.0):
+        common.append(Component("correlations of these", "B", moves.T @ correlation @ moves))
     individual = _individual(campaign, budget, identify, inputs, progress)
     scatter = []  # of the wind-off and the wind-on runs, as far as the components above do not explain it
     sides = side_scatter(campaign, estimate.runs, inputs.individual)
@@ -273,26 +288,6 @@ def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
         name: replace(getattr(estimate, name), std=budget.std(name)) for name in budget.names
     }
     return replace(estimate, covariance=tuple(map(tuple, total.tolist())), **quantities)
-
-
-def _common(budget: Budget, inputs: InputUncertainties, windy: bool) -> list[Component]:
-    """An error common to all runs scales the coefficients in closed form, whatever the method."""
-    given = tuple(name for name in _POWERS if inputs.common.get(name, 0.0) > 0.0)
-    columns = [_NAMES.index(name) for name in budget.names]
-    moves = np.array(
-        [budget.values * np.array(_POWERS[name])[columns] * inputs.common[name] for name in given]
-    ).reshape(len(given), len(budget.names))
-    notes = {"yaw_inertia": "the nominal inertia is not used"}
-    if not windy:
-        notes |= dict.fromkeys(("wind_speed", "air_density"), "no wind-on run")
-    found = [
-        Component(f"{name}, common", "B", np.outer(move, move), notes.get(name, ""))
-        for name, move in zip(given, moves, strict=True)
-    ]
-    correlation = inputs.correlation(given) - np.eye(len(given))
-    if np.any(correlation != 0.0):
-        found.append(Component("correlations of these", "B", moves.T @ correlation @ moves))
-    return found
 
 
 def _individual(

@@ -192,9 +192,24 @@ def propose_drive(
 
     def score(drive: DriveTable) -> float:
         key = drive.model_dump_json()
-        if key not in tried:
-            tried[key] = _score(driven_plan(coarse, drive, length), drive, rig, limits, goal)
-            progress()
+        if key in tried:
+            return tried[key]
+        unit = driven_plan(coarse, drive, length)
+        try:
+            check_drive(drive, unit.samples, unit.sample_rate, unit.name)
+        except TunnelError:
+            tried[key] = inf
+        else:
+            driven = plan_from(unit, rig, unit.name)
+            bound = plan_bound(driven, rig)
+            amplitude = min(limits.moment, limits.angle / _peak_between_samples(driven, drive, rig))
+            if goal == "cn_r":
+                tried[key] = log(bound.std("cn_r")) - log(amplitude)
+            else:  # the geometric mean of both standard deviations
+                places = [bound.parameters.index(name) for name in ("cn_beta", "cn_r")]
+                volume = float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1])
+                tried[key] = 0.25 * volume - log(amplitude)
+        progress()
         return tried[key]
 
     outer = (resonances[0], resonances[-1])
@@ -256,22 +271,6 @@ def _table(kind: str, **keys: float | list[float]) -> DriveTable:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{_DIGITS + 1}g}")
-
-
-def _score(unit: PlanDocument, drive: DriveTable, rig: Rig, limits: Limits, goal: Goal) -> float:
-    """Logarithm of Cnr's standard deviation or of the geometric mean of both; infinite for a refused input."""
-    try:
-        check_drive(drive, unit.samples, unit.sample_rate, unit.name)
-    except TunnelError:
-        return inf
-    plan = plan_from(unit, rig, unit.name)
-    bound = plan_bound(plan, rig)
-    amplitude = min(limits.moment, limits.angle / _peak_between_samples(plan, drive, rig))
-    if goal == "cn_r":
-        return log(bound.std("cn_r")) - log(amplitude)
-    places = [bound.parameters.index(name) for name in ("cn_beta", "cn_r")]
-    volume = float(np.linalg.slogdet(np.array(bound.covariance)[np.ix_(places, places)])[1])
-    return 0.25 * volume - log(amplitude)
 
 
 def _peak_between_samples(plan: CampaignPlan, drive: DriveTable, rig: Rig) -> float:

@@ -36,7 +36,7 @@ from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-from tunnel_sim.vocabulary.plan import Condition, SensorModel, Truth
+from tunnel_sim.vocabulary.plan import SensorModel, Truth
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -193,7 +193,22 @@ class CampaignSession:
         rng = self._rng.spawn(1)[0]
         condition = choice.condition(f"r{len(known.choices):02d}", conditions.rig.air.density)
         if conditions.linear:
-            return self._linear(known, choice, condition, rng)
+            # by the closed form of the linear model; the belief is updated to first order
+            zero = truth.sensor_zero
+            link, time = conditions.link(choice), conditions.sample_times(choice.duration)
+            decay = Decay(*map(float, link @ shared_parameters(truth.values)))
+            if decay.stiffness <= 0.0 or decay.rate <= 0.0:
+                return replace(known, status="lost: the motion grows without bound")
+            motion = free_decay(time, decay, choice.release_angle, 0.0)
+            noise = conditions.noise_std * rng.standard_normal(time.size)
+            run = stated_run(condition, Record(time, motion + zero + noise))
+            known = replace(known, runs=(*known.runs, run))
+            learnt = linear_run(link, time, decay, choice.release_angle, zero, noise)
+            if learnt is None or not shows_a_decay(motion, conditions.noise_std):
+                return replace(known, status="no information: no oscillation exceeds the noise")
+            runs = (*known.learnt, learnt)
+            belief = linear_belief(known.prior, runs, conditions.noise_std)
+            return replace(known, learnt=runs, beliefs=(*known.beliefs, belief))
         settings = run_settings(truth.coefficients, condition)
         sensor = replace(conditions.sensor, zero=truth.sensor_zero)
         try:
@@ -219,26 +234,6 @@ class CampaignSession:
             return replace(known, study=investigate(known.campaign, kinds))
         except TunnelError as error:
             return replace(known, status=f"not diagnosed: {error.what}")
-
-    def _linear(
-        self, known: Knowledge, choice: Choice, condition: Condition, rng: np.random.Generator
-    ) -> Knowledge:
-        """Make a run by the closed form of the linear model, and update the belief to first order."""
-        conditions, zero = self._conditions, self.truth.sensor_zero
-        link, time = conditions.link(choice), conditions.sample_times(choice.duration)
-        decay = Decay(*map(float, link @ shared_parameters(self.truth.values)))
-        if decay.stiffness <= 0.0 or decay.rate <= 0.0:
-            return replace(known, status="lost: the motion grows without bound")
-        motion = free_decay(time, decay, choice.release_angle, 0.0)
-        noise = conditions.noise_std * rng.standard_normal(time.size)
-        run = stated_run(condition, Record(time, motion + zero + noise))
-        known = replace(known, runs=(*known.runs, run))
-        learnt = linear_run(link, time, decay, choice.release_angle, zero, noise)
-        if learnt is None or not shows_a_decay(motion, conditions.noise_std):
-            return replace(known, status="no information: no oscillation exceeds the noise")
-        runs = (*known.learnt, learnt)
-        belief = linear_belief(known.prior, runs, conditions.noise_std)
-        return replace(known, learnt=runs, beliefs=(*known.beliefs, belief))
 
 
 def answers(effects: Sequence[str]) -> tuple[str, ...]:

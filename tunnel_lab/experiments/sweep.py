@@ -15,6 +15,7 @@ import os
 import platform
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from importlib.metadata import version
@@ -274,19 +275,17 @@ class Store:
 
     def finished(self) -> list[int]:
         """Shards whose parts exist and match their checksums, in ascending order."""
-        return [index for index in range(self.sweep.shards) if self._is_whole(index)]
-
-    def _is_whole(self, index: int) -> bool:
-        checksum = self._file(CHECKSUMS, index)
-        if not checksum.exists():
-            return False
         kept = (RESULTS, RECORDS) if self.sweep.document.records else (RESULTS,)
-        try:
-            known = read_regular(checksum, limits.DOCUMENT_BYTES)
-            parts = {name: read_regular(self._file(name, index), limits.DATA_BYTES) for name in kept}
-        except TunnelError:
-            return False
-        return known == "".join(self._line(name, index, part) for name, part in parts.items()).encode()
+        found = []
+        for index in range(self.sweep.shards):
+            checksum = self._file(CHECKSUMS, index)
+            if checksum.exists():
+                with suppress(TunnelError):
+                    known = read_regular(checksum, limits.DOCUMENT_BYTES)
+                    parts = {name: read_regular(self._file(name, index), limits.DATA_BYTES) for name in kept}
+                    lines = (self._line(name, index, part) for name, part in parts.items())
+                    found += [index] if known == "".join(lines).encode() else []
+        return found
 
     def _file(self, dataset: str, index: int) -> Path:
         width = max(5, len(str(self.sweep.shards - 1)))

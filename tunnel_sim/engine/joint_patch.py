@@ -205,8 +205,20 @@ def _write_spring(
     total = own(np.polynomial.Polynomial([offset, 1.0])) + np.polynomial.Polynomial(patch.spring)
     total -= (1.0 - weight) * own(offset)  # the spring carries the weight
     total = total.trim(1e-12 * float(np.max(np.abs(total.coef))))
-    if not total.degree():  # a moment that does not depend on the position
-        _write_constant(spec, model, -float(total.coef[0]))
+    if not total.degree():
+        moment, own_actuator = -float(total.coef[0]), model.law.actuator
+        if moment == 0.0:
+            return
+        # a constant moment is the bias of the actuator that drives the joint, or of one that is added
+        if own_actuator is None:
+            name, kind = f"{model.joint}_moment", mujoco.mjtTrn.mjTRN_JOINT
+            actuator = spec.add_actuator(name=name, trntype=kind, target=model.joint)
+            actuator.gainprm[0] = 0.0
+        else:
+            actuator = spec.actuators[own_actuator.index]
+        if actuator.biastype == mujoco.mjtBias.mjBIAS_NONE:
+            actuator.biastype, actuator.biasprm[:] = mujoco.mjtBias.mjBIAS_AFFINE, 0.0
+        actuator.biasprm[0] += moment / actuator.gear[0]
         return
     roots = total.roots()
     real = roots.real[np.abs(roots.imag) < 1e-6]
@@ -222,45 +234,25 @@ def _write_spring(
     joint.springref = math.degrees(place) if spec.compiler.degree and not model.law.slide else place
 
 
-def _write_constant(spec: mujoco.MjSpec, model: JointModel, moment: float) -> None:
-    """A constant moment (N m) as the bias of the actuator that drives the joint, or of one that is added."""
-    if moment == 0.0:
-        return
-    own = model.law.actuator
-    if own is None:
-        name, kind = f"{model.joint}_moment", mujoco.mjtTrn.mjTRN_JOINT
-        actuator = spec.add_actuator(name=name, trntype=kind, target=model.joint)
-        actuator.gainprm[0] = 0.0
-    else:
-        actuator = spec.actuators[own.index]
-    if actuator.biastype == mujoco.mjtBias.mjBIAS_NONE:
-        actuator.biastype, actuator.biasprm[:] = mujoco.mjtBias.mjBIAS_AFFINE, 0.0
-    actuator.biasprm[0] += moment / actuator.gear[0]
-
-
 def _attributes(model: mujoco.MjModel) -> dict[tuple[str, str], tuple[float, ...]]:
     """What may be written into a model, by name and unit."""
     moving = [i for i in range(model.nbody) if model.body_weldid[i]]
     spring = model.jnt_stiffness[0], *model.jnt_stiffnesspoly[0]
     damping = model.dof_damping[0], *model.dof_dampingpoly[0]
+    affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
+    constant = np.sum(model.actuator_gear[affine, 0] * model.actuator_biasprm[affine, 0])
     found = {
         ("joint armature", "kg m2"): [model.dof_armature[0]],
         ("joint stiffness", "N m/rad, /rad2, /rad3"): spring,
         ("joint springref", "rad"): [model.qpos_spring[0]],
         ("joint damping", "N m s/rad, s2/rad2, s3/rad3"): damping,
         ("joint frictionloss", "N m"): [model.dof_frictionloss[0]],
-        ("actuator moment without control", "N m"): [_unbidden(model)],
+        ("actuator moment without control", "N m"): [constant],
         **{(f"body {model.body(i).name or i} mass", "kg"): [model.body_mass[i]] for i in moving},
         ("sensor noise", "rad"): [np.max(model.sensor_noise, initial=0.0)],
         ("plugin vwt.yaw_moment", "1"): [model.nplugin],
     }
     return {name: tuple(map(float, values)) for name, values in found.items()}
-
-
-def _unbidden(model: mujoco.MjModel) -> float:
-    """The constant part of the actuators' moments, N m."""
-    affine = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    return float(np.sum(model.actuator_gear[affine, 0] * model.actuator_biasprm[affine, 0]))
 
 
 def simulate_joint(

@@ -80,7 +80,13 @@ class RigView:
         mujoco.mj_forward(self._model, self._data)
         if self._mode == "human":
             if self._window is None:
-                self._window = _open_window(self._model, self._data)
+                if not _has_display():
+                    remedy = "use render_mode='rgb_array'"
+                    raise EnvError("there is no display", where="render_mode human", remedy=remedy)
+                from mujoco import viewer  # imported here because it needs the libraries of a display
+
+                sides = {"show_left_ui": False, "show_right_ui": False}
+                self._window = viewer.launch_passive(self._model, self._data, **sides)
                 self._shown = time.monotonic()
             self._window.sync()
             wait = self._period - (time.monotonic() - self._shown)  # real time
@@ -110,14 +116,6 @@ def _has_display() -> bool:
     return not sys.platform.startswith("linux") or bool(
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )
-
-
-def _open_window(model: Any, data: Any) -> Any:
-    if not _has_display():
-        raise EnvError("there is no display", where="render_mode human", remedy="use render_mode='rgb_array'")
-    from mujoco import viewer  # imported here because it needs the libraries of a display
-
-    return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
 
 
 class _Canvas:
