@@ -11,8 +11,7 @@ from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
 from tunnel_reference.inputs import draw_inputs
-from tunnel_reference.outside import OUTSIDE_FORMS
-from tunnel_reference.outside_laws import LAW_FORMS
+from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 
 _TIME_SCALE = 30.0  # periods from 1/30 of the standard rig's to 30 times as long
 _MOMENT_SCALE = 100.0

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tunnel_reference import air_moments as m
-from tunnel_reference.air_moments import turbulence, wandering_vortex
+from tunnel_reference import moments as m
 from tunnel_reference.catalogue import (
     Draw,
     Extra,
@@ -19,6 +18,7 @@ from tunnel_reference.catalogue import (
 )
 from tunnel_reference.conditions import WIDTH, Array, Conditions
 from tunnel_reference.integrator import Phase
+from tunnel_reference.moments import turbulence, wandering_vortex
 
 T, C, R = Group.TEXTBOOK, Group.COMMON, Group.RARE
 _BOTH = (-1, 1)

@@ -44,7 +44,25 @@ def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True
         driven = rng.random(c.runs) >= _FREE
         driven[rng.permutation(c.runs)[:2]] = True, False
     own = np.sqrt((c.true_stiffness - c.air_stiffness) / c.yaw_inertia) / (2.0 * np.pi)
-    waves = [_waveform(rng, c, float(frequency)) for frequency in own]
+    time, waves = np.arange(c.samples) / c.sample_rate, []
+    for frequency in own.tolist():  # about it, and of about unit size
+        form = WAVEFORMS[int(rng.integers(len(WAVEFORMS)))]
+        low, high = _BAND[0] * frequency, _BAND[1] * frequency
+        if form == "square":
+            turns = 2.0 * np.pi * frequency * rng.uniform(0.3, 1.2) * time
+            wave = np.sign(np.sin(turns + rng.uniform(0.0, 6.0)))
+        elif form == "chirp":
+            begin, end = (low, high) if rng.random() < 0.5 else (high, low)
+            wave = np.sin(2.0 * np.pi * time * (begin + 0.5 * (end - begin) * time / c.duration))
+        else:
+            lines = np.arange(np.ceil(low * c.duration), np.floor(high * c.duration) + 1.0)
+            phase = rng.uniform(0.0, 2.0 * np.pi, lines.size)
+            size = np.ones(lines.size) if form == "multisine" else np.abs(rng.standard_normal(lines.size))
+            wave = np.zeros(c.samples)
+            for line, angle, weight in zip(lines, phase, size, strict=True):
+                wave += weight * np.cos(2.0 * np.pi * line / c.duration * time + angle)
+            wave = wave / np.sqrt(lines.size)
+        waves.append(np.asarray(wave))
     held = np.full(c.runs, rng.random() < 0.5)
     peak = np.where(driven, c.release_angle * rng.uniform(0.5, 1.0, c.runs), 0.0)
     unit = Input(column, np.stack(waves, axis=1), held, peak, gain, bool(rng.random() < 0.5))
@@ -57,25 +75,6 @@ def draw_inputs(rng: np.random.Generator, c: Conditions, *, by_root: bool = True
         start_angle=np.where(driven, start, c.start_angle),
         start_rate=2.0 * np.pi * own * peak * rng.uniform(-0.3, 0.3, c.runs),
     )
-
-
-def _waveform(rng: np.random.Generator, c: Conditions, frequency: float) -> Array:
-    """One input about a frequency in Hz, of about unit size, shape (samples,)."""
-    kind = WAVEFORMS[int(rng.integers(len(WAVEFORMS)))]
-    time = np.arange(c.samples) / c.sample_rate
-    low, high = _BAND[0] * frequency, _BAND[1] * frequency
-    if kind == "square":
-        return np.sign(np.sin(2.0 * np.pi * frequency * rng.uniform(0.3, 1.2) * time + rng.uniform(0.0, 6.0)))
-    if kind == "chirp":
-        start, end = (low, high) if rng.random() < 0.5 else (high, low)
-        return np.asarray(np.sin(2.0 * np.pi * time * (start + 0.5 * (end - start) * time / c.duration)))
-    lines = np.arange(np.ceil(low * c.duration), np.floor(high * c.duration) + 1.0)
-    phase = rng.uniform(0.0, 2.0 * np.pi, lines.size)
-    size = np.ones(lines.size) if kind == "multisine" else np.abs(rng.standard_normal(lines.size))
-    wave = np.zeros(c.samples)
-    for line, angle, weight in zip(lines, phase, size, strict=True):
-        wave += weight * np.cos(2.0 * np.pi * line / c.duration * time + angle)
-    return np.asarray(wave / np.sqrt(lines.size))
 
 
 def linear_response(c: Conditions, parameters: Array) -> Array:

@@ -48,19 +48,22 @@ def draw_set(count: int, seed: int, shares: dict[str, float], mixture: Mixture) 
     order_seed, *seeds = root.spawn(count + 1)
     order = np.random.default_rng(order_seed)
     kinds = plan_kinds(count, shares)
-    firsts: dict[str, list[str]] = {}  # families in random order; their frequencies differ by at most one
-    for kind in NUMBERS:
-        if kind != "none":
-            number, families = kinds.count(kind), np.array(mixture.families)
-            rounds = -(-number // len(families))
-            names = [str(name) for _ in range(rounds) for name in order.permutation(families)]
-            firsts[kind] = names[:number]
+    firsts = {
+        kind: _in_turn(order, kinds.count(kind), mixture.families) for kind in NUMBERS if kind != "none"
+    }
     draws = []
     for kind, child in zip(kinds, seeds, strict=True):
         rng = np.random.default_rng(child)
         families = (firsts[kind].pop(),) if kind in firsts else ()
         draws.append(draw_campaign(rng, kind=kind, mixture=mixture, families=families))
     return [draws[i] for i in order.permutation(count)]
+
+
+def _in_turn(rng: np.random.Generator, number: int, families: Sequence[str]) -> list[str]:
+    """Families in random order; their frequencies differ by at most one."""
+    rounds = -(-number // len(families))
+    names = [str(name) for _ in range(rounds) for name in rng.permutation(np.array(families))]
+    return names[:number]
 
 
 def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[Simulated]:

@@ -1,15 +1,15 @@
-"""The mechanical laws: friction, damping, springs and gravity.
+"""The laws of mechanics (friction, damping, springs, gravity), of the air and of forcing.
 
 Moments are in N m on the right-hand side of Izz β̈ = …; ``rows`` are the runs that a law applies to, ``p`` its
-parameters by run. They act on the rod's upper end (θ); gravity acts on the body (β). The θ of springs and
-of their loss is the deflection, which differs from it where the root of the spring moves.
+parameters by run. Those of the rig act on the rod's upper end (θ); gravity and the air act on the body (β). The θ
+of springs and of their loss is the deflection, which differs from it where the root of the spring moves.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from tunnel_reference.conditions import Array
+from tunnel_reference.conditions import WIDTH, Array, Conditions
 from tunnel_reference.integrator import Params, Rows, Stage
 
 # ---- friction: a law only gives the level; the integrator handles its sign and sticking
@@ -159,3 +159,174 @@ def moving_mass(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
     rate = p["share"] * p["inertia"] * np.pi * p["frequency"] * np.sin(2.0 * arg)
     s.top[rows] = (s.top[rows] - rate * s.omega[rows]) / growth
     s.body[rows] /= growth
+
+
+# ---- the air and forcing: speed, angle and moments on the body, and random moments in time
+
+RATE = 1000.0
+
+
+def _length(conditions: Conditions) -> int:
+    """Number of points in a series that covers a run."""
+    return round(conditions.duration * RATE) + 2
+
+
+def turbulence(kind: str, conditions: Conditions, *, seed: int, scale: float) -> Array:
+    """Series of unit variance for every run (zero with the wind off), shape (runs, n).
+
+    Args:
+        kind: ``band`` (flat up to ``scale`` Hz), ``dryden`` or ``von_karman`` (integral length ``scale`` m),
+            ``octave`` (a band of one octave about ``scale`` Hz).
+        conditions: speeds and duration.
+        scale: Hz or m, depending on ``kind``.
+    """
+    n = 2 ** int(np.ceil(np.log2(_length(conditions))))
+    frequency = np.fft.rfftfreq(n, 1.0 / RATE)
+    rng = np.random.default_rng(seed)
+    out = np.zeros((conditions.runs, n))
+    for run in np.flatnonzero(conditions.wind_on):
+        reduced = frequency * scale / conditions.wind_speed[run]
+        if kind == "band":
+            power = (frequency < scale).astype(np.float64)
+        elif kind == "octave":
+            power = ((frequency > scale / 1.414) & (frequency < scale * 1.414)).astype(np.float64)
+        elif kind == "dryden":
+            power = 1.0 / (1.0 + (2.0 * np.pi * reduced) ** 2)
+        else:
+            power = 1.0 / (1.0 + 70.8 * reduced**2) ** (5.0 / 6.0)
+        spectrum = np.sqrt(power) * (rng.standard_normal(power.size) + 1j * rng.standard_normal(power.size))
+        spectrum[0] = 0.0
+        series = np.fft.irfft(spectrum, n)
+        out[run] = series / (np.sqrt(2.0 * np.sum(power[1:]) * 2.0) / n)
+    return out[:, : _length(conditions)]
+
+
+def wandering_vortex(conditions: Conditions, *, seed: int, strouhal: float, wander: float) -> Array:
+    """The sine of a phase that advances at St V/width, with a random walk of ``wander`` rad/√s; shape (runs, n)."""
+    rng = np.random.default_rng(seed)
+    n = _length(conditions)
+    frequency = strouhal * conditions.true_speed[:, None] / WIDTH
+    walk = np.cumsum(rng.standard_normal((conditions.runs, n)), axis=1) * wander / np.sqrt(RATE)
+    start = rng.uniform(0.0, 2.0 * np.pi, (conditions.runs, 1))
+    wave = np.sin(2.0 * np.pi * frequency * np.arange(n) / RATE + start + walk)
+    return np.asarray(wave * conditions.wind_on[:, None])
+
+
+def speed_drift(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """V(t)/V = 1 + d g(t), g rising from 0 to 1 over the run as t^n/T^n."""
+    s.speed_ratio[rows] *= 1.0 + p["drift"] * np.minimum(s.time / p["span"], 1.0) ** p["exponent"]
+
+
+def speed_settling(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """V(t)/V = 1 + d (1 − e^(−t/τ))/(1 − e^(−T/τ))."""
+    rise = (1.0 - np.exp(-s.time / p["time"])) / (1.0 - np.exp(-p["span"] / p["time"]))
+    s.speed_ratio[rows] *= 1.0 + p["drift"] * rise
+
+
+def gust(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """V(t)/V = 1 + g exp(−((t − t0)/w)²): one slow gust, in the runs where g is not zero."""
+    s.speed_ratio[rows] *= 1.0 + p["size"] * np.exp(-(((s.time - p["when"]) / p["width"]) ** 2))
+
+
+def lag(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+    """Ka acts on (1 − w1 − w2) β + w1 x1 + w2 x2 with τi ẋi = β − xi."""
+    beta = s.beta[rows]
+    deficiency = p["w1"] * (beta - x[0]) + p["w2"] * (beta - x[1])
+    s.air_angle[rows] -= deficiency
+    dx[0] = (beta - x[0]) / p["tau1"]
+    dx[1] = (beta - x[1]) / p["tau2"]
+
+
+def lag_one(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+    """Ka acts on β − w (β − x) with τ ẋ = β − x; w = 1 is a lag, w = −1 a lead with the same time constant."""
+    gap = s.beta[rows] - x[0]
+    s.air_angle[rows] -= p["w1"] * gap
+    dx[0] = gap / p["tau1"]
+
+
+def lag_cascade(s: Stage, rows: Rows, p: Params, x: Array, dx: Array) -> None:
+    """Ka acts on x2 with τ/2 ẋ1 = β − x1, τ/2 ẋ2 = x1 − x2: two lags in series."""
+    beta = s.beta[rows]
+    s.air_angle[rows] += x[1] - beta
+    dx[0] = 2.0 * (beta - x[0]) / p["tau1"]
+    dx[1] = 2.0 * (x[0] - x[1]) / p["tau1"]
+
+
+def _pressure_stiffness(s: Stage, rows: Rows) -> Array:
+    """Ka at the present speed."""
+    return s.air_stiffness[rows] * s.speed_ratio[rows] ** 2
+
+
+def cubic_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Adds Ka (κ β³ + q β⁵)."""
+    a = s.air_angle[rows]
+    s.body[rows] += _pressure_stiffness(s, rows) * a**3 * (p["kappa"] + p["quintic"] * a * a)
+
+
+def saturating_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka β/(1 + k|β|) instead of Ka β; for k < 0 the moment grows faster than linearly."""
+    a = s.air_angle[rows]
+    s.body[rows] += _pressure_stiffness(s, rows) * (a / (1.0 + p["k"] * np.abs(a)) - a)
+
+
+def sine_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka sin(kβ)/k instead of Ka β, k = √(6|κ|)."""
+    a = s.air_angle[rows]
+    k = np.sqrt(6.0 * np.abs(p["kappa"]))
+    s.body[rows] += _pressure_stiffness(s, rows) * (np.sin(k * a) / k - a)
+
+
+def tangent_air(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Ka arctan(kβ)/k instead of Ka β, k = √(3|κ|); for κ > 0 mirrored: 2β − arctan(kβ)/k."""
+    a = s.air_angle[rows]
+    k = np.sqrt(3.0 * np.abs(p["kappa"]))
+    s.body[rows] += np.sign(p["kappa"]) * _pressure_stiffness(s, rows) * (a - np.arctan(k * a) / k)
+
+
+def nonlinear_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Adds Ca μ β² β̇."""
+    s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * p["mu"] * s.beta[rows] ** 2 * s.rate[rows]
+
+
+def absolute_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Adds Ca m |β| β̇."""
+    s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * p["mu"] * np.abs(s.beta[rows]) * s.rate[rows]
+
+
+def saturating_air_damping(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """Adds Ca μ β²/(1 + (β/b)²) β̇."""
+    square = s.beta[rows] ** 2
+    shape = p["mu"] * square / (1.0 + square / p["bend"] ** 2)
+    s.body[rows] += s.speed_ratio[rows] * s.air_damping[rows] * shape * s.rate[rows]
+
+
+def steady_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """A steady moment times (V(t)/V)²."""
+    s.body[rows] += p["moment"] * s.speed_ratio[rows] ** 2
+
+
+# ---- forcing
+
+
+def tabled_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """A moment given at 1 kHz, shape (runs, n), linear in between."""
+    table = p["table"]
+    place = s.time * RATE + 1e-9
+    k = int(place)
+    if k >= table.shape[1] - 1:
+        s.body[rows] += table[:, -1]
+        return
+    part = place - k
+    s.body[rows] += (1.0 - part) * table[:, k] + part * table[:, k + 1]
+
+
+def harmonic_moment(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """+M (sin(2πft + φ) + h sin(4πft + 2φ))."""
+    arg = 2.0 * np.pi * p["frequency"] * s.time + p["phase"]
+    s.body[rows] += p["moment"] * (np.sin(arg) + p["second"] * np.sin(2.0 * arg))
+
+
+def bump(s: Stage, rows: Rows, p: Params, _x: Array, _dx: Array) -> None:
+    """+J/(w√π) exp(−((t − t0)/w)²): a pulse of impulse J about t0."""
+    shape = np.exp(-(((s.time - p["when"]) / p["width"]) ** 2)) / (p["width"] * np.sqrt(np.pi))
+    s.body[rows] += p["impulse"] * shape

@@ -19,9 +19,8 @@ import numpy as np
 from tunnel_reference.catalogue import Bound
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.draw import CampaignDraw, redraw, with_defaults
-from tunnel_reference.driven_fit import fit_driven
 from tunnel_reference.integrator import Motion, Term, integrate
-from tunnel_reference.nominal_fit import fit_nominal
+from tunnel_reference.nominal_fit import fit_driven, fit_nominal
 from tunnel_reference.readings import ReadingTerm, read_motion
 
 PASSES = 6

@@ -247,11 +247,27 @@ def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
         (common - release @ solution[:, :-1]) @ directions
         for (common, release), solution in zip(fit.jacobian, solutions, strict=True)
     ]
-    causes = [] if misses_motion(fit) else _causes(fit, others, influence)
+    causes, residuals = [], np.concatenate(fit.residuals)
+    for kind in () if misses_motion(fit) else others:
+        with suppress(np.linalg.LinAlgError):
+            start = next(iter(starting_points(fit, kind)), None)  # the most promising one
+            cause = None if start is None else _cause(fit, start, influence)
+            # not every effect is linear in its size, so each is taken at about the size that its own step gives
+            for _ in range(_SECANTS):
+                if start is None or cause is None or start.scaled is None:
+                    break
+                size = float(cause.left @ residuals) / float(cause.left @ cause.left)
+                if not cause.least < size < cause.greatest or size <= 0.0 or abs(size - 1.0) < _SETTLED:
+                    break
+                common = start.point.common.copy()
+                common[start.scaled] *= size
+                start = replace(start, point=replace(start.point, common=common))
+                cause = _cause(fit, start, influence)
+            causes += [] if cause is None else [cause]
     if not causes:
         return replace(alone(fit), scatter=_scatter(fit, influence, fit.residuals))
     left = np.array([cause.left for cause in causes])
-    gram, score = left @ left.T, left @ np.concatenate(fit.residuals)
+    gram, score = left @ left.T, left @ residuals
     formal = _formal(fit, gradients)
     zero = np.zeros(formal.size)
     found = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
@@ -340,30 +356,6 @@ def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
     informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in names])
     parts = [residual @ own for residual, own in zip(residuals, influence, strict=True)]
     return scatter_of_runs(np.array(parts), informative_runs)
-
-
-def _causes(fit: Fit, kinds: Sequence[type[Effect]], influence: list[Array]) -> list[_Cause]:
-    """The effects that the runs can show, each from its most promising starting point.
-
-    Not every effect is linear in its size, so each is taken at about the size that its own step gives.
-    """
-    found, residuals = [], np.concatenate(fit.residuals)
-    for kind in kinds:
-        with suppress(np.linalg.LinAlgError):
-            start = next(iter(starting_points(fit, kind)), None)
-            cause = None if start is None else _cause(fit, start, influence)
-            for _ in range(_SECANTS):
-                if start is None or cause is None or start.scaled is None:
-                    break
-                size = float(cause.left @ residuals) / float(cause.left @ cause.left)
-                if not cause.least < size < cause.greatest or size <= 0.0 or abs(size - 1.0) < _SETTLED:
-                    break
-                common = start.point.common.copy()
-                common[start.scaled] *= size
-                start = replace(start, point=replace(start.point, common=common))
-                cause = _cause(fit, start, influence)
-            found += [] if cause is None else [cause]
-    return found
 
 
 def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | None:

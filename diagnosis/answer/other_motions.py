@@ -45,13 +45,33 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
     found = []
     for run in campaign.runs:
         frequency = starting_frequency(run.record) if run.drive is None else None
-        if frequency is not None:
-            reading = thinned_reading(evenly_spaced(run.record), frequency)
-            interval = float(reading.time[-1]) / (reading.time.size - 1)
-            parts = [reading.yaw[: int(part * min(reading.yaw.size, _MOST))] for part in _PARTS]
-            words = (_two_modes(run.id, part, interval) for part in parts if part.size >= _LEAST)
-            found.append(next(filter(None, words), ""))
-    return tuple(filter(None, found))
+        if frequency is None:
+            continue
+        reading = thinned_reading(evenly_spaced(run.record), frequency)
+        interval = float(reading.time[-1]) / (reading.time.size - 1)
+        parts = [reading.yaw[: int(part * min(reading.yaw.size, _MOST))] for part in _PARTS]
+        for values in (part for part in parts if part.size >= _LEAST):
+            hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
+            vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
+            one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
+            if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
+                continue
+            order = np.argsort(np.abs(two.frequency - one.frequency[0]))
+            resolution = float(two.rate.sum()) / np.pi
+            turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
+            if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
+                continue  # not resolved, or a harmonic of the motion
+            main, second = (
+                f"{two.amplitude[i]:.2g} rad at {two.frequency[i]:.3g} Hz, which decays at {two.rate[i]:.2g} 1/s"
+                for i in order
+            )
+            found.append(
+                f"{run.id} contains a second mode: {second}, beside {main}. With it, what one free decay leaves "
+                f"falls by {100.0 * (1.0 - two.left / one.left):.0f} %. A rig with one degree of freedom has one "
+                f"mode: look for another motion, such as heave or the mount's."
+            )
+            break
+    return tuple(found)
 
 
 def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _Modes | None:
@@ -68,28 +88,6 @@ def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _M
     residual = values - columns @ weights
     amplitude = np.hypot(weights[:count], weights[count : 2 * count])
     return _Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
-
-
-def _two_modes(name: str, values: Array, interval: float) -> str:
-    hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
-    vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
-    one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
-    if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
-        return ""
-    order = np.argsort(np.abs(two.frequency - one.frequency[0]))
-    resolution = float(two.rate.sum()) / np.pi
-    turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
-    if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
-        return ""  # not resolved, or a harmonic of the motion
-    main, second = (
-        f"{two.amplitude[i]:.2g} rad at {two.frequency[i]:.3g} Hz, which decays at {two.rate[i]:.2g} 1/s"
-        for i in order
-    )
-    return (
-        f"{name} contains a second mode: {second}, beside {main}. With it, what one free decay leaves falls by "
-        f"{100.0 * (1.0 - two.left / one.left):.0f} %. A rig with one degree of freedom has one mode: look for "
-        f"another motion, such as heave or the mount's."
-    )
 
 
 _NOTE = "no damping ratio and no derivative is stated, since no run is a free decay"

@@ -10,8 +10,7 @@ from scipy.special import chdtrc
 
 from diagnosis.closure import Move, Remainder, of_swing, rms_shown
 from diagnosis.likelihood.run_data import Data
-from diagnosis.noise.gap import gap_test
-from diagnosis.noise.rounding import rounding_errors
+from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
 from diagnosis.policy import FALSE_ALARM_RATE, FEW_RUNS, MATERIAL_SHARE, NOISE_CONTRADICTED
 from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
@@ -201,8 +200,8 @@ def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], exces
     if random is not None:  # in its wind it leaves innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if not run.wind_on]
-        left = np.concatenate([*random.process.innovations, *still])
-        p_value = float(chdtrc(left.size, left @ left))
+        both = np.concatenate([*random.process.innovations, *still])
+        p_value = float(chdtrc(both.size, both @ both))
     elif study.chosen is study.nominal:
         p_value = study.test.p_value
     else:  # no cause changes the tests of the noise itself: those of the residuals count
@@ -216,38 +215,28 @@ def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], exces
         # by its standard deviation, or by 1 %, where the runs determine it
         far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
         material += [name] if beyond_chance and far else []
-    words = _words(study, excess, stated, moves, material, beyond_chance=beyond_chance)
-    return Remainder(beyond_chance, excess, p_value, bool(material), moves, words)
-
-
-def _words(
-    study: Study,
-    excess: float,
-    stated: Estimates,
-    moves: Mapping[str, Move],
-    material: list[str],
-    *,
-    beyond_chance: bool,
-) -> str:
-    """What remains, in a sentence or two."""
-    if not study.causes:
-        return "No gap: nothing remains beyond the noise."
     left = f"what remains ({noise_powers(excess)})" if study.named else "it"
-    if not beyond_chance:
-        return f"Explained; {left} is within the noise."
-    if material:
-        moved = _each(material, lambda name: _sized(moves[name].value, stated[name]))
-        start = f"Not all is explained: {left}" if study.named else "It"
-        return f"{start} could move {moved}. Do not trust the coefficients beyond the intervals given."
     known = [name for name, move in moves.items() if move.std is not None]
-    if not known:
+    if not study.causes:
+        words = "No gap: nothing remains beyond the noise."
+    elif not beyond_chance:
+        words = f"Explained; {left} is within the noise."
+    elif material:
+        moved_words = _each(material, lambda name: _sized(moves[name].value, stated[name]))
+        start = f"Not all is explained: {left}" if study.named else "It"
+        words = f"{start} could move {moved_words}. Do not trust the coefficients beyond the intervals given."
+    elif not known:
         start = f"Explained; {left}" if study.named else "It"
-        return f"{start} concerns no coefficient that these runs determine."
-    bounds = _each(
-        known,
-        lambda name: f"less than {_sized(max(moves[name].value, moves[name].std or 0.0), stated[name])}",
-    )
-    return f"Explained; {left} moves {bounds}." if study.named else f"It hardly matters: it moves {bounds}."
+        words = f"{start} concerns no coefficient that these runs determine."
+    else:
+        bounds = _each(
+            known,
+            lambda name: f"less than {_sized(max(moves[name].value, moves[name].std or 0.0), stated[name])}",
+        )
+        words = (
+            f"Explained; {left} moves {bounds}." if study.named else f"It hardly matters: it moves {bounds}."
+        )
+    return Remainder(beyond_chance, excess, p_value, bool(material), moves, words)
 
 
 def _each(names: list[str], size: Callable[[str], str]) -> str:

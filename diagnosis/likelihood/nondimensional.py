@@ -18,7 +18,6 @@ from identification.signal.frequency import peak_of_swing
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
-from tunnel_sim.vocabulary.rig import JointLaw
 from tunnel_sim.vocabulary.units import dimension
 
 REFERENCE_FREQUENCY = 2.0  # of the similar rig, Hz
@@ -107,24 +106,46 @@ def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
     unit = ("rad", "rad/s", "rad/s2")[sensor.derivative]
     change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
 
-    def similar(value: float | None, unit: str) -> float | None:
+    def known(value: float | None, unit: str) -> float | None:
         return None if value is None else change.similar(value, unit)
 
     similar_rig = RigProperties(
-        similar(rig.yaw_inertia, "kg m2"),
+        known(rig.yaw_inertia, "kg m2"),
         None if rig.frontal_area is None else rig.frontal_area * change.area,
         None if rig.reference_length is None else rig.reference_length * time,
         None if rig.width is None else rig.width * time,
     )
     similar_sensor = dataclasses.replace(
         sensor,
-        sample_rate=similar(sensor.sample_rate, "Hz"),
-        resolution=similar(sensor.resolution, unit),
-        noise_std=similar(sensor.noise_std, unit),
+        sample_rate=known(sensor.sample_rate, "Hz"),
+        resolution=known(sensor.resolution, unit),
+        noise_std=known(sensor.noise_std, unit),
     )
-    runs = tuple(_run(run, change) for run in campaign.runs)
-    law = None if campaign.law is None else _law(campaign.law, change)
-    return dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=runs, law=law), change
+    runs = []
+    for run in campaign.runs:
+        readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
+        record, spring = Record(run.record.time_s * change.time, readings), run.spring_stiffness
+        drive = None if run.drive is None else _drive(run.drive, change)
+        spring = None if spring is None else spring * change.moment
+        runs.append(dataclasses.replace(run, record=record, spring_stiffness=spring, drive=drive))
+    law = campaign.law
+    if law is not None:
+        law = dataclasses.replace(
+            law,
+            inertia=change.similar(law.inertia, "kg m2"),
+            stiffness=change.similar(law.stiffness, "N m/rad"),
+            damping=change.similar(law.damping, "N m s/rad"),
+            friction=change.similar(law.friction, "N m"),
+            rest=law.rest - change.rest,
+            step=change.similar(law.step, "s"),
+            lead=change.similar(law.lead, "s"),
+            terms=tuple(
+                dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
+                for term in law.terms
+            ),
+        )
+    similar = dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=tuple(runs), law=law)
+    return similar, change
 
 
 _PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
@@ -180,35 +201,6 @@ def response_to_input(run: Run, derivative: int = 0) -> tuple[float, float, floa
     values = np.interp(record.time_s, run.record.time_s, run.drive.values)
     return driven_start(
         record.time_s, record.yaw_rad, values, sprung=not run.unrestrained, derivative=derivative
-    )
-
-
-def _law(law: JointLaw, change: Similarity) -> JointLaw:
-    return dataclasses.replace(
-        law,
-        inertia=change.similar(law.inertia, "kg m2"),
-        stiffness=change.similar(law.stiffness, "N m/rad"),
-        damping=change.similar(law.damping, "N m s/rad"),
-        friction=change.similar(law.friction, "N m"),
-        rest=law.rest - change.rest,
-        step=change.similar(law.step, "s"),
-        lead=change.similar(law.lead, "s"),
-        terms=tuple(
-            dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
-            for term in law.terms
-        ),
-    )
-
-
-def _run(run: Run, change: Similarity) -> Run:
-    spring = run.spring_stiffness
-    readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
-    record = Record(run.record.time_s * change.time, readings)
-    return dataclasses.replace(
-        run,
-        record=record,
-        spring_stiffness=None if spring is None else spring * change.moment,
-        drive=None if run.drive is None else _drive(run.drive, change),
     )
 
 

@@ -28,7 +28,7 @@ from identification.signal.driven import driven_start
 from identification.signal.free_decay import Decay
 from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
+from tunnel_sim.effects.parameters import Circumstances, ParameterInfo
 from tunnel_sim.vocabulary.record import Array, Record
 
 _STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
@@ -241,8 +241,41 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         predicted = misfit(base).excess
         predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= found_own.drop
         return [StartingPoint(problem, point, found_own.drop, predicted, base.point.common.size)]
-    found = [_scaled_start(base, kind, trial) for trial in kind.trials(_circumstances(data))]
-    return sorted((start for start in found if start is not None), key=lambda start: -start.predicted_drop)
+    found = []
+    for trial in kind.trials(_circumstances(data)):
+        spring = kind.chosen_spring()
+        held = {} if spring is None else {spring: trial.values[spring]}
+        fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
+        freed = any(info.form and info.name in trial.values for info in kind.parameters())
+        free_forms = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
+        effects = (*base.problem.effects, kind)
+        problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=free_forms)
+        own = _own_parameters(problem, kind)
+        scaled = None if trial.scaled is None else [info.name for info in own].index(trial.scaled)
+        sizes = np.array([trial.values.get(info.name, info.default) for info in own])
+        names = base.problem.names
+        replaced = names.index(trial.replaces) if trial.replaces in names else None
+        change = _moderate_change(base, problem, sizes, scaled, replaced)
+        if change is None:
+            continue
+        left = project_out(base, change)
+        power = sum(float(c @ c) for c in left)
+        if power <= 0.0:
+            continue
+        slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
+        start, drop = sizes.copy(), slope * slope * power
+        if scaled is not None:
+            moderate = np.clip(slope * sizes[scaled], -trial.at_most, trial.at_most)
+            start[scaled] = np.clip(moderate, own[scaled].lower, own[scaled].upper)
+            if start[scaled] == 0.0:
+                start[scaled], drop = 0.01 * sizes[scaled], 0.0
+            if replaced is not None:
+                start[scaled] = min(start[scaled], base.point.common[replaced])
+        point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
+        place = None if scaled is None else base.point.common.size + scaled
+        after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
+        found.append(StartingPoint(problem, point, drop, misfit(base, after).excess, place))
+    return sorted(found, key=lambda start: -start.predicted_drop)
 
 
 def misses_motion(fit: Fit) -> bool:
@@ -265,41 +298,6 @@ def _circumstances(data: Data) -> Circumstances:
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
     slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
     return Circumstances(data.springs, greatest, data.normalised, slowest)
-
-
-def _scaled_start(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
-    spring = kind.chosen_spring()
-    held = {} if spring is None else {spring: trial.values[spring]}
-    fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
-    freed = any(info.form and info.name in trial.values for info in kind.parameters())
-    with_free_form = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
-    effects = (*base.problem.effects, kind)
-    problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=with_free_form)
-    infos = _own_parameters(problem, kind)
-    scaled = None if trial.scaled is None else [info.name for info in infos].index(trial.scaled)
-    values = np.array([trial.values.get(info.name, info.default) for info in infos])
-    names = base.problem.names
-    replaced = names.index(trial.replaces) if trial.replaces in names else None
-    change = _moderate_change(base, problem, values, scaled, replaced)
-    if change is None:
-        return None
-    left = project_out(base, change)
-    power = sum(float(c @ c) for c in left)
-    if power <= 0.0:
-        return None
-    slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
-    start, drop = values.copy(), slope * slope * power
-    if scaled is not None:
-        moderate = np.clip(slope * values[scaled], -trial.at_most, trial.at_most)
-        start[scaled] = np.clip(moderate, infos[scaled].lower, infos[scaled].upper)
-        if start[scaled] == 0.0:
-            start[scaled], drop = 0.01 * values[scaled], 0.0
-        if replaced is not None:
-            start[scaled] = min(start[scaled], base.point.common[replaced])
-    point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
-    place = None if scaled is None else base.point.common.size + scaled
-    after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
-    return StartingPoint(problem, point, drop, misfit(base, after).excess, place)
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:

@@ -124,18 +124,10 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     edges = np.geomspace(lowest, highest, round(_OCTAVE_PARTS * np.log2(highest / lowest)) + 1)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
-    # Bands with one level in all parts, by a likelihood ratio of gamma variables. Bartlett's correction makes it
-    # nearly χ² for few ordinates (Proc. R. Soc. A 160 (1937) 268, doi 10.1098/rspa.1937.0109).
-    total = count.sum(axis=0)
-    mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
-    ratio = np.maximum(power / np.where(mean > 0.0, mean, 1.0), 1e-300)  # any number where the count is 0
-    corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
-    statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
-    freedom = np.sum(count > 0, axis=0) - 1
-    limit = chdtri(np.maximum(freedom, 1), LOCAL_FALSE_ALARM_RATE)
-    steady = np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
+    steady = _steady(power, count)
     if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= COLOUR_THROUGHOUT)):
         return None
+    total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
     std = np.sqrt(1.0 / total[steady])
     weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
@@ -152,6 +144,22 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
     steep = slope - CHANCE_STDS * slope_std if steady[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
+
+
+def _steady(power: Array, count: Array) -> np.ndarray:
+    """Which bands have one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
+
+    Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc. R. Soc. A 160 (1937) 268,
+    doi 10.1098/rspa.1937.0109).
+    """
+    total = count.sum(axis=0)
+    mean = np.sum(power * count, axis=0) / np.maximum(total, 1e-300)
+    ratio = np.maximum(power / np.where(mean > 0.0, mean, 1.0), 1e-300)  # any number where the count is 0
+    corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
+    statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
+    freedom = np.sum(count > 0, axis=0) - 1
+    limit = chdtri(np.maximum(freedom, 1), LOCAL_FALSE_ALARM_RATE)
+    return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis.likelihood.least_squares import Fit, FitError
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
+from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start
 from diagnosis.noise.colour import noise_colour, whitened, zero_wanders
-from diagnosis.noise.rounding import repeated, rounding_errors, samples, with_rounding
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
 from diagnosis.policy import (
     BEYOND_THE_MOTION,
@@ -27,6 +29,80 @@ from diagnosis.policy import (
 )
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
+
+#: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
+#: harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 11).
+_BLURS = 0.5
+_REPETITIONS, _FEWEST, _SAMPLES = 16, 4, 2.5e6
+
+
+def samples(fit: Fit) -> int:
+    """Number of samples in all runs of a fit."""
+    return sum(run.reading.size * run.block for run in fit.problem.data.runs)
+
+
+def repeated(
+    fit: Fit, white: Mapping[str, float], step: float, count: int, levels: Array | None = None
+) -> Iterator[tuple[RunData, Array, Array]]:
+    """Read the fitted motion again, with white noise and a lattice of unknown origin.
+
+    Args:
+        white: standard deviation of a sample's noise before rounding, rad, by run id.
+        step: of the lattice, rad; 0 where there is none.
+        count: of the repetitions.
+        levels: readings that occur where steps are of unequal width, increasing, shape (levels,), rad; None: the
+            step is the same everywhere.
+
+    Yields:
+        Every run with the samples of its motion, shape (n,), and of the readings, shape (count, n), rad.
+    """
+    # seeded by the readings, so that one campaign is always compared with the same repetitions
+    rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in fit.problem.data.runs])
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        motion = run.reading - run.unscaled(residual)
+        if run.block > 1 or run.samples is not None:  # samples from block means
+            seen = slice(None) if run.samples is None else run.samples.count > 0
+            motion = np.asarray(CubicSpline(run.times[seen], motion[seen])(run.sample_times), np.float64)
+        reading = motion + white[run.stretch_of or run.id] * rng.standard_normal((count, motion.size))
+        if step > 0.0 and levels is None:
+            shift = step * rng.uniform(size=(count, 1))
+            # back to the angle: the origin belongs to the lattice, not to the motion
+            reading = step * np.round((reading + shift) / step) - shift
+        elif step > 0.0 and levels is not None:
+            reading = levels[np.searchsorted(0.5 * (levels[1:] + levels[:-1]), reading)]
+        yield run, motion, reading
+
+
+def rounding_errors(
+    fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None
+) -> list[Array] | None:
+    """What noise and rounding alone leave in the block means, arguments as in `repeated`.
+
+    Returns:
+        By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
+        the rounding error white.
+    """
+    if min(white.values()) > _BLURS * step:
+        return None
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
+    return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count, levels)]
+
+
+def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
+    """Data prepared for white noise, with noise of block means that is not below errors of `rounding_errors`.
+
+    It is raised where averaging does not reduce the errors as it reduces white noise, at most to that of one
+    sample. None where none is raised.
+    """
+    raised = [
+        float(np.clip(np.mean(error**2), run.noise_variance, run.noise_variance * run.block))
+        for run, error in zip(data.runs, errors, strict=True)
+    ]
+    if all(run.noise_variance == value for run, value in zip(data.runs, raised, strict=True)):
+        return None
+    runs = [replace(run, noise_variance=value) for run, value in zip(data.runs, raised, strict=True)]
+    return data.with_runs(tuple(runs))
+
 
 #: Repetitions of the campaign, fewer where it is long, never below the least.
 _REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6

@@ -299,12 +299,15 @@ def grow_in_stretches(
         children = with_forms([child.long for child in grown.values()], gap, least)
         found += children
         parents = [g.long for g in level]
-        # the best child of each parent comes first: what fits better at first may be a dead end
-        ranked = going_on(children, parents, gap)
-        going: list[Hypothesis] = []
-        for parent in parents:
-            own = [h for h in ranked if h not in going and set(parent.effects) < set(h.effects)]
-            going += own[:1]
-        going += [h for h in ranked if h not in going]
+        going = _of_each(parents, going_on(children, parents, gap))
         level = [replace(grown[h.names], long=h) for h in going[: policy.GROWN_FROM]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
+
+
+def _of_each(parents: Sequence[Hypothesis], ranked: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The best child of each parent, then the others: what fits better at first may be a dead end."""
+    first: list[Hypothesis] = []
+    for parent in parents:
+        own = [h for h in ranked if h not in first and set(parent.effects) < set(h.effects)]
+        first += own[:1]
+    return first + [h for h in ranked if h not in first]

@@ -18,9 +18,8 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, by_moment, mains_interval, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import decays_start, joint_start, misses_motion, nominal_start
-from diagnosis.noise.gap import GapTest, gap_or_colour
+from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
-from diagnosis.noise.rounding import rounding_errors
 from diagnosis.noise.sensor_noise import (
     Noise,
     NoiseTrend,
@@ -282,11 +281,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     if weighed[0].effects != UNKNOWN:
         with clock.step("polishing"):
             found = replace(found, hypotheses=_polished(found.hypotheses, weighed[0], random))
-    # effects of a few numbers close little of any noise, however it misbehaves
-    block = found.nominal.problem.data.runs[0].block
-    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
-    if found.nominal.chance > 1.0 or (small and not closed):
+    if _noise_explains(found, weighed):
         answer = Weighed((), 1.0, 1.0) if found.read_off else Weighed(UNKNOWN, 1.0, 1.0)
         others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
         weighed = [answer, *others]
@@ -422,3 +417,14 @@ class _Clock:
         begun = time.perf_counter()
         yield
         self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun
+
+
+def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
+    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
+
+    Effects of a few numbers close little of any noise, however it misbehaves.
+    """
+    block = found.nominal.problem.data.runs[0].block
+    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
+    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
+    return found.nominal.chance > 1.0 or (small and not closed)

@@ -97,7 +97,18 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     longest = max(float(time[-1] + 0.5 * (time[1] - time[0])) for time in samples.time)
     instants = np.linspace(0.0, longest, _TIME_BINS + 1)
     widest = 1.0001 * max(float(a.max()) for a in samples.amplitude)
-    energy, z = _moment_energy(nominal, samples.time, instants)
+    # energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance
+    energy, variance = np.zeros(instants.size - 1), 0.0
+    for index, whole in enumerate(samples.time):
+        apparent = apparent_moment(nominal, index)
+        if apparent is None:
+            continue
+        spread = float(apparent.kernel @ apparent.kernel) * apparent.noise_std**2
+        time = whole[apparent.start : apparent.start + apparent.moment.size]
+        energy += np.histogram(time, instants, weights=apparent.moment**2 / spread - 1.0)[0]
+        # neighbours within the kernel are correlated
+        variance += 2.0 * apparent.moment.size * apparent.kernel.size
+    z = float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
     edges = _log_edges(excesses)
     resonances = [run.resonance for run in excesses]
     by_run = [
@@ -229,20 +240,6 @@ def _grid(samples: _Samples, runs: Sequence[RunData], rows: Array, seconds: floa
         np.stack([column.mean for column in columns], axis=1),
         np.stack([column.std for column in columns], axis=1),
     )
-
-
-def _moment_energy(fit: Fit, times: list[Array], edges: Array) -> tuple[Array, float]:
-    """Energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance."""
-    energy, variance = np.zeros(edges.size - 1), 0.0
-    for index, whole in enumerate(times):
-        found = apparent_moment(fit, index)
-        if found is None:
-            continue
-        spread = float(found.kernel @ found.kernel) * found.noise_std**2
-        time = whole[found.start : found.start + found.moment.size]
-        energy += np.histogram(time, edges, weights=found.moment**2 / spread - 1.0)[0]
-        variance += 2.0 * found.moment.size * found.kernel.size  # neighbours within the kernel are correlated
-    return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
 
 
 def _log_edges(excesses: list[RunExcess]) -> Array:

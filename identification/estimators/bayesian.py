@@ -33,7 +33,6 @@ from identification.signal.frequency import starting_decay
 from identification.signal.run_fit import decay_covariance_of, describe_run, noise_and_failure
 from identification.statistics import determined, inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
-from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -370,8 +369,32 @@ class Bayesian(RunByRun):
         return super().estimate(campaign)
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:
-        if run.drive is not None:
-            return self._driven(run, run.drive, sensor)
+        drive = run.drive
+        if drive is not None:
+            bare = driven_run(run, sensor)
+            if not isinstance(bare, DrivenRun) or bare.fit is None or bare.noise is None:
+                return RunDecay(bare.estimate)
+            times, held, derivative = bare.reading.time, drive.hold == "zero", sensor.derivative
+
+            def rows(decay: Decay) -> Array:
+                return driven_rows(
+                    times, drive.values, decay.rate, decay.stiffness, held=held, derivative=derivative
+                )
+
+            found = self._described(run, bare.reading, bare.fit, bare.noise, rows)
+            if not isinstance(found, _PosteriorDecay) or found.decay is None or found.covariance is None:
+                return found
+            # the gain given (a, k), as least squares has it
+            weight, known = bare.gained.weight, np.zeros((3, 3))
+            moved = np.array([found.decay.rate, found.decay.stiffness]) - bare.gained.coefficients[:2]
+            jacobian = np.eye(3)[:, :2]
+            jacobian[2] = [0.0, 1.0] if run.driven_by_stiffness else -weight[2, :2] / weight[2, 2]
+            known[:2, :2] = inverse(found.covariance)
+            if not run.driven_by_stiffness:
+                covariance = jacobian @ found.covariance @ jacobian.T
+                covariance[2, 2] += 1.0 / weight[2, 2]
+                known = inverse(covariance)
+            return replace(found, gained=Gained(bare.gained.coefficients + jacobian @ moved, known))
         start = starting_decay(run.record)
         if start is None:
             return Status.NO_OSCILLATION
@@ -383,32 +406,6 @@ class Bayesian(RunByRun):
         if failure is not None:
             return failure
         return self._described(run, reading, fit.runs[0], noise)
-
-    def _driven(self, run: Run, drive: Drive, sensor: SensorProperties) -> Found:
-        bare = driven_run(run, sensor)
-        if not isinstance(bare, DrivenRun) or bare.fit is None or bare.noise is None:
-            return RunDecay(bare.estimate)
-        times, held, derivative = bare.reading.time, drive.hold == "zero", sensor.derivative
-
-        def rows(decay: Decay) -> Array:
-            return driven_rows(
-                times, drive.values, decay.rate, decay.stiffness, held=held, derivative=derivative
-            )
-
-        found = self._described(run, bare.reading, bare.fit, bare.noise, rows)
-        if not isinstance(found, _PosteriorDecay) or found.decay is None or found.covariance is None:
-            return found
-        # the gain given (a, k), as least squares has it
-        weight, known = bare.gained.weight, np.zeros((3, 3))
-        moved = np.array([found.decay.rate, found.decay.stiffness]) - bare.gained.coefficients[:2]
-        jacobian = np.eye(3)[:, :2]
-        jacobian[2] = [0.0, 1.0] if run.driven_by_stiffness else -weight[2, :2] / weight[2, 2]
-        known[:2, :2] = inverse(found.covariance)
-        if not run.driven_by_stiffness:
-            covariance = jacobian @ found.covariance @ jacobian.T
-            covariance[2, 2] += 1.0 / weight[2, 2]
-            known = inverse(covariance)
-        return replace(found, gained=Gained(bare.gained.coefficients + jacobian @ moved, known))
 
     def _described(
         self,

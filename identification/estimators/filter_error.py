@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.campaign.combination import Found, RunByRun, RunDecay
-from identification.estimate import NoiseLevel, Quantity, Status
+from identification.estimate import Quantity, Status
 from identification.signal.decay_fit import Reading, block_means, even_reading, mean_of_blocks, project_run
 from identification.signal.driven_fit import DrivenRun, Gained, driven_run, input_response
 from identification.signal.filter import DrivenFit, KnownInput, fit_driven
@@ -59,11 +59,43 @@ class FilterError(RunByRun):
         if bare.fit is None or bare.noise is None:
             return RunDecay(bare.estimate)
         driven = self._driven(run, bare, sensor)
-        if driven is not None:
-            return _with_moment(run, bare, bare.noise, *driven, sensor.derivative)
-        variance = bare.noise.std**2 * bare.noise.slow_ratio
-        gained = bare.gained if isinstance(bare, DrivenRun) else None
-        return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, gained)
+        if driven is None:
+            variance = bare.noise.std**2 * bare.noise.slow_ratio
+            known = bare.gained if isinstance(bare, DrivenRun) else None
+            return RunDecay(bare.estimate, bare.fit.decay, decay_covariance_of(bare.fit) * variance, known)
+        found, noise_std = driven
+        decay, reading, drive = found.model.decay, bare.reading, run.drive
+        gain = decay.stiffness if run.driven_by_stiffness else found.innovations.gain
+        if drive is not None:
+            response = input_response(reading, drive, decay, sensor.derivative)
+            reading = Reading(reading.time, reading.yaw - gain * response)
+        projected = project_run(reading, decay)
+        if projected is None:
+            return Status.NOT_CONVERGED
+        fitted, zero = projected
+        # The model is judged by the innovations, which are white if it is right; the residual is not.
+        values, expected = found.innovations.values, found.innovations.variance
+        level = noise_level(
+            [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
+            SensorProperties(noise_std=float(np.sqrt(expected))),
+        )
+        departs = level.departs or level.disagrees
+        ratio = max(level.slow_ratio, float(values @ values) / values.size / expected) if departs else 1.0
+        noise = replace(bare.noise, std=noise_std, departs=departs, slow_ratio=ratio)
+        covariance = found.covariance * noise.slow_ratio
+        # The initial state is that of least squares; the part of it due to the moment is of the power of the
+        # residual.
+        variance = max(noise_std, noise.residual_std) ** 2
+        estimate = describe_run(run, reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
+        q = found.model.intensity_at_resonance
+        process_noise = Quantity(q, q * float(np.sqrt(covariance[2, 2])), INTENSITY_UNIT)
+        estimate = replace(estimate, process_noise=process_noise)
+        if drive is None:
+            return RunDecay(estimate, decay, covariance[:2, :2])
+        size, weight = 2 if run.driven_by_stiffness else 3, np.zeros((3, 3))
+        weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
+        gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
+        return RunDecay(estimate, decay, covariance[:2, :2], gained)
 
     def _driven(self, run: Run, bare: FittedRun, sensor: SensorProperties) -> tuple[DrivenFit, float] | None:
         # The fit, and the sensor noise of one sample that it assumes.
@@ -90,40 +122,3 @@ class FilterError(RunByRun):
             known = KnownInput(response, by_root=run.driven_by_stiffness)
         found = fit_driven(thin.yaw, interval, fit.decay, deviations, noise_std**2 / factor, known)
         return None if found is None or found.model.decay.stiffness <= 0.0 else (found, noise_std)
-
-
-def _with_moment(
-    run: Run, bare: FittedRun, before: NoiseLevel, found: DrivenFit, noise_std: float, derivative: int
-) -> Found:
-    decay = found.model.decay
-    reading, drive = bare.reading, run.drive
-    gain = decay.stiffness if run.driven_by_stiffness else found.innovations.gain
-    if drive is not None:
-        response = input_response(reading, drive, decay, derivative)
-        reading = Reading(reading.time, reading.yaw - gain * response)
-    projected = project_run(reading, decay)
-    if projected is None:
-        return Status.NOT_CONVERGED
-    fitted, zero = projected
-    # The model is judged by the innovations, which are white if it is right; the residual is not.
-    values, expected = found.innovations.values, found.innovations.variance
-    level = noise_level(
-        [Residual(values, _INNOVATIONS_BLOCK, _DECIDED, float(np.abs(values).max()))],
-        SensorProperties(noise_std=float(np.sqrt(expected))),
-    )
-    departs = level.departs or level.disagrees
-    ratio = max(level.slow_ratio, float(values @ values) / values.size / expected) if departs else 1.0
-    noise = replace(before, std=noise_std, departs=departs, slow_ratio=ratio)
-    covariance = found.covariance * noise.slow_ratio
-    # The initial state is that of least squares; the part of it due to the moment is of the power of the residual.
-    variance = max(noise_std, noise.residual_std) ** 2
-    estimate = describe_run(run, reading, fitted, zero, covariance[:2, :2], variance, noise=noise)
-    q = found.model.intensity_at_resonance
-    process_noise = Quantity(q, q * float(np.sqrt(covariance[2, 2])), INTENSITY_UNIT)
-    estimate = replace(estimate, process_noise=process_noise)
-    if drive is None:
-        return RunDecay(estimate, decay, covariance[:2, :2])
-    size, weight = 2 if run.driven_by_stiffness else 3, np.zeros((3, 3))
-    weight[:size, :size] = inverse(found.gained[:size, :size] * noise.slow_ratio)
-    gained = Gained(np.array([decay.rate, decay.stiffness, gain]), weight)
-    return RunDecay(estimate, decay, covariance[:2, :2], gained)

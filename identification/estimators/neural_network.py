@@ -86,14 +86,35 @@ class NeuralNetwork(Paired):
             zeta_std, omega_std = max(zeta_std, least_zeta.std), max(omega_std, least_omega.std)
         if run.spring_stiffness is None:
             statuses.add(Status.NO_STIFFNESS)
-        trained = [one for one in readings if networks.trained_for(one.zeta, one.omega_n)]
+        shown = []
+        for one in readings:
+            if not networks.trained_for(one.zeta, one.omega_n):
+                continue
+            window, of_zeta, of_omega = one.window, *np.sqrt(one.variances)
+            own_zeta, own_omega = networks.own_stds(one.zeta, window.t3)
+            # The envelope at the first crossing, and from there to mid-window.
+            unit = normalise(response_points(np.array([one.zeta]))[0]).scale
+            middle = float(np.exp(-np.pi * CYCLES * one.zeta / np.sqrt(1.0 - one.zeta**2)))
+            amplitude = window.shape.scale / unit * middle
+            level = window.noise.std * float(np.linalg.norm(window.shape.peak_weights @ window.noise.points))
+            own_std = float(np.hypot(of_omega, own_omega * one.omega_n))
+            shown.append(
+                WindowEstimate(
+                    start_s=window.start_s,
+                    duration_s=window.t3,
+                    amplitude=Quantity(amplitude, level / unit * middle, "rad"),
+                    omega_n=Quantity(one.omega_n, own_std, "rad/s"),
+                    zeta=Quantity(one.zeta, float(np.hypot(of_zeta, own_zeta)), "1"),
+                    cycles=CYCLES,
+                )
+            )
         estimate = RunEstimate(
             id=run.id,
             statuses=by_severity(statuses),
             omega_n=Quantity(omega, omega_std, "rad/s"),
             zeta=Quantity(zeta, zeta_std, "1"),
             noise=None if check is None else check.noise,
-            windows=tuple(_shown(one, networks) for one in trained),
+            windows=tuple(shown),
         )
         root = float(np.sqrt(1.0 - zeta**2))
         damped_std = float(np.hypot(root * omega_std, zeta / root * omega * zeta_std))
@@ -162,23 +183,3 @@ def _average(readings: Sequence[WindowReading], row: int) -> tuple[float, float,
     scatter = float(away @ inverse @ away)
     departs = scatter > SCATTER_TOLERANCE * float(chdtri(values.size - 1, 0.5 * MISFIT_RATE))
     return mean, std * float(np.sqrt(scatter / (values.size - 1))) if departs else std, departs
-
-
-def _shown(reading: WindowReading, networks: Networks) -> WindowEstimate:
-    window, zeta = reading.window, reading.zeta
-    own_zeta, own_omega = networks.own_stds(zeta, window.t3)
-    # The envelope at the first crossing, and from there to mid-window.
-    unit = normalise(response_points(np.array([zeta]))[0]).scale
-    middle = float(np.exp(-np.pi * CYCLES * zeta / np.sqrt(1.0 - zeta**2)))
-    amplitude = window.shape.scale / unit * middle
-    level = window.noise.std * float(np.linalg.norm(window.shape.peak_weights @ window.noise.points))
-    of_zeta, of_omega = np.sqrt(reading.variances)
-    omega_std = float(np.hypot(of_omega, own_omega * reading.omega_n))
-    return WindowEstimate(
-        start_s=window.start_s,
-        duration_s=window.t3,
-        amplitude=Quantity(amplitude, level / unit * middle, "rad"),
-        omega_n=Quantity(reading.omega_n, omega_std, "rad/s"),
-        zeta=Quantity(zeta, float(np.hypot(of_zeta, own_zeta)), "1"),
-        cycles=CYCLES,
-    )

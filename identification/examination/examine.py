@@ -244,26 +244,23 @@ def find_clock(time_s: Array) -> Clock | None:
         if np.abs(steps - step * whole).max() < allowed + _ON_LATTICE * step:
             allowed = max(allowed, step)
     for interval in (float(np.mean(steps)), float(np.mean(usual))):
-        found = _counted(time_s, interval)
-        if found is not None and found.away <= max(allowed, CLOCK_TOLERANCE * found.interval):
-            return found
+        for _ in range(_SWEEPS):  # to the interval that fits the stamps best
+            ticks = np.maximum(np.round(np.diff(time_s) / interval), 1.0)
+            place = np.concatenate([[0.0], np.cumsum(ticks)])
+            if place[-1] > _MOST_MISSING * time_s.size:
+                break
+            slope, start = np.polyfit(place - place.mean(), time_s, 1)
+            settled = abs(slope / interval - 1.0) * place[-1] < CLOCK_TOLERANCE
+            interval = float(slope)
+            if settled:
+                break
+        if place[-1] > _MOST_MISSING * time_s.size:  # gaps are most of them
+            continue
+        clock = start + interval * (place - place.mean())
+        away = float(np.abs(time_s - clock).max())
+        if away <= max(allowed, CLOCK_TOLERANCE * interval):
+            return Clock(interval, place.astype(np.int64), clock, away)
     return None
-
-
-def _counted(time_s: Array, interval: float) -> Clock | None:
-    """The clock of about an interval, s, that fits the stamps best; None if gaps are most of them."""
-    for _ in range(_SWEEPS):
-        ticks = np.maximum(np.round(np.diff(time_s) / interval), 1.0)
-        place = np.concatenate([[0.0], np.cumsum(ticks)])
-        if place[-1] > _MOST_MISSING * time_s.size:
-            return None
-        slope, start = np.polyfit(place - place.mean(), time_s, 1)
-        settled = abs(slope / interval - 1.0) * place[-1] < CLOCK_TOLERANCE
-        interval = float(slope)
-        if settled:
-            break
-    clock = start + interval * (place - place.mean())
-    return Clock(interval, place.astype(np.int64), clock, float(np.abs(time_s - clock).max()))
 
 
 def _range(values: list[float]) -> str:

@@ -269,7 +269,20 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
     if search.size:
         expected = float(time[search[np.argmax(np.abs(record.yaw_rad[search] - middle))]])
     while expected + width <= time[-1]:
-        vertex = _vertex(time, record.yaw_rad, expected, width)
+        vertex, at = None, expected
+        for _ in range(_MOVES):  # where the period drifts, the window follows the peak
+            low, high = np.searchsorted(time, (at - width, at + width))
+            if high - low < 3:
+                break
+            x = (time[low:high] - at) / width
+            bend, slope, height = np.polyfit(x, record.yaw_rad[low:high], 2)
+            place = -0.5 * slope / bend if bend != 0.0 else np.inf
+            if abs(place) <= 0.5:
+                vertex = at + float(place) * width, float(height + 0.5 * slope * place)
+                break
+            # Move up the slope: with curvature of the wrong sign the vertex would lie on the other side.
+            rising = slope * np.sign(record.yaw_rad[low:high].mean() - record.yaw_rad.mean()) > 0.0
+            at += (0.5 if rising else -0.5) * width
         if vertex is None:
             break
         if len(heights) >= 2 and (vertex[1] > heights[-1]) != (heights[-2] > heights[-1]):
@@ -278,23 +291,6 @@ def follow_peaks(record: Record, frequency: float, *, sparse: bool = False) -> t
         heights.append(vertex[1])
         expected = vertex[0] + half
     return np.array(times), np.array(heights)
-
-
-def _vertex(time: Array, yaw: Array, expected: float, width: float) -> tuple[float, float] | None:
-    # Where the period drifts, a peak is not at the expected instant: the window follows it.
-    for _ in range(_MOVES):
-        low, high = np.searchsorted(time, (expected - width, expected + width))
-        if high - low < 3:
-            return None
-        x = (time[low:high] - expected) / width
-        bend, slope, height = np.polyfit(x, yaw[low:high], 2)
-        place = -0.5 * slope / bend if bend != 0.0 else np.inf
-        if abs(place) <= 0.5:
-            return expected + float(place) * width, float(height + 0.5 * slope * place)
-        # Move up the slope: with curvature of the wrong sign the vertex would lie on the other side.
-        rising = slope * np.sign(yaw[low:high].mean() - yaw.mean()) > 0.0
-        expected += (0.5 if rising else -0.5) * width
-    return None
 
 
 def _line(x: Array, y: Array) -> tuple[float, float]:

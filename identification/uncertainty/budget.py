@@ -276,7 +276,22 @@ def make_budget(
         half = slice(0, max(2, run.record.time_s.size // 2))
         halves.append(replace(run, record=Record(run.record.time_s[half], run.record.yaw_rad[half])))
     rivals["the first half of the records"] = identify(replace(campaign, runs=tuple(halves)))
-    model = _model(budget, np.sqrt(np.diag(noise.covariance)), rivals)
+    own_std, largest, blamed = np.sqrt(np.diag(covariance)), np.zeros(len(names)), []
+    for name, rival in rivals.items():
+        values = _values(rival, budget)
+        if values is None:
+            continue
+        move = np.abs(values - budget.values)
+        stds = np.array([getattr(rival, name).std for name in names])
+        # Of two unbiased estimates from the same records, the better one is uncorrelated with their difference.
+        chance = np.sqrt(np.abs(stds**2 - own_std**2))
+        move = np.where(move > DIFFERENCE_DEVIATIONS * chance, move, 0.0)
+        if np.any(move > 0.0):
+            blamed.append(name)
+        largest = np.maximum(largest, move)
+    note = f"moved by {', '.join(blamed)}" if blamed else f"{', '.join(rivals)}: within chance"
+    # The largest change beyond chance is the half-width of a rectangular distribution (GUM 4.3.7).
+    model = Component("choice of model", "B", np.diag(largest**2 / 3.0), note)
     return replace(budget, components=(noise, *common, *individual, *scatter, model))
 
 
@@ -328,25 +343,6 @@ def _values(estimate: Estimate, budget: Budget) -> Array | None:
     found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
     given = [quantity.value for quantity in found if quantity is not None]
     return np.array(given) if len(given) == len(found) else None
-
-
-def _model(budget: Budget, own_std: Array, rivals: Mapping[str, Estimate]) -> Component:
-    """The largest change beyond chance, as the half-width of a rectangular distribution (GUM 4.3.7)."""
-    largest, blamed = np.zeros(len(budget.names)), []
-    for name, rival in rivals.items():
-        values = _values(rival, budget)
-        if values is None:
-            continue
-        move = np.abs(values - budget.values)
-        stds = np.array([getattr(rival, name).std for name in budget.names])
-        # Of two unbiased estimates from the same records, the better one is uncorrelated with their difference.
-        chance = np.sqrt(np.abs(stds**2 - own_std**2))
-        move = np.where(move > DIFFERENCE_DEVIATIONS * chance, move, 0.0)
-        if np.any(move > 0.0):
-            blamed.append(name)
-        largest = np.maximum(largest, move)
-    note = f"moved by {', '.join(blamed)}" if blamed else f"{', '.join(rivals)}: within chance"
-    return Component("choice of model", "B", np.diag(largest**2 / 3.0), note)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,13 @@ import pytest
 
 from tests.reference.effect_cases import ON_DRIVEN_RUNS, VOCABULARY
 from tests.reference.rigs import rig
-from tunnel_reference.air_moments import turbulence
 from tunnel_reference.catalogue import Group
 from tunnel_reference.conditions import Input
 from tunnel_reference.draw import KINDS, NUMBERS, CampaignDraw, EffectDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES, FORMS, forms_of
+from tunnel_reference.moments import turbulence
 from tunnel_reference.nominal_fit import fit_nominal
-from tunnel_reference.outside import OUTSIDE_FORMS
-from tunnel_reference.outside_laws import LAW_FORMS
+from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 from tunnel_reference.severity import bind_effects, read_and_fit, simulate_motions, size_effects
 
 ALL_FORMS = (*FORMS, *OUTSIDE_FORMS, *LAW_FORMS)

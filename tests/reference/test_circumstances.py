@@ -23,8 +23,9 @@ from tunnel_reference.forms import forms_of
 from tunnel_reference.integrator import Motion
 from tunnel_reference.readings import read_motion
 from tunnel_reference.severity import (
-    _excess,
-    _separable,
+    OWN_EXCESS,
+    OWN_SHARE,
+    _Search,
     own_excesses,
     read_and_fit,
     simulate_motions,
@@ -113,7 +114,8 @@ def test_an_effect_outside_the_vocabulary_must_matter_too():
         CampaignDraw("outside", RIG, (replace(outside("damping_warms_up"), value=value),), 1)
         for value in (1e-6, 1e-3)
     )
-    assert [_separable(draw) for draw in own_excesses([weak, strong])] == [False, True]
+    found = [draw.effects[0] for draw in own_excesses([weak, strong])]
+    assert [e.own >= max(OWN_EXCESS, OWN_SHARE * e.target) for e in found] == [False, True]
 
 
 def outside(name):
@@ -121,12 +123,16 @@ def outside(name):
     return EffectDraw(form, form.draw(np.random.default_rng(0), RIG), form.signs[0], 1.0, form.start)
 
 
-def test_a_motion_that_is_no_decay_is_infinitely_severe():
-    alone = CampaignDraw("single", RIG, (effect("cubic_stiffness"),), 1)
+def test_a_motion_that_is_no_decay_is_infinitely_severe(monkeypatch):
+    seen = []
+    monkeypatch.setattr(_Search, "learn", lambda _, excess: seen.append(excess))
+    search = _Search(0, 0, CampaignDraw("single", RIG, (effect("cubic_stiffness"),), 1))
     n = round(RIG.duration * RIG.sample_rate)
     away = np.full((n, RIG.runs), 1e200)
-    assert _excess(alone, Motion(away, away)) == np.inf
-    assert _excess(alone, Motion(np.full_like(away, np.nan), away)) == np.inf
+    for angle in (away, np.full_like(away, np.nan)):
+        search.motion = Motion(angle, away)
+        search.try_out()
+    assert seen == [np.inf, np.inf]
 
 
 @pytest.mark.parametrize(("kind", "number"), [("none", 0), ("single", 1), ("three", 3), ("four", 4)])

@@ -15,10 +15,10 @@ from tunnel_reference import moments as m
 from tunnel_reference.catalogue import NOT_DRIVEN
 from tunnel_reference.conditions import Input
 from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
-from tunnel_reference.driven_fit import fit_driven
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES
 from tunnel_reference.inputs import linear_response
 from tunnel_reference.integrator import Phase, Term, integrate
+from tunnel_reference.nominal_fit import fit_driven
 from tunnel_reference.severity import read_and_fit, simulate_motions
 
 PLAIN = replace(rig(duration=0.5, sample_rate=100.0), start_rate=np.array([0.4, -0.2]))

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.reference.rigs import rig
-from tunnel_reference import air_moments as air
 from tunnel_reference import moments as m
 from tunnel_reference.conditions import REFERENCE_LENGTH, Rod
 from tunnel_reference.integrator import Phase, Term, integrate
@@ -81,12 +80,12 @@ CASES = {
         lambda _c, _run: lambda _t, y: (-0.3 * (np.sin(y[0] - 0.2) + 0.05 * np.sin(2 * (y[0] - 0.2))), ()),
     ),
     "nonlinear_air": (
-        air.cubic_air,
+        m.cubic_air,
         {"kappa": 2.0, "quintic": 1.0},
         lambda c, run: lambda _t, y: (c.air_stiffness[run] * (2.0 * y[0] ** 3 + y[0] ** 5), ()),
     ),
     "air_damping": (
-        air.nonlinear_air_damping,
+        m.nonlinear_air_damping,
         {"mu": 5.0},
         lambda c, run: lambda _t, y: (c.air_damping[run] * 5.0 * y[0] ** 2 * y[1], ()),
     ),
@@ -139,9 +138,9 @@ def test_dead_zone_matches_an_adaptive_solver():
 def test_lag_and_speed_drift_match_an_adaptive_solver():
     c = rig(speed=(15.0, 25.0))
     tau = 0.8 * REFERENCE_LENGTH / c.true_speed
-    lag = Term(air.lag_one, Phase.ANGLE, {"w1": np.ones(2), "tau1": tau}, np.tile(c.start_angle, (1, 1)))
+    lag = Term(m.lag_one, Phase.ANGLE, {"w1": np.ones(2), "tau1": tau}, np.tile(c.start_angle, (1, 1)))
     drift = Term(
-        air.speed_drift,
+        m.speed_drift,
         Phase.WIND,
         {"drift": np.full(2, 0.1), "span": np.full(2, 2.0), "exponent": np.ones(2)},
     )
@@ -232,7 +231,7 @@ def test_friction_sticks_at_release_and_breaks_loose_under_a_rising_moment():
     c = rig(stiffness=(20.0,), speed=(0.0,), angle=(0.001,), duration=0.5)
     stick = Term(m.coulomb_level, Phase.FRICTION, {"moment": np.array([0.05])})
     push = Term(
-        air.harmonic_moment,
+        m.harmonic_moment,
         Phase.MOMENT,
         {
             "moment": np.array([0.2]),

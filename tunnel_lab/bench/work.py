@@ -169,7 +169,9 @@ async def closure(campaign: Path, state: State, effects: Sequence[str], *, conve
     Raises:
         TunnelError: when the campaign cannot be read, or an effect cannot be fitted to it.
     """
-    return await _in_fitter(_closure, campaign, state, tuple(sorted(effects)), converged)
+    words = tuple(sorted(effects))
+    found: Closure = await _in_fitter(_answered, campaign, state, "closure", words, converged=converged)
+    return found
 
 
 async def next_run(
@@ -177,7 +179,8 @@ async def next_run(
 ) -> dict[str, Any] | None:
     """The run that would distinguish two sets of effects; None in normalised form; errors as of `closure`."""
     answers = tuple(sorted(first)), tuple(sorted(second))
-    return await _in_fitter(_next_run, campaign, state, *answers)
+    found: dict[str, Any] | None = await _in_fitter(_answered, campaign, state, "next_run", *answers)
+    return found
 
 
 async def _in_fitter(work: Callable[Given, ResultT], *given: Given.args, **named: Given.kwargs) -> ResultT:
@@ -208,11 +211,6 @@ def _by_hand(campaign: Path, state: State) -> ByHand:
     return ByHand(read_campaign(campaign))
 
 
-def _closure(campaign: Path, state: State, effects: tuple[str, ...], converged: bool) -> Closure:
-    return _by_hand(campaign, state).closure(effects, converged=converged)
-
-
-def _next_run(
-    campaign: Path, state: State, first: tuple[str, ...], second: tuple[str, ...]
-) -> dict[str, Any] | None:
-    return _by_hand(campaign, state).next_run(first, second)
+def _answered(campaign: Path, state: State, method: str, *given: object, **named: object) -> Any:
+    """What a method of `ByHand` gives, in the process that keeps the fits."""
+    return getattr(_by_hand(campaign, state), method)(*given, **named)

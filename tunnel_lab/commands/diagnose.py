@@ -324,10 +324,17 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
             cells = (_NONE if given is None else estimated(given) for given in found)
             coefficients.append((f"{label} {key}", *cells))
     first, *others = (document["coefficients"]["after"] for document in documents)
-    differences = tuple(
-        (label, *(_difference(first.get(name), other.get(name)) for other in others))
-        for name, label in labels.items()
-    )
+    differences = []  # taken as independent of each other
+    for name, label in labels.items():
+        row, mine = [label], first.get(name)
+        for theirs in (other.get(name) for other in others):
+            alike = mine is not None and theirs is not None and mine["unit"] == theirs["unit"]
+            if alike and mine["std"] is not None and theirs["std"] is not None:
+                moved, std = theirs["value"] - mine["value"], math.hypot(mine["std"], theirs["std"])
+                row.append(f"{with_std(moved, std)} ({in_stds(moved, std)})")
+            else:
+                row.append(_NONE)
+        differences.append(tuple(row))
     keys = dict.fromkeys(key for texts in parameters for key in texts)
     rows = tuple((*key, *(texts.get(key, _NONE) for texts in parameters)) for key in keys)
     quantity, parameter = ("quantity",), ("effect", "parameter")
@@ -336,15 +343,5 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         TextTable("Gap and answer", (*quantity, *names), answers),
         TextTable("Parameters ± one standard deviation", (*parameter, *names), rows),
         TextTable("Coefficients ± one standard deviation", (*quantity, *names), tuple(coefficients)),
-        TextTable(change, (*quantity, *names[1:]), differences),
+        TextTable(change, (*quantity, *names[1:]), tuple(differences)),
     ]
-
-
-def _difference(first: Document | None, second: Document | None) -> str:
-    """The second estimate minus the first, taken as independent of each other."""
-    if first is None or second is None or first["unit"] != second["unit"]:
-        return _NONE
-    if first["std"] is None or second["std"] is None:
-        return _NONE
-    change, std = second["value"] - first["value"], math.hypot(first["std"], second["std"])
-    return f"{with_std(change, std)} ({in_stds(change, std)})"

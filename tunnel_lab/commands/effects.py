@@ -100,7 +100,17 @@ def run(
             raise TunnelError(
                 "name one effect to check, and no file to write", remedy="tunnel effects check NAME"
             )
-        _check(checked)
+        from diagnosis.identifiability import identifiability
+        from tunnel_sim.engine.effect_laws import check
+
+        own = effect_class(checked)
+        verdicts, seen = check(own), identifiability(own)
+        for law, fault in [*((v.law, v.fault) for v in verdicts), (seen.LAW, seen.fault)]:
+            say(f"violated: {law}: {fault}." if fault else f"obeyed: {law}.")
+        for line in seen.lines():
+            say(line)
+        if seen.fault or any(v.fault for v in verdicts):
+            raise typer.Exit(1)
         return
     if checked is not None:
         raise TunnelError(f"one name too many: {checked!r}", remedy="name one effect")
@@ -137,23 +147,6 @@ def run(
     show_tables(parameters)
     say(ABOUT_DIRECTIONS)
     say(f"To inject it: tunnel simulate plan.toml --out FOLDER {example(kind)}")
-
-
-def _check(name: str) -> None:
-    """Print which laws an effect obeys; exit with 1 where it violates one."""
-    from diagnosis.identifiability import identifiability
-    from tunnel_sim.effects import effect_class
-    from tunnel_sim.engine.effect_laws import check
-
-    kind = effect_class(name)
-    verdicts = check(kind)
-    seen = identifiability(kind)
-    for law, fault in [*((v.law, v.fault) for v in verdicts), (seen.LAW, seen.fault)]:
-        say(f"violated: {law}: {fault}." if fault else f"obeyed: {law}.")
-    for line in seen.lines():
-        say(line)
-    if seen.fault or any(v.fault for v in verdicts):
-        raise typer.Exit(1)
 
 
 def summary(kind: type[Effect]) -> str:

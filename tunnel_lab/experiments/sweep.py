@@ -142,7 +142,18 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     marks.append(("simulate", time.perf_counter()))
     answers: list[tuple[SweepCase, str | None, Estimate | Failure | None]] = []
     for name in plan.document.estimators:
-        answers += [(case, name, _estimate(campaign, name)) for case, campaign in campaigns]
+        for case, campaign in campaigns:  # one bad case must not stop the sweep
+            found: Estimate | Failure
+            if isinstance(campaign, Failure):
+                found = campaign
+            else:
+                try:
+                    found = identify(campaign, _estimator(name), throw=False)
+                except TunnelError as error:
+                    found = Failure(REFUSED, one_line(error))
+                except Exception as error:
+                    found = Failure(RAISED, one_line(f"{type(error).__name__}: {error}"))
+            answers.append((case, name, found))
         marks.append((name, time.perf_counter()))
     if not plan.document.estimators:
         answers = [
@@ -184,18 +195,6 @@ def _simulate(cases: Sequence[SweepCase], nthread: int) -> Sequence[Campaign | F
             return [Failure(NOT_SIMULATED, one_line(error))]
     half = len(cases) // 2
     return [*_simulate(cases[:half], nthread), *_simulate(cases[half:], nthread)]
-
-
-def _estimate(campaign: Campaign | Failure, name: str) -> Estimate | Failure:
-    """An estimate, or why there is none: one bad case must not stop the sweep."""
-    if isinstance(campaign, Failure):
-        return campaign
-    try:
-        return identify(campaign, _estimator(name), throw=False)
-    except TunnelError as error:
-        return Failure(REFUSED, one_line(error))
-    except Exception as error:
-        return Failure(RAISED, one_line(f"{type(error).__name__}: {error}"))
 
 
 def _parquet(rows: Sequence[tuple[Any, ...]], columns: Mapping[str, Any]) -> bytes:

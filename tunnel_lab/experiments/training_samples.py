@@ -95,37 +95,33 @@ def readings_of(spec: ShardSpec) -> Iterator[tuple[Campaign, Conditions, list[st
         if not np.all(np.isfinite(motion.angle)) or np.abs(motion.angle).max() > 1.0:
             continue
         for number in range(VARIANTS):
-            campaign, conditions = _variant(draw, motion, rng, first=number == 0)
-            yield campaign, conditions, [e.form.family for e in draw.effects], number
-
-
-def _variant(
-    draw: CampaignDraw, motion: Motion, rng: np.random.Generator, *, first: bool
-) -> tuple[Campaign, Conditions]:
-    """A campaign as read with another level of noise; the later variants may lose their end and some runs."""
-    if not first:
-        factor = float(np.exp(rng.uniform(*np.log(_NOISE))))
-        c = draw.conditions
-        draw = replace(
-            draw,
-            conditions=replace(c, noise_std=c.noise_std * factor, resolution=c.resolution * min(factor, 2.0)),
-            seed=int(rng.integers(2**62)),
-        )
-    c, terms = bind_effects(draw)
-    sensor = [term for term in terms if isinstance(term, ReadingTerm)]
-    readings = read_motion(c, motion, sensor, np.random.default_rng(draw.seed))[: draw.conditions.samples]
-    campaign = as_campaign(Simulated(draw, readings, 0.0, np.zeros(c.runs), np.zeros((0, 0))), "sample")
-    runs = campaign.runs[:MOST_RUNS]
-    if not first and rng.random() < 0.5:
-        kept = int(len(runs[0].record.time_s) * rng.uniform(0.4, 1.0))
-        runs = tuple(
-            replace(run, record=Record(run.record.time_s[:kept], run.record.yaw_rad[:kept])) for run in runs
-        )
-    if not first and rng.random() < 0.5:
-        number = int(rng.integers(1, len(runs) + 1))
-        places = np.sort(rng.choice(len(runs), number, replace=False))
-        runs = tuple(runs[place] for place in places)
-    return replace(campaign, runs=runs), c
+            # variants after the first have another level of noise, and may lose their end and some runs
+            read, first = draw, number == 0
+            if not first:
+                factor, c = float(np.exp(rng.uniform(*np.log(_NOISE)))), draw.conditions
+                coarser = c.resolution * min(factor, 2.0)
+                noisier = replace(c, noise_std=c.noise_std * factor, resolution=coarser)
+                read = replace(draw, conditions=noisier, seed=int(rng.integers(2**62)))
+            c, terms = bind_effects(read)
+            sensor = [term for term in terms if isinstance(term, ReadingTerm)]
+            readings = read_motion(c, motion, sensor, np.random.default_rng(read.seed))[
+                : read.conditions.samples
+            ]
+            campaign = as_campaign(
+                Simulated(read, readings, 0.0, np.zeros(c.runs), np.zeros((0, 0))), "sample"
+            )
+            runs = campaign.runs[:MOST_RUNS]
+            if not first and rng.random() < 0.5:
+                kept = int(len(runs[0].record.time_s) * rng.uniform(0.4, 1.0))
+                runs = tuple(
+                    replace(run, record=Record(run.record.time_s[:kept], run.record.yaw_rad[:kept]))
+                    for run in runs
+                )
+            if not first and rng.random() < 0.5:
+                count = int(rng.integers(1, len(runs) + 1))
+                places = np.sort(rng.choice(len(runs), count, replace=False))
+                runs = tuple(runs[place] for place in places)
+            yield replace(campaign, runs=runs), c, [e.form.family for e in draw.effects], number
 
 
 def truth_of(c: Conditions) -> dict[str, float]:

@@ -97,7 +97,13 @@ def rendered(table: Table, kind: TableFormat) -> str:
     if kind is TableFormat.JSON:
         from tunnel_sim.files.writing import json_line
 
-        records = [{head: _value(cell) for head, cell in zip(heads, row, strict=True)} for row in rows]
+        records = [
+            {
+                head: cell if not _NUMBER.fullmatch(cell) else int(cell) if cell.isdecimal() else float(cell)
+                for head, cell in zip(heads, row, strict=True)
+            }
+            for row in rows
+        ]
         return json_line({"table": title, "rows": records}) + "\n"
     if kind is TableFormat.MD:
         lines = [heads, ["---"] * len(heads), *rows]
@@ -112,12 +118,6 @@ def rendered(table: Table, kind: TableFormat) -> str:
 
 def _plain(cell: object) -> str:
     return " ".join(str(cell).split())
-
-
-def _value(cell: str) -> str | float:
-    if not _NUMBER.fullmatch(cell):
-        return cell
-    return int(cell) if cell.isdecimal() else float(cell)
 
 
 def table(title: str, *columns: str, right: Sequence[str] = ()) -> Table:

@@ -151,7 +151,27 @@ def expression_effect(
     unused = [own for own in parameters if own not in formula.names]
     if unused:
         raise TunnelError(f"parameter {unused[0]} is not in {text!r}", remedy="use it or leave it out")
-    _check_values(formula, parameters, "0" if reading is None else "y")
+    # refused where it acts at its null, does nothing beyond it or has no value somewhere
+    null = "0" if reading is None else "y"
+    rng = np.random.default_rng(0)
+    tried = {key: top * rng.uniform(-1.0, 1.0, 200) for key, top in _TRIED.items()}
+    tried |= {key: np.abs(tried[key]) for key in ("t", "V", "Kr", "omega")}
+    for key in ("b", "r", "y", "t", "V"):
+        tried[key][:: 7 + len(key) + ord(key[0]) % 5] = 0.0
+    at = {key: quantity.default for key, quantity in parameters.items()}
+    severity, size = next((key, quantity.scale) for key, quantity in parameters.items())
+    without = tried["y"] if null == "y" else 0.0
+    at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
+    if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
+        fault = f"{formula.text!r} has no finite value somewhere in the motion of a rig"
+        raise TunnelError(
+            fault, remedy="avoid division by zero, and roots and logarithms of negative numbers"
+        )
+    if np.any(np.abs(at_null - without) > 1e-12):
+        remedy = "write it so that the first parameter, the severity, removes the effect"
+        raise TunnelError(f"{formula.text!r} is not {null} at {severity} = 0", remedy=remedy)
+    if np.all(np.abs(beyond - without) <= 1e-300):
+        raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
     fields = []
     for own, q in parameters.items():
         field = parameter(
@@ -195,27 +215,6 @@ def _check_names(parameters: Mapping[str, Quantity]) -> None:
     if severity is None or severity.default != 0.0:
         remedy = "give it the default 0, which removes the effect"
         raise TunnelError("the first parameter is not a severity", remedy=remedy)
-
-
-def _check_values(formula: Expression, parameters: Mapping[str, Quantity], null: str) -> None:
-    """Refuse an expression that acts at its null, does nothing beyond it or has no value somewhere."""
-    rng = np.random.default_rng(0)
-    tried = {name: top * rng.uniform(-1.0, 1.0, 200) for name, top in _TRIED.items()}
-    tried |= {name: np.abs(tried[name]) for name in ("t", "V", "Kr", "omega")}
-    for name in ("b", "r", "y", "t", "V"):
-        tried[name][:: 7 + len(name) + ord(name[0]) % 5] = 0.0
-    at = {name: quantity.default for name, quantity in parameters.items()}
-    severity, size = next((name, quantity.scale) for name, quantity in parameters.items())
-    without = tried["y"] if null == "y" else 0.0
-    at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
-    if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
-        what = f"{formula.text!r} has no finite value somewhere in the motion of a rig"
-        raise TunnelError(what, remedy="avoid division by zero, and roots and logarithms of negative numbers")
-    if np.any(np.abs(at_null - without) > 1e-12):
-        remedy = "write it so that the first parameter, the severity, removes the effect"
-        raise TunnelError(f"{formula.text!r} is not {null} at {severity} = 0", remedy=remedy)
-    if np.all(np.abs(beyond - without) <= 1e-300):
-        raise TunnelError(f"{formula.text!r} does nothing", remedy="correct the expression or the scale")
 
 
 def read_effects(path: Path) -> tuple[type[Effect], ...]:

@@ -2,13 +2,12 @@
 
 from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from identification import identify
-from identification.uncertainty.budget import InputUncertainties, _common, make_budget, with_budget
+from identification.uncertainty.budget import InputUncertainties, make_budget, with_budget
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 
@@ -173,7 +172,8 @@ def test_scatter_beyond_noise_is_flagged_as_rarely_as_stated():
 
 @pytest.mark.parametrize("windy", [False, True])
 def test_what_common_errors_of_the_wind_need_is_said(windy):
-    budget = SimpleNamespace(names=("yaw_inertia", "mechanical_damping"), values=np.array([0.1, 0.01]))
-    inputs = SimpleNamespace(common={"wind_speed": 0.01}, correlation=lambda given: np.eye(len(given)))
-    (found,) = _common(budget, inputs, windy)
+    runs = [run for run in TWELVE if windy or run[1] == 0.0]
+    data = campaign(runs, noise=5e-4, rng=np.random.default_rng(2), **SHAPE)
+    found = component(budget_of(data, InputUncertainties(common={"wind_speed": 0.01})), "wind_speed, common")
     assert found.note == ("" if windy else "no wind-on run")
+    assert found.covariance.any() == windy

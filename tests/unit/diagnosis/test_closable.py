@@ -27,8 +27,7 @@ from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.make import as_campaign
-from tunnel_reference.outside import OUTSIDE_FORMS
-from tunnel_reference.outside_laws import LAW_FORMS
+from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import effect_class
 from tunnel_sim.effects.expression_effect import read_effects

@@ -5,7 +5,7 @@ import pytest
 
 from diagnosis.likelihood.prepare import in_stretches, prepare
 from diagnosis.likelihood.residuals import misfit
-from diagnosis.noise.rounding import rounding_errors, with_rounding
+from diagnosis.noise.gap import rounding_errors, with_rounding
 from diagnosis.noise.sensor_noise import (
     campaign_noise,
     lattice_step,

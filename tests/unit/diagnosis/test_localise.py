@@ -20,7 +20,6 @@ from diagnosis.where.along_motion import apparent_moment, backbones, drift
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
 from diagnosis.where.place import (
     _between_runs,
-    _by_band,
     infer_channel,
     infer_condition,
     locate,
@@ -276,11 +275,12 @@ def test_a_centre_that_shifts_with_the_second_harmonic_is_the_springs():
         ({"above": 0.9, "f0": -5.0}, "always", "sensor"),  # less than the noise is none
     ],
 )
-def test_the_band_of_most_of_the_excess_decides_the_channel(bands, condition, channel):
+def test_the_band_of_most_of_the_excess_decides_the_channel(monkeypatch, bands, condition, channel):
+    monkeypatch.setattr("diagnosis.where.place.drift", lambda _: (0.0, 0.0))
     given = tuple(SimpleNamespace(band=name, excess=excess) for name, excess in bands.items())
-    maps = SimpleNamespace(bands=given, lines=(), runs=())
-    found = _by_band(None, SimpleNamespace(maps=maps), condition)
-    assert (None if found is None else found.value) == channel
+    found = infer_channel(_ONE_DECAY, _without_a_blow(given), condition)
+    assert found.value == channel
+    assert ("most of it" in found.reason or "harmonic" in found.reason) == (channel is not None)
 
 
 @pytest.mark.parametrize(
@@ -299,17 +299,24 @@ def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
     monkeypatch, frequency, damping, channel
 ):
     monkeypatch.setattr("diagnosis.where.place.drift", lambda _: (frequency, damping))
-    runs = [SimpleNamespace(reading=np.zeros(100), drive=None)]
-    decays = SimpleNamespace(problem=SimpleNamespace(data=SimpleNamespace(runs=runs)))
+    assert infer_channel(_ONE_DECAY, _without_a_blow(()), "always").value == channel
+
+
+_ONE_DECAY = SimpleNamespace(
+    problem=SimpleNamespace(data=SimpleNamespace(runs=[SimpleNamespace(reading=np.zeros(100), drive=None)]))
+)
+
+
+def _without_a_blow(bands):
+    """Maps of one run with these excesses by band, no blow, and nothing between the runs."""
     maps = SimpleNamespace(
         time=SimpleNamespace(edges=np.arange(3.0)),
-        bands=(),
+        bands=bands,
         lines=(),
         runs=(),
         backbones=[_curve(0.0, 0.0, None)],
     )
-    found = SimpleNamespace(maps=maps, moment_energy=np.zeros(2))  # no blow, and nothing between the runs
-    assert infer_channel(decays, found, "always").value == channel
+    return SimpleNamespace(maps=maps, moment_energy=np.zeros(2))
 
 
 def _curve(frequency, damping, alone):

@@ -42,12 +42,13 @@ class Window:
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[Window]:
     opened: list[Window] = []
 
-    def open_window(model: Any, data: Any) -> Window:
-        del model
+    def open_window(_model: Any, data: Any, **sides: bool) -> Window:
+        assert sides == {"show_left_ui": False, "show_right_ui": False}
         opened.append(Window(data))
         return opened[-1]
 
-    monkeypatch.setattr(rendering, "_open_window", open_window)
+    monkeypatch.setattr(rendering, "_has_display", lambda: True)
+    monkeypatch.setattr("mujoco.viewer.launch_passive", open_window)
     return opened
 
 

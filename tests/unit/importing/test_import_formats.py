@@ -23,7 +23,6 @@ import xlsxwriter
 
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.binary import _unpacked_size
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.readers import load_reader
@@ -199,10 +198,17 @@ def test_sizes_are_counted_before_anything_is_unpacked(
 
 
 @pytest.mark.parametrize("compressed", [False, True])
-def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(tmp_path: Path, compressed: bool) -> None:
+def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compressed: bool
+) -> None:
     arrays = {name: np.zeros(1000) for name in ("a", "b", "c")}
     scipy.io.savemat(tmp_path / "three.mat", arrays, do_compression=compressed)
-    assert 3 * 8000 <= _unpacked_size((tmp_path / "three.mat").read_bytes()) < 3 * 8100
+    content = (tmp_path / "three.mat").read_bytes()
+    monkeypatch.setattr(limits, "DATA_BYTES", 3 * 8100)
+    assert read_tables(content, "three.mat")
+    monkeypatch.setattr(limits, "DATA_BYTES", 3 * 8000 - 8)
+    with pytest.raises(TunnelError, match="numbers, more than"):
+        read_tables(content, "three.mat")
 
 
 @pytest.mark.parametrize("name", ["log.h5", "log.mat"])

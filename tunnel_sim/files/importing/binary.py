@@ -256,7 +256,18 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
     from scipy.io import loadmat
 
     with faults("a MAT file", where):
-        check_size(_unpacked_size(content) // 8, where)
+        total = 0 if content.startswith(b"MATLAB") else len(content)
+        at = len(content) if total else _HEADER
+        order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
+        while at + 8 <= len(content):  # each element states its size in its first eight bytes
+            kind, size = (int.from_bytes(content[at + i : at + i + 4], order) for i in (0, 4))
+            if kind == _COMPRESSED:
+                start = zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], 8)
+                total += int.from_bytes(start[4:8], order)
+            else:
+                total += size
+            at += 8 + size
+        check_size(total // 8, where)
         held = loadmat(cast(Any, io.BytesIO(content)), simplify_cells=True)  # the stubs know paths only
     arrays: dict[str, NDArray[np.generic]] = {}
     runs = {}
@@ -269,23 +280,6 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
         elif below and name == "drive_hold":
             arrays[path] = np.array(hold_order(value))
     return tables_of_arrays(arrays, "MAT file", runs=runs)
-
-
-def _unpacked_size(content: bytes) -> int:
-    """Bytes of all elements once unpacked, which each states in its first eight."""
-    if not content.startswith(b"MATLAB"):
-        return len(content)
-    order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
-    at, total = _HEADER, 0
-    while at + 8 <= len(content):
-        kind, size = (int.from_bytes(content[at + i : at + i + 4], order) for i in (0, 4))
-        if kind == _COMPRESSED:
-            start = zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], 8)
-            total += int.from_bytes(start[4:8], order)
-        else:
-            total += size
-        at += 8 + size
-    return total
 
 
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.generic] | str]]:

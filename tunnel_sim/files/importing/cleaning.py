@@ -238,7 +238,25 @@ def find_runs(time_s: Array, reading: Array) -> list[RecordPiece]:
         lengths[0] = np.inf  # pulled aside: a free swing takes no longer out than back
     # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
     moved = int(starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * usual else ends[-1])
-    found = _released(lengths, peaks, usual)
+    # the excursions in which a hand moves the body, each with the one from which on the motion is free
+    found: list[tuple[int, int]] = []
+    for k in np.flatnonzero(lengths[:-1] > _LONGER * usual).tolist():
+        before = peaks[k - 1] if k else 0.0
+        if max(peaks[k], peaks[k + 1]) <= _GROWN * before:
+            continue
+        at = k
+        while at + 1 < peaks.size and peaks[at + 1] > _STILL_GROWING * peaks[at]:
+            at += 1
+        if not found or at > found[-1][1]:
+            found.append((k, at))
+    if found and found[0][0] >= _LEAST_HALVES:  # the record begins in free motion
+        found.insert(0, (0, 0))
+    until = [*(k for k, _ in found), peaks.size][1:]
+    found = [
+        (k, at)
+        for (k, at), end in zip(found, until, strict=True)
+        if peaks[at:end].max() <= _STILL_GROWING * peaks[at]
+    ]
     if not found:
         return [RecordPiece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
     pieces = []
@@ -286,28 +304,6 @@ def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np
     if not outside.size:
         return outside, outside
     return outside[np.concatenate([[0], change + 1])], outside[np.concatenate([change, [-1]])] + 1
-
-
-def _released(lengths: Array, peaks: Array, usual: float) -> list[tuple[int, int]]:
-    """The excursions in which a hand moves the body, each with the one from which on the motion is free."""
-    found: list[tuple[int, int]] = []
-    for k in np.flatnonzero(lengths[:-1] > _LONGER * usual).tolist():
-        before = peaks[k - 1] if k else 0.0
-        if max(peaks[k], peaks[k + 1]) <= _GROWN * before:
-            continue
-        at = k
-        while at + 1 < peaks.size and peaks[at + 1] > _STILL_GROWING * peaks[at]:
-            at += 1
-        if not found or at > found[-1][1]:
-            found.append((k, at))
-    if found and found[0][0] >= _LEAST_HALVES:  # the record begins in free motion
-        found.insert(0, (0, 0))
-    ends = [*(k for k, _ in found), peaks.size][1:]
-    return [
-        (k, at)
-        for (k, at), end in zip(found, ends, strict=True)
-        if peaks[at:end].max() <= _STILL_GROWING * peaks[at]
-    ]
 
 
 def _without_long_rest(time_s: Array, first: int, end: int, *, clear: bool) -> int:

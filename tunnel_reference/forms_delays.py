@@ -1,4 +1,4 @@
-"""Forms of samples that are missing without a gap in the time stamps."""
+"""Forms of errors in time: a delay of the input, and samples that are missing without a gap in the time stamps."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.catalogue import Bind, Bound, Draw, Extra, Form, Group
+from tunnel_reference.catalogue import Bind, Bound, Draw, Extra, Form, Group, calibration
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.readings import Order, Params, Reading, ReadingTerm
 
+_BOTH = (-1, 1)
 _LONGEST = 0.25  # s: longest time lost, for which the motion goes on beyond the record
 
 
@@ -45,7 +46,20 @@ def _lost(instants: int) -> Bind:
 
 _DRAWN: Draw = lambda g, c: {"seed": float(g.integers(0, 2**31)), "duration": c.duration}  # noqa: E731
 
+
+def _later(p: float, e: Extra, c: Conditions) -> Conditions:
+    """The input acts later by p, in every run by the share ``spread`` of it more or less."""
+    assert c.drive is not None
+    own = np.random.default_rng(int(e["seed"])).uniform(-1.0, 1.0, c.runs)
+    return replace(c, drive=replace(c.drive, delay=p * (1.0 + e["spread"] * own)))
+
+
 FORMS = (
+    Form("input_delay", "constant", Group.TEXTBOOK, "τ, s", 5e-4, calibration(_later), _BOTH,
+         draw=lambda _g, _c: {"seed": 0.0, "spread": 0.0}, limits=(1e-6, 0.05), driven=True),
+    Form("input_delay", "by_run", Group.COMMON, "τ, s", 5e-4, calibration(_later), _BOTH,
+         draw=lambda g, _c: {"seed": float(g.integers(0, 2**31)), "spread": 0.1}, limits=(1e-6, 0.05),
+         driven=True),
     Form("dropped_samples", "one_instant", Group.TEXTBOOK, "τ, s", 0.005, _lost(1), draw=_DRAWN,
          limits=(1e-3, 0.9 * _LONGEST)),
     Form("dropped_samples", "three_instants", Group.COMMON, "τ, s", 0.005, _lost(3), draw=_DRAWN,
