@@ -17,17 +17,10 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import chdtri
 
+from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
-from diagnosis.policy import (
-    CHANCE_STDS,
-    COLOUR_AMPLITUDES,
-    COLOUR_THROUGHOUT,
-    FALSE_ALARM_RATE,
-    FLOOR_TOLERANCE,
-    LOCAL_FALSE_ALARM_RATE,
-)
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough
@@ -111,7 +104,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
         for piece in (slice(i * length, (i + 1) * length) for i in range(pieces)):
             parts.append(_part(values[piece], run.reading[piece] - values[piece], run, own))
     sizes = [part.motion for part in parts]
-    if len(sizes) < _FEWEST_PARTS or max(sizes) < COLOUR_AMPLITUDES * min(sizes):
+    if len(sizes) < _FEWEST_PARTS or max(sizes) < policy.COLOUR_AMPLITUDES * min(sizes):
         return None
     lowest = max(
         _LOWEST * max(part.frequency[1] for part in parts),
@@ -125,14 +118,14 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
     steady = _steady(power, count)
-    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= COLOUR_THROUGHOUT)):
+    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= policy.COLOUR_THROUGHOUT)):
         return None
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
     std = np.sqrt(1.0 / total[steady])
-    weight = 1.0 / (std**2 + FLOOR_TOLERANCE**2)
+    weight = 1.0 / (std**2 + policy.FLOOR_TOLERANCE**2)
     departure = float(weight @ (level - float(weight @ level / weight.sum())) ** 2)
-    if departure < float(chdtri(level.size - 1, FALSE_ALARM_RATE)):  # one constant within chance
+    if departure < float(chdtri(level.size - 1, policy.FALSE_ALARM_RATE)):  # one constant within chance
         return None
     centres = np.sqrt(edges[1:] * edges[:-1])[steady]
     lowest_bands = slice(0, _SLOPE_BANDS)
@@ -142,7 +135,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     slope = float((weight * centred) @ level[lowest_bands]) / information
     slope_std = float(np.sqrt(1.0 / information))
     # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
-    steep = slope - CHANCE_STDS * slope_std if steady[0] else slope
+    steep = slope - policy.CHANCE_STDS * slope_std if steady[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
 
 
@@ -158,7 +151,7 @@ def _steady(power: Array, count: Array) -> np.ndarray:
     corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
     statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
     freedom = np.sum(count > 0, axis=0) - 1
-    limit = chdtri(np.maximum(freedom, 1), LOCAL_FALSE_ALARM_RATE)
+    limit = chdtri(np.maximum(freedom, 1), policy.LOCAL_FALSE_ALARM_RATE)
     return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
 
 
@@ -251,7 +244,7 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     relative = frequency / colour.frequency[0]
     seen = _least_loss(relative, power, 1.0)
     free = min(seen, _least_loss(relative, power, _LOWEST_CORNER))
-    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * FALSE_ALARM_RATE))
+    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * policy.FALSE_ALARM_RATE))
 
 
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:

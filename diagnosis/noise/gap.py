@@ -11,6 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import bdtrc, chdtrc, stdtr
 
+from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit, FitError
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.problem import Problem
@@ -19,14 +20,6 @@ from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start
 from diagnosis.noise.colour import noise_colour, whitened, zero_wanders
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
-from diagnosis.policy import (
-    BEYOND_THE_MOTION,
-    FALSE_ALARM_RATE,
-    FLOOR_TOLERANCE,
-    NOISE_FALSE_ALARM_SHARE,
-    NOISE_TAILS,
-    ROUNDED_NOISE,
-)
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
 
@@ -124,7 +117,7 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
         return dict.fromkeys(_NAMES, 1.0)
     white = noise.white(trend.step)
     factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
-    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(NOISE_TAILS)])
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(policy.NOISE_TAILS)])
     count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
     found = np.zeros(3)
     for factor in factors:
@@ -146,7 +139,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
     median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
-    level = noise.estimated / (ROUNDED_NOISE * noise.stated_variance)
+    level = noise.estimated / (policy.ROUNDED_NOISE * noise.stated_variance)
     ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
     return float(bdtrc((ordinates - 1) // 2, ordinates, 2.0**-level))
 
@@ -210,7 +203,7 @@ def gap_test(
         level = np.mean(found, axis=0)
         beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
         level, scatter = np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
-    floor = (1.0 + FLOOR_TOLERANCE) * noise.margin * level
+    floor = (1.0 + policy.FLOOR_TOLERANCE) * noise.margin * level
     tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
     tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
     noisy: dict[str, float] = {}
@@ -219,7 +212,7 @@ def gap_test(
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
     everything = tests | noisy
-    limit = FALSE_ALARM_RATE / len(everything)
+    limit = policy.FALSE_ALARM_RATE / len(everything)
     smallest = min(everything.values())
     return GapTest(
         smallest < limit,
@@ -231,7 +224,7 @@ def gap_test(
 
 def _misbehaves(tests: Mapping[str, float]) -> float:
     """The p-value of one of these tests below which the noise itself misbehaves."""
-    return FALSE_ALARM_RATE * NOISE_FALSE_ALARM_SHARE / len(tests)
+    return policy.FALSE_ALARM_RATE * policy.NOISE_FALSE_ALARM_SHARE / len(tests)
 
 
 def gap_or_colour(
@@ -270,7 +263,9 @@ def gap_or_colour(
         test = gap_test(white, coloured, trend, coarse_step=coarse_step, errors=errors)
         still = any(not run.wind_on for run in nominal.problem.data.runs)
         excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
-        believed = still and not excessive and noise_colour(source, beyond=BEYOND_THE_MOTION) is not None
+        believed = (
+            still and not excessive and noise_colour(source, beyond=policy.BEYOND_THE_MOTION) is not None
+        )
         if believed if test.detected else not zero_wanders(nominal, found):
             return white, coloured, test
     blurred = max(noise.white(step).values()) >= 0.5 * step

@@ -11,17 +11,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
+from diagnosis import policy
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
-from diagnosis.policy import (
-    AS_MUCH,
-    LEAST_CLOSABLE,
-    LINE_CONTRAST,
-    LOCAL_FALSE_ALARM_RATE,
-    MOST,
-)
 from diagnosis.remainder.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.remainder.formula import choose, propose
 from diagnosis.remainder.paths import COMMON, OF_READING, SINGLE, Path, Places
@@ -89,7 +83,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         words += (
             f" The line is at {with_std(*sizes[:2])} Hz, with an amplitude of {with_std(*sizes[2:])} "
             f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
-            f"{100.0 * LOCAL_FALSE_ALARM_RATE:.2g} % of campaigns."
+            f"{100.0 * policy.LOCAL_FALSE_ALARM_RATE:.2g} % of campaigns."
         )
     excess = left.excess / left.problem.data.runs[0].block
     return Closable(excess, ceilings, kind, words, where, shape, law)
@@ -100,10 +94,10 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )
-    if max(of_all.closed, of_one.closed) < LEAST_CLOSABLE:
+    if max(of_all.closed, of_one.closed) < policy.LEAST_CLOSABLE:
         return "noise"
-    among, best = (common, of_all) if of_all.closed >= MOST * of_one.closed else (single, of_one)
-    least = best.closed - max(AS_MUCH, best.std)
+    among, best = (common, of_all) if of_all.closed >= policy.MOST * of_one.closed else (single, of_one)
+    least = best.closed - max(policy.AS_MUCH, best.std)
     return next(kind for kind, one in among.items() if one.ceiling.closed >= least)
 
 
@@ -122,7 +116,7 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
     sizes = np.array([before[run].size for run in both], np.float64)
     closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-    if closed < LEAST_CLOSABLE:
+    if closed < policy.LEAST_CLOSABLE:
         return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):
@@ -153,7 +147,7 @@ def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Eve
     # of others, those that the kind is not a case of
     included = (kind, "state") if kind in ("angle", "rate") else (kind,)
     others = [one for one in ceilings if one.held_out == best.held_out and one.kind not in included]
-    alike = [one for one in others if one.closed >= best.closed - max(AS_MUCH, best.std)]
+    alike = [one for one in others if one.closed >= best.closed - max(policy.AS_MUCH, best.std)]
     if alike:
         said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")
     elif others:
@@ -312,7 +306,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
             before = float(residual[own] @ residual[own])
             predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
             fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
-    if predicted / max(fitted, 1e-300) < MOST:
+    if predicted / max(fitted, 1e-300) < policy.MOST:
         return None
     drops = _drops(unexplained, frequency)
     whole = float(drops.sum())
@@ -369,8 +363,8 @@ def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
     with np.errstate(divide="ignore"):
         chance = np.where(count > 0, np.log(chdtrc(2.0 * np.maximum(count, 1.0), power)), 0.0)
     best = int(np.argmin(chance))
-    clear = power[best] >= LINE_CONTRAST * 2.0 * count[best]
-    if not clear or chance[best] + np.log(grid.size) > np.log(LOCAL_FALSE_ALARM_RATE):
+    clear = power[best] >= policy.LINE_CONTRAST * 2.0 * count[best]
+    if not clear or chance[best] + np.log(grid.size) > np.log(policy.LOCAL_FALSE_ALARM_RATE):
         return None, 1.0
     return float(grid[best]), float(floors[best] / count[best])
 

@@ -8,24 +8,11 @@ from math import degrees
 
 import numpy as np
 
+from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
-from diagnosis.policy import (
-    BETWEEN_RUNS_SHARE,
-    BLOW_SHARE,
-    CLEAR_MOMENT,
-    DOMINANT_SHARE,
-    DRIFT_RATIO,
-    FASTEST_MOMENT,
-    LISTED_BAND_SHARE,
-    LOCAL_FALSE_ALARM_RATE,
-    LOCATES_UP_TO,
-    NAMED_RUN_SHARE,
-    SECOND_HARMONIC_SHARE,
-    SINGLE_RUN_SHARE,
-)
 from diagnosis.printing import plain
 from diagnosis.result import Where
 from diagnosis.where.along_motion import drift
@@ -91,8 +78,12 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
 
 def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
     """The runs beyond chance (1 % over all) that have a tenth or more of the largest excess among them."""
-    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < LOCAL_FALSE_ALARM_RATE}
-    least = NAMED_RUN_SHARE * max(clear.values(), default=0.0)
+    clear = {
+        run.id: run.excess
+        for run in excesses
+        if run.p_value() * len(excesses) < policy.LOCAL_FALSE_ALARM_RATE
+    }
+    least = policy.NAMED_RUN_SHARE * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
@@ -105,10 +96,10 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     undetermined = "whether it needs wind cannot be determined"
     if not off:
         return Finding(None, f"{undetermined}, since the wind is on in every run")
-    if min(run.p_value for run in shown) * len(runs) > LOCAL_FALSE_ALARM_RATE:
+    if min(run.p_value for run in shown) * len(runs) > policy.LOCAL_FALSE_ALARM_RATE:
         return Finding(None, f"{undetermined}, since no single run shows it")
     most = max(shown, key=lambda run: run.share)
-    if len(shown) >= 3 and most.share > SINGLE_RUN_SHARE and most.id not in off:
+    if len(shown) >= 3 and most.share > policy.SINGLE_RUN_SHARE and most.id not in off:
         return Finding(None, f"{undetermined} from one run alone ({most.id})")
     # without coefficients and a gain that these runs lack
     data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
@@ -121,7 +112,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     tests += [band.p_value for band in band_excesses(excesses)]
     count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
     show = f"{count}, fitted alone, show{'s' * (len(off) == 1)}"
-    if min(tests) * len(tests) < LOCAL_FALSE_ALARM_RATE:
+    if min(tests) * len(tests) < policy.LOCAL_FALSE_ALARM_RATE:
         return Finding("always", f"{show} it too")
     return Finding("wind_on", f"{show} no gap")
 
@@ -138,10 +129,10 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     """
     edges = found.maps.time.edges
     interval = shortest_interval(edges, found.moment_energy, share)
-    if interval is None or found.moment_z < CLEAR_MOMENT:
+    if interval is None or found.moment_z < policy.CLEAR_MOMENT:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= BLOW_SHARE * length
+    brief = interval[1] - interval[0] <= policy.BLOW_SHARE * length
     return interval if brief and interval[0] > 0.05 * length else None
 
 
@@ -155,22 +146,23 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
-    lines = [line for line in found.maps.lines if line.share > 0.5 * DOMINANT_SHARE]
+    lines = [line for line in found.maps.lines if line.share > 0.5 * policy.DOMINANT_SHARE]
     if lines and len(lines) >= max(1, len(found.maps.runs) // 3):
         hertz = float(np.median([line.frequency for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Finding(
-            "forcing" if similar < FASTEST_MOMENT else "sensor", f"it is a spectral line near {hertz:.3g} Hz"
+            "forcing" if similar < policy.FASTEST_MOMENT else "sensor",
+            f"it is a spectral line near {hertz:.3g} Hz",
         )
-    if excess.get("above", 0.0) > DOMINANT_SHARE * whole:
+    if excess.get("above", 0.0) > policy.DOMINANT_SHARE * whole:
         return Finding("sensor", "most of it is faster than the rig can move")
-    if excess.get("0", 0.0) > DOMINANT_SHARE * whole:
-        if excess.get("2f0", 0.0) > SECOND_HARMONIC_SHARE * whole:
+    if excess.get("0", 0.0) > policy.DOMINANT_SHARE * whole:
+        if excess.get("2f0", 0.0) > policy.SECOND_HARMONIC_SHARE * whole:
             return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
         if condition == "wind_on":
             return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
         return Finding("sensor", "most of it is a slow shift of the centre")
-    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > DOMINANT_SHARE * whole:
+    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > policy.DOMINANT_SHARE * whole:
         return Finding(
             "sensor", "it contains harmonics of the motion, without a shift of frequency or damping"
         )
@@ -180,9 +172,9 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, "every run is driven, so that no decay shows it")
     frequency, damping = drift(list(found.maps.backbones))
-    if frequency > DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
+    if frequency > policy.DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
+    if damping > policy.DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
     return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
 
@@ -198,7 +190,7 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         frequency = curve.alone_frequency / curve.nominal_frequency - 1.0
         shifts.append((frequency, curve.alone_zeta - curve.nominal_zeta))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
-    if len(sizes) < 2 or left > BETWEEN_RUNS_SHARE * whole:
+    if len(sizes) < 2 or left > policy.BETWEEN_RUNS_SHARE * whole:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
@@ -249,7 +241,7 @@ def describe(
 ) -> str:
     """Where the gap is, in sentences; the bands are those that show it."""
     # which runs show the gap, and how much more of it is with the wind on or off
-    count, rate = len(found.maps.runs), 100.0 * LOCAL_FALSE_ALARM_RATE
+    count, rate = len(found.maps.runs), 100.0 * policy.LOCAL_FALSE_ALARM_RATE
     share = sum(run.share for run in found.maps.runs if run.id in where.runs)
     named = f" ({', '.join(where.runs)})" if len(where.runs) <= _LISTED else ""
     if not where.runs:
@@ -273,17 +265,17 @@ def describe(
             text += f"; {ratio:.2g} times as much power with the wind {more} as with it {less}"
     parts, places = [f"{text}."], []
     length, greatest = float(found.maps.time.edges[-1]), float(found.maps.amplitude.edges[-1])
-    if where.time_s is not None and where.time_s[1] - where.time_s[0] < LOCATES_UP_TO * length:
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < policy.LOCATES_UP_TO * length:
         places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
     amplitude = where.amplitude_rad
-    if amplitude is not None and amplitude[1] - amplitude[0] < LOCATES_UP_TO * greatest:
+    if amplitude is not None and amplitude[1] - amplitude[0] < policy.LOCATES_UP_TO * greatest:
         places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
     if places:
         parts.append(f"Four fifths of it lie {', '.join(places)}.")
     whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
-    shown = [b for b in found.maps.bands if b.band in bands and b.excess > LISTED_BAND_SHARE * whole]
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > policy.LISTED_BAND_SHARE * whole]
     if shown and whole > 0.0:
         shown.sort(key=lambda band: -band.excess)
         listed = (f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)

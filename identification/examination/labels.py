@@ -17,16 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, fdtri, ndtri
 
+from identification import policy
 from identification.examination.self_excited import Swing
-from identification.policy import (
-    INERTIA_FACTOR,
-    LEAST_SPRING_SPREAD,
-    LEAST_STIFFNESS_STD,
-    MISFIT_RATE,
-    REFUSAL_RATE,
-    SAME_PRESSURE,
-    SPRING_TOLERANCE,
-)
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
@@ -62,7 +54,7 @@ class Labels:
             np.array([float(run.spring_stiffness or 0.0) for run in runs]),
             np.array([0.5 * (run.air_density or 0.0) * run.wind_speed**2 for run in runs]),
             seen,
-            np.maximum(std, LEAST_STIFFNESS_STD * seen),
+            np.maximum(std, policy.LEAST_STIFFNESS_STD * seen),
         )
 
 
@@ -76,7 +68,7 @@ class _Misfit:
     @property
     def agrees(self) -> bool:
         """Whether the residuals are within chance."""
-        return self.squares <= float(chdtri(self.freedom, MISFIT_RATE))
+        return self.squares <= float(chdtri(self.freedom, policy.MISFIT_RATE))
 
 
 def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -87,18 +79,20 @@ def exchanged_labels(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     labels = Labels.of(known)
     for what in (_SPRINGS, "wind_speed"):
         stated, away = _misfit(labels, what)
-        if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, REFUSAL_RATE))):
+        if not (stated.freedom > 0 and stated.squares > float(chdtri(stated.freedom, policy.REFUSAL_RATE))):
             continue
         trials = [(places, _misfit(other, what)[0]) for places, other in _exchanged(labels, away, what)]
         mended = []  # that agree, or agree better than what is stated by more than chance
         for places, found in trials:
             ratio, freedom = stated.squares / max(found.squares, 1e-300), found.freedom
-            if found.agrees or ratio > float(fdtri(freedom, freedom, 1.0 - REFUSAL_RATE / len(trials))):
+            if found.agrees or ratio > float(
+                fdtri(freedom, freedom, 1.0 - policy.REFUSAL_RATE / len(trials))
+            ):
                 mended.append((places, found))
         if not mended:
             continue
         # Exchanges that fit as well as the best one cannot be distinguished.
-        limit = min(found.squares for _, found in mended) + float(chdtri(1, MISFIT_RATE))
+        limit = min(found.squares for _, found in mended) + float(chdtri(1, policy.MISFIT_RATE))
         names = [[known[i].run.id for i in places] for places, found in mended if found.squares <= limit]
         ids = tuple(dict.fromkeys(itertools.chain.from_iterable(names)))
         pairs = ", or ".join(" and ".join(pair) for pair in names)
@@ -135,7 +129,7 @@ def _fitted(
     lengths = np.linalg.norm(scaled, axis=0)
     if (
         spring.size < lengths.size
-        or np.linalg.svd(scaled / lengths, compute_uv=False)[-1] < LEAST_SPRING_SPREAD
+        or np.linalg.svd(scaled / lengths, compute_uv=False)[-1] < policy.LEAST_SPRING_SPREAD
     ):
         return None
     solution = np.linalg.lstsq(scaled / lengths, np.ones_like(spring), rcond=None)[0] / lengths
@@ -153,7 +147,11 @@ def _misfit(labels: Labels, what: str) -> tuple[_Misfit, Array]:
         columns, target = labels.seen[:, None], labels.spring
         if np.any(labels.pressure > 0.0):
             columns = np.column_stack((columns, labels.pressure))
-        std = labels.spring * np.hypot(SPRING_TOLERANCE, labels.std / labels.seen) * np.sqrt(count[place])
+        std = (
+            labels.spring
+            * np.hypot(policy.SPRING_TOLERANCE, labels.std / labels.seen)
+            * np.sqrt(count[place])
+        )
         freedom = springs.size - 1
     else:
         columns, target, std = np.zeros((labels.seen.size, springs.size + 1)), labels.seen, labels.std
@@ -175,7 +173,7 @@ def _exchanged(labels: Labels, away: Array, what: str) -> Iterator[tuple[tuple[i
     values = labels.spring if what == _SPRINGS else labels.pressure
     for i, j in pairs:
         low, high = sorted((values[i], values[j]))
-        if high - low > (0.0 if what == _SPRINGS else SAME_PRESSURE * high):
+        if high - low > (0.0 if what == _SPRINGS else policy.SAME_PRESSURE * high):
             other = values.copy()
             other[[i, j]] = other[[j, i]]
             yield (
@@ -196,7 +194,7 @@ def _exchanged(labels: Labels, away: Array, what: str) -> Iterator[tuple[tuple[i
 def _speeds_exchanged(labels: Labels) -> Iterator[tuple[tuple[int, ...], Labels]]:
     """The wind speeds of all runs of two settings."""
     order = np.argsort(labels.pressure)
-    rises = np.diff(labels.pressure[order]) > SAME_PRESSURE * labels.pressure[order][1:]
+    rises = np.diff(labels.pressure[order]) > policy.SAME_PRESSURE * labels.pressure[order][1:]
     settings = np.split(order, np.flatnonzero(rises) + 1)
     for one, two in itertools.combinations(settings, 2):
         if one.size + two.size == 2:
@@ -240,7 +238,7 @@ class _Springs:
         seen = [np.mean([np.log(s.stiffness) for s in group]) for group in groups]
         # Of the mean of ln k: the effect of the amplitude on k is common to the runs of a spring.
         std = [
-            np.hypot(SPRING_TOLERANCE, float(np.mean([s.stiffness_std / s.stiffness for s in group])))
+            np.hypot(policy.SPRING_TOLERANCE, float(np.mean([s.stiffness_std / s.stiffness for s in group])))
             for group in groups
         ]
         return cls(
@@ -264,7 +262,7 @@ class _Springs:
     def disagree(self) -> bool:
         """Whether the springs' inertias differ beyond chance."""
         away = (self.inertia - self.mean()[0]) / self.std
-        return float(away @ away) > float(chdtri(self.stiffness.size - 1, MISFIT_RATE))
+        return float(away @ away) > float(chdtri(self.stiffness.size - 1, policy.MISFIT_RATE))
 
 
 def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
@@ -287,7 +285,7 @@ def springs_off_the_line(swings: Sequence[Swing]) -> tuple[Remark, ...]:
         mean, std = rest.mean()
         score = abs(springs.inertia[place] - mean) / float(np.hypot(std, springs.std[place]))
         scores.append(-1.0 if rest.disagree() else score)
-    if scores and max(scores) > float(-ndtri(0.5 * MISFIT_RATE / count)):
+    if scores and max(scores) > float(-ndtri(0.5 * policy.MISFIT_RATE / count)):
         place = int(np.argmax(scores))
         percent = 100.0 * np.expm1(springs.without(place).mean()[0] - springs.inertia[place])
         how = f"{abs(percent):.0f} % {'stiffer' if percent > 0.0 else 'softer'}"
@@ -321,10 +319,10 @@ def inertia_off_the_springs(swings: Sequence[Swing], campaign: Campaign) -> tupl
         return ()
     found = float(np.exp(_Springs.of(still).mean()[0]))
     off = {ratio: abs(np.log(found / stated / ratio)) for ratio in (1.0, *_SLIPS)}
-    if off[1.0] <= np.log(INERTIA_FACTOR):
+    if off[1.0] <= np.log(policy.INERTIA_FACTOR):
         return ()
     nearest = min(_SLIPS, key=off.__getitem__)
-    slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(INERTIA_FACTOR) else ""
+    slip = f": it looks like {_SLIPS[nearest]}" if off[nearest] <= np.log(policy.INERTIA_FACTOR) else ""
     what = (
         f"with the wind off Kr/omega_n^2 is {found:.4g} kg m2, {found / stated:.4g} times the stated "
         f"yaw_inertia of {stated:.4g} kg m2{slip}"

@@ -13,16 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtrc
 
-from identification.policy import (
-    LEAST_GROWTH_WINDOWS,
-    LEAST_STEADY_CYCLES,
-    LINEAR_SHARE,
-    MISFIT_DEVIATIONS,
-    REFUSAL_DEVIATIONS,
-    REFUSAL_RATE,
-    SETTLED_SHARE,
-    STEADY_CHANGE,
-)
+from identification import policy
 from identification.printing import significant
 from identification.signal.decay_fit import Reading, project_run
 from identification.signal.free_decay import envelope_amplitude
@@ -112,7 +103,7 @@ def growing_runs(swings: Sequence[Swing]) -> tuple[Remark, ...]:
     """
     ids = []
     for swing in swings:
-        if swing.run.wind_on or swing.rate + REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
+        if swing.run.wind_on or swing.rate + policy.REFUSAL_DEVIATIONS * swing.rate_std >= 0.0:
             continue
         quarters = [float(part @ part) / max(part.size, 1) for part in np.array_split(swing.motion, 4)]
         if quarters[3] > quarters[2] > max(quarters[0], quarters[1]):
@@ -173,8 +164,11 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     slope, std = _slope(windows.time, windows.amplitude)
     length = float(np.ptp(windows.time))
     cycles = length * float(np.median(windows.frequency))
-    changes = (abs(slope) + MISFIT_DEVIATIONS * std) * length
-    if cycles >= LEAST_STEADY_CYCLES and max(changes, np.log(windows.amplitude).std()) < STEADY_CHANGE:
+    changes = (abs(slope) + policy.MISFIT_DEVIATIONS * std) * length
+    if (
+        cycles >= policy.LEAST_STEADY_CYCLES
+        and max(changes, np.log(windows.amplitude).std()) < policy.STEADY_CHANGE
+    ):
         amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
         what = (
             f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
@@ -191,21 +185,21 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     first, last = (
         float(np.mean(part**2)) for part in (windows.amplitude[:quarter], windows.amplitude[-quarter:])
     )
-    if not fdtrc(2 * quarter, 2 * quarter, last / first) < REFUSAL_RATE:
+    if not fdtrc(2 * quarter, 2 * quarter, last / first) < policy.REFUSAL_RATE:
         return run, None
     # First window of the limit cycle; None where the amplitude still grows at the end.
-    below = np.flatnonzero(windows.amplitude < SETTLED_SHARE * _last(windows.amplitude))
+    below = np.flatnonzero(windows.amplitude < policy.SETTLED_SHARE * _last(windows.amplitude))
     start, settled = int(below[-1]) + 1 if below.size else 0, None
-    if windows.time.size - start >= LEAST_GROWTH_WINDOWS:
+    if windows.time.size - start >= policy.LEAST_GROWTH_WINDOWS:
         slope, std = _slope(windows.time[start:], windows.amplitude[start:])
-        if slope + MISFIT_DEVIATIONS * std < float(windows.growth_rate[:start].max(initial=0.0)):
+        if slope + policy.MISFIT_DEVIATIONS * std < float(windows.growth_rate[:start].max(initial=0.0)):
             settled = start
-    limit = np.inf if settled is None else LINEAR_SHARE * _last(windows.amplitude)
+    limit = np.inf if settled is None else policy.LINEAR_SHARE * _last(windows.amplitude)
     # From the smallest amplitude to the last window below the limit, rad.
     above = np.flatnonzero(windows.amplitude > limit)
     end = int(above[0]) if above.size else windows.time.size
     part = slice(int(np.argmin(windows.amplitude[:end])) if end else 0, end)
-    enough = part.stop - part.start >= LEAST_GROWTH_WINDOWS
+    enough = part.stop - part.start >= policy.LEAST_GROWTH_WINDOWS
     remark = _growth_remark(run, windows, part if enough else None, settled)
     if settled is None:
         return run, remark
@@ -224,7 +218,7 @@ def windows_of(record: Record) -> AmplitudeWindows | None:
         return None
     reading = thinned_reading(evenly_spaced(record), frequency)
     count = int(float(reading.time[-1]) * frequency / _CYCLES)
-    if count < 2 * LEAST_GROWTH_WINDOWS:
+    if count < 2 * policy.LEAST_GROWTH_WINDOWS:
         return None
     rows = []
     for part in np.array_split(np.arange(reading.time.size), count):
@@ -239,13 +233,13 @@ def windows_of(record: Record) -> AmplitudeWindows | None:
         amplitude = envelope_amplitude(decay, run.angle, run.rate) * np.exp(-0.5 * decay.rate * length)
         if np.isfinite(amplitude) and amplitude > 0.0:
             rows.append((float(time.mean()), float(amplitude), decay.omega_d / (2.0 * np.pi)))
-    if len(rows) < max(2 * LEAST_GROWTH_WINDOWS, count // 2):
+    if len(rows) < max(2 * policy.LEAST_GROWTH_WINDOWS, count // 2):
         return None
     return AmplitudeWindows(*np.array(rows).T)
 
 
 def _last(amplitude: Array) -> float:
-    return float(np.median(amplitude[-LEAST_GROWTH_WINDOWS:]))
+    return float(np.median(amplitude[-policy.LEAST_GROWTH_WINDOWS :]))
 
 
 def _slope(time: Array, amplitude: Array) -> tuple[float, float]:
@@ -265,14 +259,14 @@ def _growth_remark(run: Run, windows: AmplitudeWindows, part: slice | None, sett
     end = (
         f"reaches {significant(last, 2)} rad" if settled is None else f"settles at {significant(last, 2)} rad"
     )
-    if rate is not None and grown > rate + MISFIT_DEVIATIONS * (std or 0.0):
+    if rate is not None and grown > rate + policy.MISFIT_DEVIATIONS * (std or 0.0):
         said += f" (at most {grown:.2g} 1/s, at {significant(at, 2)} rad)"
     if settled is None:
         outcome, remedy = Outcome.NOTED, "its damping is negative as long as the growth is linear"
     elif part is None:
         outcome, remedy = Outcome.LEFT_OUT, "start from a smaller motion to record its linear growth"
     else:
-        share = f"{100.0 * LINEAR_SHARE:.0f} %"
+        share = f"{100.0 * policy.LINEAR_SHARE:.0f} %"
         outcome = Outcome.CUT
         remedy = f"frequency and damping are those of its growth up to {share} of the limit cycle"
     return Remark(

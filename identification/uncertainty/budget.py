@@ -18,14 +18,9 @@ from pydantic import Field
 from scipy.linalg import block_diag
 from scipy.special import chdtri
 
+from identification import policy
 from identification.campaign.derivatives import build_design, combine, derivatives
 from identification.estimate import PARAMETERS, Estimate, Quantity, RunEstimate
-from identification.policy import (
-    DIFFERENCE_DEVIATIONS,
-    DIFFERENCE_RATE,
-    LEAST_FREE_SHARE,
-    LEAST_SCATTER_FREEDOM,
-)
 from identification.statistics import inverse
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -285,7 +280,7 @@ def make_budget(
         stds = np.array([getattr(rival, name).std for name in names])
         # Of two unbiased estimates from the same records, the better one is uncorrelated with their difference.
         chance = np.sqrt(np.abs(stds**2 - own_std**2))
-        move = np.where(move > DIFFERENCE_DEVIATIONS * chance, move, 0.0)
+        move = np.where(move > policy.DIFFERENCE_DEVIATIONS * chance, move, 0.0)
         if np.any(move > 0.0):
             blamed.append(name)
         largest = np.maximum(largest, move)
@@ -461,15 +456,15 @@ def _side(fit: _SideFit, covariance: Array, mine: Array) -> SideScatter:
         # The weighted residuals of these rows are a linear map of errors with this covariance.
         residual_map = root[:, None] * (np.eye(size) - fit.hat)
         spread = residual_map @ covariance @ residual_map.T
-        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < LEAST_SCATTER_FREEDOM:
+        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < policy.LEAST_SCATTER_FREEDOM:
             continue
         seen = True
         expected = float(np.trace(spread))
         degrees = expected**2 / float(np.sum(spread**2))
         ratio = float(np.sum((root * fit.residual) ** 2)) / expected
-        if ratio > float(chdtri(degrees, DIFFERENCE_RATE)) / degrees:
+        if ratio > float(chdtri(degrees, policy.DIFFERENCE_RATE)) / degrees:
             # As in the jackknife, every run gets the variance of its own residual, corrected for its leverage.
-            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), LEAST_FREE_SHARE)
+            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), policy.LEAST_FREE_SHARE)
             excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
             added += (fit.influence * (chosen * excess)) @ fit.influence.T
     return SideScatter(seen, fit.names, added)

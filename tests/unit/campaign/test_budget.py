@@ -172,7 +172,7 @@ def test_scatter_beyond_noise_is_flagged_as_rarely_as_stated():
 
 @pytest.mark.parametrize("windy", [False, True])
 def test_what_common_errors_of_the_wind_need_is_said(windy):
-    runs = [run for run in TWELVE if windy or run[1] == 0.0]
+    runs = [run for run in TWELVE if windy or run.speed == 0.0]
     data = campaign(runs, noise=5e-4, rng=np.random.default_rng(2), **SHAPE)
     found = component(budget_of(data, InputUncertainties(common={"wind_speed": 0.01})), "wind_speed, common")
     assert found.note == ("" if windy else "no wind-on run")
