@@ -42,7 +42,19 @@ def identify(
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
-    refuse_driven(campaign, chosen.name)
+    # driven runs that the estimator would take for free decays are refused
+    for run in campaign.runs:
+        if run.drive is None:
+            continue
+        where = f"{campaign.name}, run '{run.id}'"
+        if chosen.name not in DRIVEN_ESTIMATORS:
+            raise TunnelError(
+                f"the run is driven, and {chosen.name} takes free decays only",
+                where=where,
+                remedy=f"use {' or '.join(DRIVEN_ESTIMATORS)}, or leave the driven runs out",
+            )
+        checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
+        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
     examined = examine(campaign).accepted()
     left = examined.campaign
     found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
@@ -71,19 +83,3 @@ def identify(
 
 DRIVEN_ESTIMATORS = ("output_error", "filter_error", "bayesian", "frequency_response")
 """Names of the estimators that take the input of driven runs."""
-
-
-def refuse_driven(campaign: Campaign, name: str) -> None:
-    """Refuse driven runs that an estimator, by its name, would take for free decays."""
-    for run in campaign.runs:
-        if run.drive is None:
-            continue
-        where = f"{campaign.name}, run '{run.id}'"
-        if name not in DRIVEN_ESTIMATORS:
-            raise TunnelError(
-                f"the run is driven, and {name} takes free decays only",
-                where=where,
-                remedy=f"use {' or '.join(DRIVEN_ESTIMATORS)}, or leave the driven runs out",
-            )
-        checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
-        refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)

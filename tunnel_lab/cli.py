@@ -16,7 +16,6 @@ import typer
 
 from tunnel_lab.commands import (
     about,
-    bench,
     blind,
     diagnose,
     effects,
@@ -125,7 +124,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "docs": about.docs,
     "doctor": about.doctor,
     "schema": about.schema,
-    "bench": bench.run,
+    "bench": show.bench,
 }
 """Every command that is one function by its name, in the order of the help."""
 _WITHOUT_TABLES = {"simulate", "plot", "export", "view", "render", "docs", "schema", "bench"}

@@ -254,13 +254,6 @@ class _Batch:
                 present, change = (whole[block].reshape(group.memory.shape) for whole in (state, out))
             group.law(stage, group.rows, group.params, present, change)
 
-    def start_friction(self) -> None:
-        """Set the sign of friction at rest: opposed to the other moments, or sticking."""
-        resting = self.dry[self.rate[self.dry] == 0.0]
-        if resting.size:
-            self.derivative(0.0, self.state)
-            self._leave_rest(resting)
-
     def step(self, time: float, h: float) -> None:
         """Advance by one RK4 step, then correct the rows with friction whose rate changed sign.
 
@@ -303,9 +296,9 @@ class _Batch:
             self.moving[crossed] = np.where(stick, 0.0, 1.0)
         resting = rows[self.moving[rows] == 0.0]
         if resting.size:
-            self._leave_rest(resting)
+            self.leave_rest(resting)
 
-    def _leave_rest(self, rows: Places) -> None:
+    def leave_rest(self, rows: Places) -> None:
         """Rows at rest slip once the other moments exceed the level."""
         net = self.stage.top[rows]
         go = np.abs(net) > self.stage.level[rows]
@@ -331,7 +324,10 @@ def integrate(
     if len({c.rod is None for c in conditions}) != 1 or len({c.sample_rate for c in conditions}) != 1:
         raise ValueError("a batch needs one kind of rod and one sample rate")
     batch = _Batch(conditions, terms)
-    batch.start_friction()
+    resting = batch.dry[batch.rate[batch.dry] == 0.0]
+    if resting.size:  # at rest, friction is opposed to the other moments, or sticks
+        batch.derivative(0.0, batch.state)
+        batch.leave_rest(resting)
     samples = max(c.samples for c in conditions)
     interval = 1.0 / conditions[0].sample_rate
     h, n = interval / substeps, batch.size

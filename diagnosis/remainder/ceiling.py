@@ -136,16 +136,6 @@ def best_ridge(whole: Normal) -> Ridge:
     return Ridge(whole, max((_log_evidence(values, along, precision), precision) for precision in tried)[1])
 
 
-def common_precision(parts: Sequence[Normal]) -> float:
-    """One precision of the prior, as in `Ridge`, for units with coefficients of their own."""
-    spectra = [_spectrum(part) for part in parts]
-    greatest = max(max(values, default=0.0) for values, _ in spectra)
-    if greatest <= 0.0:
-        return 1e300
-    tried = [greatest / float(width) for width in _WIDTHS**2]
-    return max(tried, key=lambda precision: sum(_log_evidence(*each, precision) for each in spectra))
-
-
 def held_out(parts: Sequence[Normal], groups: Sequence[Sequence[int]], precision: float | None) -> Array:
     """χ² of every unit predicted without its group, or of the fit to all where it is in none, shape (units,).
 
@@ -303,7 +293,11 @@ class Unexplained:
         """A kind that is different in every run: short gaps are predicted from what is around them."""
         columns = [unit.left(matrix) for unit, matrix in zip(self.runs, self.columns(kind), strict=True)]
         residuals = [unit.left(unit.path.residual) for unit in self.runs]
-        precision = common_precision([normal(r, c) for r, c in zip(residuals, columns, strict=True)])
+        # one precision of the prior, as in `Ridge`, for units with coefficients of their own
+        spectra = [_spectrum(normal(r, c)) for r, c in zip(residuals, columns, strict=True)]
+        greatest = max(max(values, default=0.0) for values, _ in spectra)
+        tried = [greatest / float(width) for width in _WIDTHS**2] if greatest > 0.0 else [1e300]
+        precision = max(tried, key=lambda p: sum(_log_evidence(*each, p) for each in spectra))
         drops = []
         for matrix, residual in zip(columns, residuals, strict=True):
             turn, after = gaps(residual.size), 0.0

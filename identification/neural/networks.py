@@ -68,10 +68,6 @@ class DataSpec:
         """t3 [s] or ωn [rad/s] as the second network takes it, any shape."""
         return np.log(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
 
-    def from_network(self, values: Array) -> Array:
-        """ωn in rad/s from the second network's output, any shape."""
-        return np.exp(values) if self.frequency_scale == LOGARITHMIC else np.asarray(values)
-
 
 def training_pairs(spec: DataSpec, which: str) -> tuple[Array, Array]:
     """Inputs, shape (N, inputs), and targets, shape (N,), of the training set of ``damping`` or ``frequency``."""
@@ -243,8 +239,8 @@ class Networks:
             zeta: shape (n,).
             t3: time of three damped cycles, s, shape (n,).
         """
-        inputs = np.column_stack((zeta, self.spec.to_network(t3)))
-        return self.spec.from_network(self.frequency.value(inputs))
+        found = self.frequency.value(np.column_stack((zeta, self.spec.to_network(t3))))
+        return np.exp(found) if self.spec.frequency_scale == LOGARITHMIC else np.asarray(found)
 
     def omega_slopes(self, zeta: float, t3: float) -> tuple[float, float]:
         """∂ωn/∂ζ [rad/s] and ∂ωn/∂t3 [rad/s²].

@@ -226,11 +226,8 @@ def make_budget(
     """
     names = tuple(name for name in _NAMES if getattr(estimate, name) is not None)
     if not set(names) & set(PARAMETERS):
-        raise TunnelError(
-            "no coefficients, so no uncertainty budget",
-            where=campaign.name,
-            remedy="state spring_stiffness, or leave --budget and --uncertainties out",
-        )
+        remedy = "state spring_stiffness, or leave --budget and --uncertainties out"
+        raise TunnelError("no coefficients, so no uncertainty budget", where=campaign.name, remedy=remedy)
     quantities: list[Quantity] = [getattr(estimate, name) for name in names]
     budget = Budget(names, np.array([quantity.value for quantity in quantities]))
     covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])

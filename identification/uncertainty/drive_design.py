@@ -178,10 +178,8 @@ def propose_drive(
     plan = plan_from(document, rig, document.name)
     resonances = sorted({sqrt(max(_decay(plan, c, rig)[1], 0.0)) / (2.0 * pi) for c in plan.conditions})
     if not resonances[0] > 0.0:
-        raise TunnelError(
-            "the wind overcomes the spring: a run has no resonance",
-            remedy="lower wind_speeds, or stiffen springs",
-        )
+        remedy = "lower wind_speeds, or stiffen springs"
+        raise TunnelError("the wind overcomes the spring: a run has no resonance", remedy=remedy)
     coarse, rate = document, _PER_CYCLE * _BROAD * resonances[-1]
     if rate < document.sample_rate:  # fewer readings of as much information
         sensor = SensorModel(**document.sensor.model_dump(exclude_none=True))
@@ -229,9 +227,8 @@ def propose_drive(
     found.append(_moved(_stepped, rates, score))
     best = min(found, key=score)
     if score(best) == inf:
-        raise TunnelError(
-            "no input has a line in the band of the resonances", remedy="give a longer duration or --minutes"
-        )
+        remedy = "give a longer duration or --minutes"
+        raise TunnelError("no input has a line in the band of the resonances", remedy=remedy)
     return within_limits(document, best, rig, limits, length)
 
 

@@ -163,10 +163,9 @@ def expression_effect(
     without = tried["y"] if null == "y" else 0.0
     at_null, beyond = (formula.value({**tried, **at, **more}) for more in ({}, {severity: size}))
     if not np.all(np.isfinite(at_null) & np.isfinite(beyond)):
+        remedy = "avoid division by zero, and roots and logarithms of negative numbers"
         fault = f"{formula.text!r} has no finite value somewhere in the motion of a rig"
-        raise TunnelError(
-            fault, remedy="avoid division by zero, and roots and logarithms of negative numbers"
-        )
+        raise TunnelError(fault, remedy=remedy)
     if np.any(np.abs(at_null - without) > 1e-12):
         remedy = "write it so that the first parameter, the severity, removes the effect"
         raise TunnelError(f"{formula.text!r} is not {null} at {severity} = 0", remedy=remedy)
