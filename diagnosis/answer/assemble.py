@@ -25,8 +25,9 @@ from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, main_effect
 from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.maps import Maps
-from diagnosis.where.place import agreement, blow_interval, describe, nowhere
+from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
+from diagnosis.where.words import agreement, describe, nowhere
 from tunnel_sim.effects import Effect, effect_class
 
 
