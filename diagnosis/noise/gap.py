@@ -1,4 +1,4 @@
-"""Is there a gap? Tests of the nominal model's residuals by frequency band, and of the noise itself."""
+"""Is there a gap? Tests of the residuals by frequency band and of the noise; and the error of rounded readings."""
 
 from __future__ import annotations
 
