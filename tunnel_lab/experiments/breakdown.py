@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-    from identification.estimate import Quantity
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
@@ -263,12 +262,6 @@ def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
     """The map as a table: a row for each effect, severity, estimator and quantity; units in the columns' names."""
     import polars as pl
 
-    def value(quantity: Quantity | None) -> float | None:
-        return None if quantity is None else quantity.value
-
-    def std(quantity: Quantity | None) -> float | None:
-        return None if quantity is None else quantity.std
-
     rows = [
         {
             "effect": bias.effect,
@@ -278,12 +271,12 @@ def breakdown_frame(biases: Sequence[Bias]) -> pl.DataFrame:
             "quantity": bias.quantity,
             "realisations": bias.score.count,
             "failures": bias.score.failures.count,
-            "bias_percent": value(bias.score.relative_bias),
-            "bias_percent_std_error": std(bias.score.relative_bias),
-            "bias_in_stds": value(bias.score.bias_in_stds),
-            "bias_in_stds_std_error": std(bias.score.bias_in_stds),
-            "rmse_over_bound": value(bias.score.rmse_over_bound),
-            "covered": None if bias.score.coverage is None else bias.score.coverage.count,
+            "bias_percent": getattr(bias.score.relative_bias, "value", None),
+            "bias_percent_std_error": getattr(bias.score.relative_bias, "std", None),
+            "bias_in_stds": getattr(bias.score.bias_in_stds, "value", None),
+            "bias_in_stds_std_error": getattr(bias.score.bias_in_stds, "std", None),
+            "rmse_over_bound": getattr(bias.score.rmse_over_bound, "value", None),
+            "covered": getattr(bias.score.coverage, "count", None),
             "model_departs_share": bias.departs,
         }
         for bias in biases

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from rich.table import Table
 
-    from identification.estimate import Quantity
-
 NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
 """How the quantities of a score are written."""
 ABOUT = (
@@ -177,7 +175,7 @@ def scores_frame(results: Results) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
+def summary_tables(results: Results) -> list[Table]:
     """One table for each kind of cell, pooled: a section for each estimator, a row for each quantity."""
     tables = []
     trials = results.trials()
@@ -189,7 +187,7 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
             right=("worst",),
         )
         for name in results.estimators:
-            _section(result, results, name, cells, times=times)
+            _section(result, results, name, cells)
             for quantity in results.grid.cells[cells[0]].quantities:
                 result.add_row(
                     f"  {NAMES[quantity]}", *pooled_figures([trials[name, cell, quantity] for cell in cells])
@@ -198,14 +196,13 @@ def summary_tables(results: Results, *, times: bool = True) -> list[Table]:
     return tables
 
 
-def _section(result: Table, results: Results, name: str, cells: Sequence[int], *, times: bool = True) -> None:
+def _section(result: Table, results: Results, name: str, cells: Sequence[int]) -> None:
     """The estimator's name and time."""
     if result.row_count:
         result.add_section()
     result.columns[0].no_wrap = True
     result.add_row(Text(name, style="bold"))
-    if times:
-        result.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
+    result.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
 
 
 def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
@@ -213,7 +210,6 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
     scores = [score(trials) for trials in every]
     worst = [s.rmse_over_bound.value for s in scores if s.rmse_over_bound is not None]
     scaled = [float(value) for trials in every if trials.bound is not None for value in trials.scaled]
-
     bias = mean_figure(np.array(scaled), "1") if len(scaled) > 1 else None
     identified = sum(trials.error.size for trials in every)
     covered = Proportion(sum(trials.covered for trials in every), identified) if identified else None
