@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.record import Array
 #: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
 #: harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 11).
 _BLURS = 0.5
-_REPETITIONS, _FEWEST, _SAMPLES = 16, 4, 2.5e6
+_MOST_ROUNDINGS, _FEWEST_ROUNDINGS, _SAMPLES = 16, 4, 2.5e6
 
 
 def samples(fit: Fit) -> int:
@@ -77,7 +77,7 @@ def rounding_errors(
     """
     if min(white.values()) > _BLURS * step:
         return None
-    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
+    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST_ROUNDINGS, _MOST_ROUNDINGS))
     return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count, levels)]
 
 
@@ -98,7 +98,7 @@ def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
 
 
 #: Repetitions of the campaign, fewer where it is long, never below the least.
-_REPETITIONS, _FEWEST, _SAMPLES = 32, 16, 2.5e6
+_REPETITIONS, _FEWEST = 32, 16
 #: A step this many times the noise hides its level, since crossed edges look like noise; several are tried.
 _COARSE = 3.0
 _FACTORS = (0.0, 0.5, 1.0, 1.5)
