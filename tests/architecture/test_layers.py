@@ -154,6 +154,6 @@ def test_no_module_of_the_upper_layers_loads_heavy_packages_at_import() -> None:
 def test_commands_do_not_import_each_other() -> None:
     graph = imports()
     commands = {name for name in graph.modules if name.startswith("tunnel_lab.commands.")}
-    assert len(commands) > 10
+    assert len(commands) >= 10
     for name in sorted(commands):
         assert graph.find_modules_directly_imported_by(name) & commands == set(), name
