@@ -217,7 +217,7 @@ class TextTable:
         return "\n".join([self.title, self._lines(self.columns, widths), rule, *body])
 
     def html(self) -> str:
-        """The table as an HTML element, of whose cells each has its heading, for screens on which rows are stacked."""
+        """The table as an HTML element, each cell with its heading, for narrow screens that stack rows."""
         head = "".join(self._cell("th", heading, heading) for heading in self.columns)
         rows = ("".join(map(self._cell, ("td",) * len(row), row, self.columns)) for row in self.rows)
         body = "".join(f"<tr>{row}</tr>" for row in rows)

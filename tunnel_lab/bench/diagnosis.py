@@ -6,7 +6,7 @@ import asyncio
 import re
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 from math import degrees
@@ -149,7 +149,7 @@ class Progress:
 
     stages: tuple[tuple[str, str], ...] = ()
     tried: str = ""
-    reached: Reached = Reached()
+    reached: Reached = field(default_factory=Reached)
     seconds: float = 0.0
 
 

@@ -399,7 +399,7 @@ def print_sets(every: float) -> None:
 
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step, the effect tried and the time so far and left, or a line per step where no terminal is.
+    """A spinner with step, effect tried, time so far and time left, or a line per step where no terminal shows it.
 
     Yields:
         The function to call with each step.
@@ -412,7 +412,7 @@ def step_display() -> Iterator[Callable[[str], None]]:
     class TimeLeft(ProgressColumn):
         """The time left, in words."""
 
-        def render(self, task: Task) -> Text:
+        def render(self, _: Task) -> Text:
             """As of now."""
             return Text(reached.words(time.perf_counter() - begun))
 

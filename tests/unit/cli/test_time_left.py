@@ -1,4 +1,4 @@
-"""The time left of a diagnosis. Truth: quantiles of a lognormal distribution drawn here, and a clock of the test's own."""
+"""The time left of a diagnosis. Truth: a lognormal distribution drawn here, and a clock of the test's own."""
 
 from __future__ import annotations
 
