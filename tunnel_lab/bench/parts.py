@@ -126,13 +126,15 @@ class Frame:
                 self.way_on()
 
     def way_on(self) -> None:
-        """A link to the next stage, where it is open."""
+        """Links to the next stage and to the last, where they are open."""
         assert self._session is not None
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
         if after < len(keys) and not self._why_closed(keys[after]):
             path = address(self._session, keys[after])
             ui.link(f"Continue: {STAGES[after].title}", path).classes("button go")
+        if after < len(keys) - 1 and not self._why_closed(keys[-1]):
+            ui.link("To the report", address(self._session, keys[-1])).classes("button")
 
     def _why_closed(self, key: str) -> str:
         assert self._session is not None
