@@ -243,7 +243,7 @@ class ConditionsPage:
 
     def _table(self) -> ui.aggrid:
         columns: list[dict[str, Any]] = [
-            {"field": "run", "headerName": "run", "pinned": "left", "minWidth": 120}
+            {"field": "run", "headerName": "run", "pinned": "left", "minWidth": 80}
         ]
         for key in RUN_KEYS:
             columns.append(
@@ -251,7 +251,7 @@ class ConditionsPage:
                     "field": key,
                     "headerName": WORDS[key],
                     "editable": True,
-                    "minWidth": 150,
+                    "minWidth": 64,
                     "wrapHeaderText": True,
                     "autoHeaderHeight": True,
                     "cellClassRules": {

@@ -262,7 +262,9 @@ def backbone_figure(document: Document) -> Figure:
     named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
     # the runs that show the gap first, in the campaign's order, and then the rest for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
-    labels = {name: figure_text(label) for name, label in run_labels(maps).items()}
+    labels = {
+        run["id"]: figure_text(label) for run, label in zip(maps["runs"], run_labels(maps), strict=True)
+    }
     fig = figure(NARROW, 7.0)
     frequency, damping = fig.subplots(2, 1)
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from identification.printing import TextTable
 from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench.workspace import Session
@@ -27,7 +28,7 @@ pytest.importorskip("nicegui")
 from nicegui import Client, ui
 from starlette.requests import Request
 
-from tunnel_lab.bench import diagnosis, work
+from tunnel_lab.bench import diagnosis, parts, work
 from tunnel_lab.bench.parts import Frame
 
 NORMALISED = {
@@ -87,6 +88,19 @@ def texts(build: Any, given: Session) -> list[str]:
         str(one.content if isinstance(one, ui.html) else getattr(one, "text", ""))
         for one in client.elements.values()
     ]
+
+
+def test_effects_are_words_on_the_page_and_runs_are_as_they_are_named(tmp_path: Path) -> None:
+    rows = (("coulomb_friction", "run_1"),)
+    (shown,) = [
+        text
+        for text in texts(
+            lambda *_: parts.show_parts([TextTable("", ("effect", "run"), rows)]), session(tmp_path)
+        )
+        if "table" in text
+    ]
+    assert ">coulomb friction<" in shown
+    assert ">run_1<" in shown
 
 
 def test_the_page_shows_what_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,7 +54,7 @@ def picture(one: Tab, name: str) -> None:
         one.page.set_viewport_size({"width": 1200, "height": 900})
         for scheme in ("light", "dark"):
             one.page.emulate_media(color_scheme=scheme)
-            one.page.wait_for_timeout(600)
+            one.page.wait_for_timeout(2000)  # colours change slowly
             screenshot(one.page, path=f"{PICTURES}/bench-{name}-{scheme}.png")
         one.page.emulate_media(color_scheme="light")
         one.page.set_viewport_size(before)

@@ -247,7 +247,7 @@ def test_backbones(given: Document) -> None:
                 assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
         assert list(axes.lines[-1].get_ydata()) == [0.0, 0.0]
     labels = [line.get_label() for line in damping.lines[:2]]
-    named = list(run_labels(given["maps"]).values())
+    named = run_labels(given["maps"])
     assert labels == [named[0], named[2]]
 
 
@@ -311,17 +311,16 @@ def test_no_phase_plane_no_figure(given: Document) -> None:
 
 
 def test_the_label_of_a_run_holds_its_conditions(given: Document) -> None:
-    labels = run_labels(given["maps"])
-    for name, (spring, speed, *_) in zip(IDS, CONDITIONS, strict=True):
-        assert [n.value for n in numbers(labels[name])] == [v for v in (spring, speed) if v]
+    for label, (spring, speed, *_) in zip(run_labels(given["maps"]), CONDITIONS, strict=True):
+        assert [n.value for n in numbers(label)] == [v for v in (spring, speed) if v]
 
 
 def test_no_label_speaks_of_wind_where_no_run_had_any(given: Document) -> None:
     still = {"runs": [run | {"wind_speed": 0.0} for run in given["maps"]["runs"]]}
     still["runs"][0]["spring_stiffness"] = 0.0
     labels = run_labels(still)
-    assert labels[IDS[0]] == IDS[0]
-    assert not any("wind" in label for label in labels.values())
+    assert labels[0] == IDS[0]
+    assert not any("wind" in label for label in labels)
 
 
 def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Document) -> None:
