@@ -241,7 +241,9 @@ class TextTable:
         side = "right" if heading in self.right else "left"
         style = f"text-align: {side}; padding: 0.15em 0.8em"
         head = f'data-head="{escape(" ".join(heading.split()))}" ' if tag == "td" else ""
-        return f'<{tag} {head}style="{style}">{escape(text).replace(chr(10), "<br>")}</{tag}>'
+        lines = escape(text).replace("\n", "<br>")
+        lines = f"<span>{lines}</span>" if "\n" in text else lines
+        return f'<{tag} {head}style="{style}">{lines}</{tag}>'
 
 
 def as_text(parts: Iterable[str | TextTable]) -> str:
