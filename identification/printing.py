@@ -217,7 +217,7 @@ class TextTable:
         return "\n".join([self.title, self._lines(self.columns, widths), rule, *body])
 
     def html(self) -> str:
-        """The table as an HTML element."""
+        """The table as an HTML element, each cell with its heading, for narrow screens that stack rows."""
         head = "".join(self._cell("th", heading, heading) for heading in self.columns)
         rows = ("".join(map(self._cell, ("td",) * len(row), row, self.columns)) for row in self.rows)
         body = "".join(f"<tr>{row}</tr>" for row in rows)
@@ -240,7 +240,10 @@ class TextTable:
     def _cell(self, tag: str, text: str, heading: str) -> str:
         side = "right" if heading in self.right else "left"
         style = f"text-align: {side}; padding: 0.15em 0.8em"
-        return f'<{tag} style="{style}">{escape(text).replace(chr(10), "<br>")}</{tag}>'
+        head = f'data-head="{escape(" ".join(heading.split()))}" ' if tag == "td" else ""
+        lines = escape(text).replace("\n", "<br>")
+        lines = f"<span>{lines}</span>" if "\n" in text else lines
+        return f'<{tag} {head}style="{style}">{lines}</{tag}>'
 
 
 def as_text(parts: Iterable[str | TextTable]) -> str:

@@ -71,18 +71,23 @@ def cautions(
             f"({confirmation.tolerance:.1e} rad). The gap before and after comes from MuJoCo. The parameters and "
             f"probabilities come from the fits, and may be wrong by as much."
         )
+    windy = any(run.wind_on for run in campaign.runs)
     if len(campaign.runs) < FEW_RUNS:
+        motion, others = "decay", "with other springs and release angles"
+        if campaign.driven:
+            motion, others = "motion", "with other inputs"
+        if windy:
+            others = "with other springs, wind speeds and release angles"
         number = "is one run" if len(campaign.runs) == 1 else f"are {len(campaign.runs)} runs"
         found.append(
-            f"There {number} only: causes are distinguished by the form of the decay alone. Add runs with other "
-            f"springs, wind speeds and release angles."
+            f"There {number} only: causes are distinguished by the form of the {motion} alone. Add runs {others}."
         )
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
         found.append(
             "No run could be held out of the fit, so the share closed is that of the fitted runs. The gap as the "
-            "causes are added is predicted for stretches of time left out. Repeat every spring, with the wind off "
-            "and on: a run left out tests more than a stretch."
+            "causes are added is predicted for stretches of time left out. Repeat every "
+            f"{'spring, with the wind off and on' if windy else 'run'}: a run left out tests more than a stretch."
         )
     elif named and fitted:
         found.append(
@@ -143,10 +148,10 @@ BLIND_SPOTS = (
     "a constant sensor lag or filter: it only shifts the release",
     "an error of the clock",
     "a common scale on the inertia and all stiffnesses",
-    "a scale error of wind speed or air density: Cnβ and Cnr absorb it",
 )
 
 
+_OF_WIND = "a scale error of wind speed or air density: Cnβ and Cnr absorb it"
 _OF_INPUT = "a common scale on the inertia and the moment of the input"
 _OF_GAIN = "a scale on the moment of the input as opposed to one on the inertia and all moments of the model"
 
@@ -175,17 +180,13 @@ def blind_spots(data: Data) -> tuple[str, ...]:
         )
     if data.wind_on and all(run.wind_on for run in data.runs):
         found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
+    last = (_OF_WIND,) if data.wind_on else ()
     if data.driven:
         found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
         scale = BLIND_SPOTS[2] if springs or data.normalised else _OF_INPUT
         scale = _OF_GAIN if springs and data.law is not None else scale
-        return (
-            *found,
-            BLIND_SPOTS[1],
-            scale,
-            BLIND_SPOTS[3],
-        )
-    return (*found, *BLIND_SPOTS)
+        return (*found, BLIND_SPOTS[1], scale, *last)
+    return (*found, *BLIND_SPOTS, *last)
 
 
 def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Remainder:

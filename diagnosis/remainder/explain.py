@@ -51,7 +51,8 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     if left.excess <= 0.0:
         return None
     unexplained = Unexplained(left)
-    common = {kind: unexplained.common(kind) for kind in COMMON}
+    windy = any(path.speed > 0.0 for path in unexplained.paths)
+    common = {kind: unexplained.common(kind) for kind in COMMON if windy or kind != "wind"}
     line = steady_line(unexplained)
     single = {} if line is None else {"line": line.evidence}
     single |= {kind: unexplained.single(kind) for kind in SINGLE}

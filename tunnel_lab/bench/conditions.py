@@ -242,16 +242,15 @@ class ConditionsPage:
             self._check()
 
     def _table(self) -> ui.aggrid:
-        columns: list[dict[str, Any]] = [
-            {"field": "run", "headerName": "run", "pinned": "left", "minWidth": 120}
-        ]
+        columns: list[dict[str, Any]] = [{"field": "run", "headerName": "run", "minWidth": 80, "flex": 1}]
         for key in RUN_KEYS:
             columns.append(
                 {
                     "field": key,
                     "headerName": WORDS[key],
                     "editable": True,
-                    "minWidth": 150,
+                    "minWidth": 64,
+                    "flex": 1,
                     "wrapHeaderText": True,
                     "autoHeaderHeight": True,
                     "cellClassRules": {
@@ -275,7 +274,8 @@ class ConditionsPage:
                 "enterNavigatesVertically": True,
                 "domLayout": "autoHeight" if short else "normal",
                 "tooltipShowDelay": 300,
-            }
+            },
+            auto_size_columns=False,  # they share the width, whatever it becomes
         )
         grid.classes("grid" if short else "grid tall").props('aria-label="Conditions of the runs"')
         grid.on("cellValueChanged", self._edited, ["data", "colId", "newValue"])

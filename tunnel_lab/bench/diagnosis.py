@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
 from math import degrees
@@ -29,6 +30,7 @@ from tunnel_lab.bench.parts import (
 )
 from tunnel_lab.bench.workspace import Session, is_current, read_result
 from tunnel_lab.terminal.outputs import STEPS
+from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -42,6 +44,7 @@ STOPPED = 130
 _AFTER_STOP = "; a stopped diagnosis starts again from the beginning, a paused one goes on where it was"
 _STOP = "Stop ends it: a stopped diagnosis starts again from the beginning."
 _POLL_S = 0.5
+_PRINTED = re.compile(r"(\d+\.\d) s: ([^:]+)(?:: (.+))?")
 _ABOUT = (
     "Switch causes on and off: they are fitted in their textbook form, and the gap is predicted for runs, or "
     "stretches of time, held out of the fit. The diagnosis itself does not change; it also frees the forms."
@@ -57,7 +60,6 @@ class DiagnosePage:
         self._session, self._frame = session, frame
         self._log = session.log(WORK)
         self._shown: object = None
-        self._tried = ""
         self._before = ""
         self._command = ["diagnose", str(session.campaign), "--json", str(session.diagnosis)]
         show_command(" ".join(("tunnel", *self._command)))
@@ -74,17 +76,20 @@ class DiagnosePage:
         state = work.work_of(self._log)
         result = self._session.diagnosis
         written = result.stat().st_mtime_ns if result.is_file() and not state.running else 0
-        stages, self._tried = stages_of(state.lines)
+        found = progress_of(state.lines)
         if not state.running and (took := work.seconds_taken(self._log)) is not None:
             self._before = f"; the last diagnosis took {took:.0f} s"
-        now = (replace(state, lines=()), stages, written)
+        now = (replace(state, lines=(), printed=0.0), found.stages, written)
         words = "Paused; it goes on where it was."
         if state.running and not state.paused:
             begun = datetime.fromisoformat(state.started)
             elapsed = (datetime.now().astimezone() - begun).total_seconds()
-            tried = f", now with {self._tried}" if self._tried else ""
+            tried = f" Now with {found.tried}." if found.tried else ""
+            left = "time left not known after a pause"
+            if not state.pauses:
+                left = found.reached.words(found.seconds + time.time() - state.printed)
             words = (
-                f"{elapsed:.0f} s so far{self._before}{tried}. "
+                f"{elapsed:.0f} s so far, {left}{self._before}.{tried} "
                 "It runs in a process of its own: this page may be closed."
             )
         self._clock.set_text(f"{words} {_STOP}" if state.running else "")
@@ -104,8 +109,8 @@ class DiagnosePage:
                 button("Stop", self._stop)
         self._progress.clear()
         with self._progress:
-            for place, (seconds, words) in enumerate(stages if state.running else (), 1):
-                last = place == len(stages)
+            for place, (seconds, words) in enumerate(found.stages if state.running else (), 1):
+                last = place == len(found.stages)
                 with ui.element("li").classes("now" if last else "done"):
                     ui.label(f"{words} … since {seconds} s" if last else f"{words}, from {seconds} s on")
         if state.error:
@@ -131,19 +136,34 @@ class DiagnosePage:
         await asyncio.to_thread(work.stop, self._log)
 
 
-def stages_of(lines: Sequence[str]) -> tuple[tuple[tuple[str, str], ...], str]:
-    """The stages begun, by what was printed: time (s) and name of each; and the set of effects tried, in words."""
-    stages: list[tuple[str, str]] = []
-    tried = ""
-    for line in lines:
-        seconds, _, words = line.partition(" s: ")
-        stage, _, effects = words.partition(": ")
-        if words in STEPS.values():
-            stages.append((seconds, words))
-            tried = ""
-        elif stages and stage == stages[-1][1]:
-            tried = plain(effects)
-    return tuple(stages), tried
+@dataclass(frozen=True)
+class Progress:
+    """How far a diagnosis has come, by what it has printed.
+
+    Args:
+        stages: those begun: time (s since its start, as printed) and name of each.
+        tried: the set of effects that is tried, in words; empty where none is.
+        reached: the last stage.
+        seconds: of the last line, s since its start.
+    """
+
+    stages: tuple[tuple[str, str], ...] = ()
+    tried: str = ""
+    reached: Reached = field(default_factory=Reached)
+    seconds: float = 0.0
+
+
+def progress_of(lines: Sequence[str]) -> Progress:
+    """How far a diagnosis has come, by the lines that it has printed."""
+    names = {words: name for name, words in STEPS.items()}
+    found = Progress()
+    for seconds, stage, effects in (m.groups() for m in map(_PRINTED.fullmatch, lines) if m):
+        now = float(seconds)
+        if effects is None and stage in names:
+            found = Progress((*found.stages, (seconds, stage)), "", Reached(names[stage], now), now)
+        elif effects is not None and found.stages and stage == found.stages[-1][1]:
+            found = replace(found, tried=plain(effects), seconds=now)
+    return found
 
 
 class Answer:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from html import escape
 from typing import Any
 from urllib.parse import quote
@@ -40,6 +41,7 @@ FIELDS = {
 _OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"[^\"]*\"))?")
 
 _THEME = "bench-theme"
+_NAMED = ("answer", "effect", "parameter", "added")  # columns of the names of effects and parameters
 _HEAD = """
 <link rel="stylesheet" href="/static/uplot/uPlot.min.css">
 <link rel="stylesheet" href="/static/bench/bench.css">
@@ -126,13 +128,15 @@ class Frame:
                 self.way_on()
 
     def way_on(self) -> None:
-        """A link to the next stage, where it is open."""
+        """Links to the next stage and to the last, where they are open."""
         assert self._session is not None
         keys = [stage.key for stage in STAGES]
         after = keys.index(self._stage) + 1
         if after < len(keys) and not self._why_closed(keys[after]):
             path = address(self._session, keys[after])
             ui.link(f"Continue: {STAGES[after].title}", path).classes("button go")
+        if after < len(keys) - 1 and not self._why_closed(keys[-1]):
+            ui.link("To the report", address(self._session, keys[-1])).classes("button")
 
     def _why_closed(self, key: str) -> str:
         assert self._session is not None
@@ -166,8 +170,19 @@ class Fault:
 
 
 def show_parts(parts: Iterable[str | TextTable]) -> None:
-    """Tables and paragraphs as the terminal prints them."""
-    ui.html(as_html(parts), sanitize=False).classes("printed")  # its texts are escaped
+    """Tables and paragraphs as the terminal prints them, with names as words."""
+    shown = (_with_words(part) if isinstance(part, TextTable) else part for part in parts)
+    ui.html(as_html(shown), sanitize=False).classes("printed")  # its texts are escaped
+
+
+def _with_words(table: TextTable) -> TextTable:
+    """A table whose names of effects and parameters are words, such as ``coulomb friction``."""
+    named = [heading in _NAMED for heading in table.columns]
+    rows = (
+        tuple(cell.replace("_", " ") if name else cell for cell, name in zip(row, named, strict=True))
+        for row in table.rows
+    )
+    return replace(table, rows=tuple(rows))
 
 
 def show_facts(facts: Iterable[tuple[str, ...]]) -> None:

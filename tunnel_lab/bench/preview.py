@@ -308,7 +308,7 @@ def _rest(part: ImportedRun, unit: str) -> tuple[float, str]:
     end = float(np.median(tail))
     low, high = np.quantile(tail, (0.05, 0.95))
     if high - low < _STILL * float(np.ptp(part.reading)):
-        return end, f"{significant(end)} {unit}, found where the motion has ended"
+        return end, f"{significant(end)} {unit}, found at the end"
     centre = None if part.run is None else centre_of(part.run, 0.0)
     if centre is not None:
         return centre.zero, f"{with_std(centre.zero, centre.std)} {unit}, found"

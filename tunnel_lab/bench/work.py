@@ -47,6 +47,8 @@ class Work:
         command: as one would type it; empty where there is no log.
         started: date and time, ISO 8601.
         lines: printed so far.
+        printed: when the last of them was, s since the epoch.
+        pauses: how often it was paused.
         status: exit status; None while it runs, and where it ended without one.
     """
 
@@ -54,6 +56,8 @@ class Work:
     process: int = 0
     started: str = ""
     lines: tuple[str, ...] = ()
+    printed: float = 0.0
+    pauses: int = 0
     running: bool = False
     paused: bool = False
     status: int | None = None
@@ -83,8 +87,9 @@ def work_of(log: Path) -> Work:
         child.poll()  # else a process that has ended stays in the table
     import fcntl
 
-    running, body = False, lines[1:]
+    running, body, printed = False, lines[1:], 0.0
     try:
+        printed = log.stat().st_mtime
         with log.open("rb") as stream:
             fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -96,15 +101,18 @@ def work_of(log: Path) -> Work:
     shown = tuple(line for line in body if line not in (_PAUSED, _GOES_ON) and not _LAST.fullmatch(line))
     status = int(last["status"]) if last and not running else None
     paused = running and bool(marks) and marks[-1] == _PAUSED
-    return Work(first["command"], int(first["process"]), first["started"], shown, running, paused, status)
+    return Work(
+        *(first["command"], int(first["process"]), first["started"], shown, printed, marks.count(_PAUSED)),
+        *(running, paused, status),
+    )
 
 
 def seconds_taken(log: Path) -> float | None:
     """Wall time of a command that has succeeded, s; None where it has not, or was paused."""
     work = work_of(log)
-    if work.status != 0 or _PAUSED in log.read_text("utf-8", "replace").splitlines():
+    if work.status != 0 or work.pauses:
         return None
-    return max(log.stat().st_mtime - datetime.fromisoformat(work.started).timestamp(), 0.0)
+    return max(work.printed - datetime.fromisoformat(work.started).timestamp(), 0.0)
 
 
 def start(words: Sequence[str], log: Path) -> None:

@@ -65,13 +65,21 @@ def faded(*colours: str) -> Colormap:
     return LinearSegmentedColormap.from_list("faded", ramp)
 
 
-def run_label(run: Document) -> str:
-    """A run of ``maps.runs`` and its conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``."""
-    parts = [str(run["id"])]
-    if run["spring_stiffness"] is not None:
-        parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
-        parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0 else "wind off")
-    return " · ".join(parts)
+def run_labels(maps: Document) -> list[str]:
+    """The runs of ``maps`` with their conditions, such as ``r02 · 16.1 N m/rad · 15 m/s``.
+
+    A spring is named where there is one, and the wind where any run had some.
+    """
+    windy = any(run["wind_speed"] > 0.0 for run in maps["runs"])
+    labels = []
+    for run in maps["runs"]:
+        parts = [str(run["id"])]
+        if run["spring_stiffness"]:
+            parts.append(f"{run['spring_stiffness']:.4g} N m/rad")
+        if windy:
+            parts.append(f"{run['wind_speed']:g} m/s" if run["wind_speed"] > 0.0 else "wind off")
+        labels.append(" · ".join(parts))
+    return labels
 
 
 def misfit_scale(document: Document) -> tuple[str, Callable[[float], float]]:

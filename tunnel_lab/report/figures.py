@@ -39,7 +39,7 @@ from tunnel_lab.report.drawing import (
     array,
     faded,
     misfit_scale,
-    run_label,
+    run_labels,
 )
 from tunnel_lab.report.view import WITHIN_THE_NOISE
 from tunnel_sim.vocabulary.record import Array
@@ -262,7 +262,9 @@ def backbone_figure(document: Document) -> Figure:
     named = [curve for curve in curves if curve["id"] in document["where"]["runs"]]
     # the runs that show the gap first, in the campaign's order, and then the rest for comparison
     chosen = (named + [curve for curve in curves if curve not in named])[:_MOST_CURVES]
-    labels = {run["id"]: figure_text(run_label(run)) for run in maps["runs"]}
+    labels = {
+        run["id"]: figure_text(label) for run, label in zip(maps["runs"], run_labels(maps), strict=True)
+    }
     fig = figure(NARROW, 7.0)
     frequency, damping = fig.subplots(2, 1)
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}

@@ -22,7 +22,7 @@ from tunnel_lab.report.drawing import (
     array,
     faded,
     misfit_scale,
-    run_label,
+    run_labels,
 )
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -96,7 +96,7 @@ def runs_figure(document: Document) -> Figure:
     )  # fmt: skip
     if not np.isfinite(cells).any():
         axes.text(0.5, 0.5, "every cell within the noise", transform=axes.transAxes, ha="center")
-    axes.set_yticks(range(len(runs)), [figure_text(run_label(run)) for run in runs])
+    axes.set_yticks(range(len(runs)), [*map(figure_text, run_labels(maps))])
     axes.set_xlabel(TIME)
     fig.colorbar(image, ax=axes, location="top", label="excess (noise variances)", aspect=50)
     return fig
@@ -243,13 +243,14 @@ def charts(document: Document) -> dict[str, list[Chart]]:
     if not maps:
         return {}
     cells, low, high = _run_cells(maps)
+    labels = run_labels(maps)
     ids = [str(run["id"]) for run in maps["runs"]]
     runs = {
         "kind": "cells",
         "title": "Excess of every run over time",
         "x": {"label": TIME, "edges": maps["time"]["edges_s"]},
         "y": {"label": "run", "edges": np.arange(len(ids) + 1).tolist(), "names": ids},
-        "labels": [run_label(run) for run in maps["runs"]],
+        "labels": labels,
         "values": [_rounded(row) for row in cells],
         "unit": "noise variances",
         "range": [low, high],
@@ -261,8 +262,8 @@ def charts(document: Document) -> dict[str, list[Chart]]:
     excess, std = array(given["excess"]), SIGMAS * array(given["std"])
     after = none if given["after"] is None else array(given["after"])
     views = [_filled("all runs together", centre, -std, std, excess, after)]
-    for run, by_bin in zip(maps["runs"], given.get("by_run", []), strict=False):
-        views.append(_filled(run_label(run), centre, none, none, array(by_bin), none, run=run["id"]))
+    for run, label, by_bin in zip(maps["runs"], labels, given.get("by_run", []), strict=False):
+        views.append(_filled(label, centre, none, none, array(by_bin), none, run=run["id"]))
     spectrum = {
         "kind": "lines",
         "title": "Residual power over noise against frequency",
@@ -334,7 +335,7 @@ def fitted_runs(document: Document, ids: Sequence[str] = ()) -> list[Curves]:
     """The runs of a diagnosis against time, by ids or all, the largest gap first; none without ``maps``."""
     maps = document.get("maps") or {"runs": [], "traces": []}
     unit, factor = unit_shown(maps.get("unit", "rad"))
-    labels = {run["id"]: run_label(run) for run in maps["runs"]}
+    labels = {run["id"]: label for run, label in zip(maps["runs"], run_labels(maps), strict=True)}
     traces = {trace["id"]: trace for trace in maps["traces"] if "reading_rad" in trace}
     runs = []
     for name in ids or traces:

@@ -23,6 +23,7 @@ from rich.text import Text
 from identification import printing
 from identification.printing import SYMBOLS, TextTable, concise, in_stds, significant, unit, with_std
 from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
+from tunnel_lab.terminal.time_left import Reached
 
 if TYPE_CHECKING:
     from rich.table import Column
@@ -398,24 +399,37 @@ def print_sets(every: float) -> None:
 
 @contextmanager
 def step_display() -> Iterator[Callable[[str], None]]:
-    """A spinner with the step, the effect tried and the time, or one line per step where no terminal shows it.
+    """A spinner with step, effect tried, time so far and time left, or a line per step where no terminal shows it.
 
     Yields:
         The function to call with each step.
     """
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
 
     terminal = console(stderr=True)
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+    step, begun, printed, reached = "", time.perf_counter(), 0.0, Reached()
+
+    class TimeLeft(ProgressColumn):
+        """The time left, in words."""
+
+        def render(self, _: Task) -> Text:
+            """As of now."""
+            return Text(reached.words(time.perf_counter() - begun))
+
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        TimeElapsedColumn(),
+        TimeLeft(),
+    )
     with Progress(*columns, console=terminal, disable=not terminal.is_terminal, transient=True) as progress:
         task = progress.add_task("starting", total=None)
-        step, begun, printed = "", time.perf_counter(), 0.0
 
         def show_step(text: str) -> None:
-            nonlocal step, printed
+            nonlocal step, printed, reached
             now = time.perf_counter() - begun
             if text in STEPS:
-                step = STEPS[text]
+                step, reached = STEPS[text], Reached(text, now)
                 progress.update(task, description=step)
                 if not terminal.is_terminal:
                     terminal.print(f"{now:.1f} s: {step}", markup=False)

@@ -331,12 +331,15 @@ def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench, sche
                 one.page.set_viewport_size({"width": width, "height": 900})
                 wide, seen = one.page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
                 assert wide <= seen, (path, width)
+                assert one.page.evaluate(SIDEWAYS) == [], (path, width)
             pairs = one.page.evaluate(CONTRASTS)
             assert len(pairs) > 5, path
             assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == [], path
             assert one.page.evaluate(NAMELESS) == [], path
 
 
+SIDEWAYS = """() => [...document.querySelectorAll(".printed, .figures figure, .ag-center-cols-viewport")].filter(
+  (one) => one.checkVisibility() && one.scrollWidth > one.clientWidth + 1).map((one) => one.outerHTML.slice(0, 200))"""
 NAMELESS = """() => [...document.querySelectorAll(
   "button, a, input, textarea, select, [role=slider], [role=img], iframe, nav")].filter((one) => {
   if (!one.checkVisibility() || one.closest(".ag-root-wrapper, .u-legend")) return false;

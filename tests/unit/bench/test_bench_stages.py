@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 import os
 import re
+import time
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from identification.printing import TextTable
 from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench.workspace import Session
 from tunnel_lab.report import view
 from tunnel_lab.terminal import outputs
+from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -24,7 +28,7 @@ pytest.importorskip("nicegui")
 from nicegui import Client, ui
 from starlette.requests import Request
 
-from tunnel_lab.bench import diagnosis, work
+from tunnel_lab.bench import diagnosis, parts, work
 from tunnel_lab.bench.parts import Frame
 
 NORMALISED = {
@@ -38,15 +42,17 @@ NORMALISED = {
 
 def test_the_stage_and_the_set_are_read_from_what_is_printed() -> None:
     lines = ["Note: a run was cut", "0.1 s: estimating the noise", "2.5 s: fitting sets of effects"]
-    assert diagnosis.stages_of(lines) == (
-        (("0.1", "estimating the noise"), ("2.5", "fitting sets of effects")),
-        "",
-    )
-    lines += ["3.0 s: fitting sets of effects: coulomb_friction + free_play"]
-    assert diagnosis.stages_of(lines)[1] == "coulomb friction + free play"
+    found = diagnosis.progress_of(lines)
+    assert found.stages == (("0.1", "estimating the noise"), ("2.5", "fitting sets of effects"))
+    assert (found.tried, found.reached, found.seconds) == ("", Reached("effects", 2.5), 2.5)
+    lines += ["4.0 s: fitting sets of effects: coulomb_friction + free_play"]
+    found = diagnosis.progress_of(lines)
+    assert found.tried == "coulomb friction + free play"
+    assert (found.reached, found.seconds) == (Reached("effects", 2.5), 4.0)
     lines += ["9.0 s: predicting held-out runs"]
-    assert diagnosis.stages_of(lines)[1] == ""
-    assert diagnosis.stages_of(["tunnel: no such folder", "1 s: what: else"]) == ((), "")
+    assert diagnosis.progress_of(lines).tried == ""
+    assert diagnosis.progress_of(lines).reached == Reached("how far it closes", 9.0)
+    assert diagnosis.progress_of(["tunnel: no such folder", "1.0 s: what: else"]) == diagnosis.Progress()
 
 
 @pytest.mark.parametrize(("every", "sets"), [(None, 0), (0.0, 3), (1e6, 0)])
@@ -65,7 +71,7 @@ def test_sets_are_printed_where_they_are_asked_for(
     assert len(lines) == 1 + sets
     assert re.fullmatch(r"\d+\.\d s: fitting sets of effects", lines[0])
     if sets:
-        assert diagnosis.stages_of(lines)[1] == long.replace("_", " ")
+        assert diagnosis.progress_of(lines).tried == long.replace("_", " ")
 
 
 def session(folder: Path) -> Session:
@@ -84,15 +90,34 @@ def texts(build: Any, given: Session) -> list[str]:
     ]
 
 
+def test_effects_are_words_on_the_page_and_runs_are_as_they_are_named(tmp_path: Path) -> None:
+    rows = (("coulomb_friction", "run_1"),)
+    (shown,) = [
+        text
+        for text in texts(
+            lambda *_: parts.show_parts([TextTable("", ("effect", "run"), rows)]), session(tmp_path)
+        )
+        if "table" in text
+    ]
+    assert ">coulomb friction<" in shown
+    assert ">run_1<" in shown
+
+
 def test_the_page_shows_what_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = session(tmp_path)
     lines = ("2.5 s: fitting sets of effects", "3.0 s: fitting sets of effects: free_play + mains_hum")
-    state = work.Work("tunnel diagnose rig", 1, "2026-01-01T00:00:00+00:00", lines, running=True)
+    state = work.Work("tunnel diagnose rig", 1, "2026-01-01T00:00:00+00:00", lines, 1000.0, running=True)
     monkeypatch.setattr(work, "work_of", lambda _: state)
+    monkeypatch.setattr(time, "time", lambda: 1007.0)
+    left = Reached("effects", 2.5).words(10.0)  # 7 s after the line of 3.0 s
+    assert re.fullmatch(r"about \d+ to \d+ s left", left)
     shown = texts(diagnosis.DiagnosePage, given)
     (clock,) = [text for text in shown if "so far" in text]
-    assert "s so far, now with free play + mains hum." in clock
+    assert f"s so far, {left}. Now with free play + mains hum." in clock
     assert "fitting sets of effects … since 2.5 s" in shown
+    state = replace(state, pauses=1)
+    (clock,) = [text for text in texts(diagnosis.DiagnosePage, given) if "so far" in text]
+    assert "s so far, time left not known after a pause." in clock
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,7 @@ def test_the_rest_follows_a_flat_end(session: Session) -> None:
     (session.uploads / "log.csv").write_text(f"time_s,yaw_rad\n{rows}\n")
     (mark,) = preview.drawn(preview.read(session)[0])[0].marks
     assert mark.rest == pytest.approx(0.734, abs=1e-6)
-    assert "found where the motion has ended" in mark.about
+    assert "found at the end" in mark.about
 
 
 def test_a_page_speaks_of_fields_and_not_of_options() -> None:

@@ -8,7 +8,7 @@ import pytest
 from diagnosis.answer import reported as module
 from diagnosis.answer.held_out import predict_held_out, refit_releases
 from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
-from diagnosis.answer.verdict import cautions
+from diagnosis.answer.verdict import blind_spots, cautions
 from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.run_data import Data, RunData
@@ -130,6 +130,24 @@ def test_a_disagreement_is_a_caution_and_agreement_is_none():
     (said,) = cautions(data, campaign_noise(data), (), bad, named=False)
     assert "2.0e-05 rad" in said
     assert "r1" in said
+
+
+def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
+    data = campaign()
+    alone = dataclasses.replace(data, runs=data.runs[:1])
+    good = confirm([Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))])
+    found = {}
+    for speed in (0.0, 10.0):
+        run = dataclasses.replace(alone.runs[0], wind_speed=speed, air_density=1.2)
+        (said,) = cautions(
+            dataclasses.replace(alone, runs=(run,)), campaign_noise(alone), (), good, named=False
+        )
+        runs = tuple(dataclasses.replace(r, wind_speed=speed) for r in problem().data.runs)
+        found[speed] = (said, " ".join(blind_spots(dataclasses.replace(problem().data, runs=runs))))
+    assert "Add runs with other springs and release angles." in found[0.0][0]
+    assert "other springs, wind speeds and release angles." in found[10.0][0]
+    assert "Cnβ" not in found[0.0][1]
+    assert "a scale error of wind speed" in found[10.0][1]
 
 
 @pytest.fixture(scope="module")

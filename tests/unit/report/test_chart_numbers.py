@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.unit.diagnosis_document import IDS, document
-from tunnel_lab.report.drawing import run_label
+from tunnel_lab.report.drawing import run_labels
 from tunnel_lab.report.where import charts
 
 Document = dict[str, Any]
@@ -30,7 +30,7 @@ def test_the_spectrum_of_all_runs_and_of_each(given: Document) -> None:
     centres = [0.7071, 2.0, 8.0]  # Hz, √(0.5 · 1), √(1 · 4), √(4 · 16)
     whole, *each = chart["views"]
     assert [view["run"] for view in each] == list(IDS)
-    assert [view["label"] for view in each] == [run_label(run) for run in given["maps"]["runs"]]
+    assert [view["label"] for view in each] == run_labels(given["maps"])
     frequency, low, high, before, after = whole["data"]
     assert frequency == centres
     assert low == pytest.approx([1.0 - 3.0 * 0.051, 1.0 - 3.0 * 0.052, 0.3])  # the last below the axis

@@ -17,7 +17,7 @@ from tests.unit.shown_numbers import numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
 from tunnel_lab.report import where
-from tunnel_lab.report.drawing import run_label
+from tunnel_lab.report.drawing import run_labels
 from tunnel_lab.report.figures import backbone_figure, law_figure
 
 Document = dict[str, Any]
@@ -157,7 +157,7 @@ def test_the_map_of_runs(given: Document) -> None:
     assert grid.images[0].get_clim() == pytest.approx((3.0 * 0.017 * np.sqrt(3.0), 60.0))
     assert grid.images[0].get_extent() == [0.0, 9.0, 2.5, -0.5]
     assert [label.get_text() for label in grid.get_yticklabels()] == [
-        "alpha · 16.25 N m/rad · wind off", "beta · 44.75 N m/rad · 13.5 m/s", "gamma",
+        "alpha · 16.25 N m/rad · wind off", "beta · 44.75 N m/rad · 13.5 m/s", "gamma · 21.5 m/s",
     ]  # fmt: skip
 
 
@@ -247,7 +247,8 @@ def test_backbones(given: Document) -> None:
                 assert (column.min(), column.max()) == pytest.approx((y - 1.96 * std, y + 1.96 * std))
         assert list(axes.lines[-1].get_ydata()) == [0.0, 0.0]
     labels = [line.get_label() for line in damping.lines[:2]]
-    assert labels == [run_label(given["maps"]["runs"][0]), run_label(given["maps"]["runs"][2])]
+    named = run_labels(given["maps"])
+    assert labels == [named[0], named[2]]
 
 
 def test_no_two_backbones_are_of_one_colour(given: Document) -> None:
@@ -309,12 +310,17 @@ def test_no_phase_plane_no_figure(given: Document) -> None:
     assert where.moment_figure(given) is None
 
 
-def test_the_label_of_a_run_holds_its_conditions() -> None:
-    for name, (spring, speed, *_) in zip(IDS, CONDITIONS, strict=True):
-        found = [
-            n.value for n in numbers(run_label({"id": name, "spring_stiffness": spring, "wind_speed": speed}))
-        ]
-        assert found == ([] if spring is None else [v for v in (spring, speed) if v])
+def test_the_label_of_a_run_holds_its_conditions(given: Document) -> None:
+    for label, (spring, speed, *_) in zip(run_labels(given["maps"]), CONDITIONS, strict=True):
+        assert [n.value for n in numbers(label)] == [v for v in (spring, speed) if v]
+
+
+def test_no_label_speaks_of_wind_where_no_run_had_any(given: Document) -> None:
+    still = {"runs": [run | {"wind_speed": 0.0} for run in given["maps"]["runs"]]}
+    still["runs"][0]["spring_stiffness"] = 0.0
+    labels = run_labels(still)
+    assert labels[0] == IDS[0]
+    assert not any("wind" in label for label in labels)
 
 
 def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Document) -> None:

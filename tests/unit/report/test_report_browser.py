@@ -68,11 +68,16 @@ def opened(browser: Any, report: Path, request: pytest.FixtureRequest) -> Iterat
 WIDTHS = [{"width": width, "color_scheme": scheme} for width in (390, 1200) for scheme in ("light", "dark")]
 
 
+SIDEWAYS = """() => [...document.querySelectorAll(".scroll, .drawn, .charts")].filter((one) =>
+  one.checkVisibility() && one.scrollWidth > one.clientWidth + 1).map((one) => one.outerHTML.slice(0, 200))"""
+
+
 @pytest.mark.parametrize("opened", WIDTHS, indirect=True)
 def test_nothing_is_wider_than_the_page_and_every_text_can_be_read(opened: Opened) -> None:
     opened.open_all()
     wide, seen = opened.page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
     assert wide <= seen
+    assert opened.page.evaluate(SIDEWAYS) == []
     pairs = opened.page.evaluate(CONTRASTS)
     assert len(pairs) > 50
     assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == []
