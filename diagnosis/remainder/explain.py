@@ -13,7 +13,9 @@ from scipy.special import chdtrc
 
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
+from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.policy import (
     AS_MUCH,
@@ -22,9 +24,7 @@ from diagnosis.policy import (
     LOCAL_FALSE_ALARM_RATE,
     MOST,
 )
-from diagnosis.remainder.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.remainder.formula import choose, propose
-from diagnosis.remainder.paths import COMMON, OF_READING, SINGLE, Path, Places
 from diagnosis.search.investigate import Study
 from diagnosis.where.excess import away_from_motion
 from identification.printing import unit_mark, with_std
@@ -227,7 +227,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
 
     Args:
         unexplained: what is left.
-        kind: of `diagnosis.remainder.paths.SINGLE`.
+        kind: of `diagnosis.likelihood.paths.SINGLE`.
         precision: one over the variance of a coefficient in the prior, in the basis' units.
 
     Returns:
