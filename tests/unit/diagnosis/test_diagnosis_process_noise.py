@@ -159,7 +159,7 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     base = nominal(deflected(campaign(), 0.005))
     assert obeys_a_law(base)
     assert weigh_random_moments(base, [], BOTH) == []
-    monkeypatch.setattr(random_moments, "obeys_a_law", lambda fit: False)
+    monkeypatch.setattr(random_moments, "obeys_a_law", lambda _: False)
     assert [answer.effects for answer in weigh_random_moments(base, [], BOTH)] == [("buffeting",)]
 
 
