@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import block_diag, solve_triangular
 
-from diagnosis.remainder.paths import Path, Ranges, paths, ranges
+from diagnosis.likelihood.paths import Path, Ranges, paths, ranges
 
 Array = NDArray[np.float64]
 

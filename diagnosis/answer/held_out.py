@@ -12,7 +12,7 @@ from diagnosis.closure import Step, Waterfall
 from diagnosis.likelihood.least_squares import Fit, FitError, clip, damped_step, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_data import FOLDS, folds
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search.hypothesis import restricted
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study
@@ -20,7 +20,6 @@ from diagnosis.search.random_moments import RandomAnswer
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
-FOLDS = 3
 _STEPS = 6  # Gauss–Newton steps without a group
 _TRIES = 4  # dampings tried in a step
 _GAIN = 1e-4  # share of χ² that a step must save
@@ -40,46 +39,6 @@ class HeldOut:
 
     residuals: dict[str, Array]
     points: dict[str, tuple[Array, Array]]
-
-
-def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
-    """Groups of runs to leave out in turn.
-
-    Args:
-        count: number of groups, fewer where there are few runs.
-
-    Returns:
-        Ids by group. Runs with the same wind and spring go to different groups, and the runs kept always include
-        every spring, wind-off runs, wind-on runs and an input of unknown gain: the others could not be predicted
-        without them. The only run of its kind is in no group.
-    """
-    order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
-    free = [run for run in order if _covers(data, [run])]
-    count = min(count, len(free))
-    if count < 2:
-        return []
-    groups: list[list[RunData]] = [[] for _ in range(count)]
-    for i, run in enumerate(free):
-        for turn in range(count):
-            group = groups[(i + turn) % count]
-            if _covers(data, [*group, run]):
-                group.append(run)
-                break
-    return [tuple(run.id for run in group) for group in groups if group]
-
-
-def _covers(data: Data, left_out: list[RunData]) -> bool:
-    """Whether the other runs have every spring, wind on and off, and an input of unknown gain, as all runs have."""
-    gone = {run.id for run in left_out}
-
-    def kinds(runs: Sequence[RunData]) -> tuple[set[object], ...]:
-        return (
-            {run.gain_free for run in runs},
-            {run.spring_stiffness for run in runs},
-            {run.wind_on for run in runs},
-        )
-
-    return kinds(data.runs) == kinds([run for run in data.runs if run.id not in gone])
 
 
 def predict_held_out(whole: Fit) -> HeldOut:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,6 +17,8 @@ from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw
+
+FOLDS = 3  # groups of runs left out in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,6 +413,46 @@ class Data:
     def subset(self, keep: tuple[str, ...]) -> Data:
         """The runs of the given ids."""
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
+
+
+def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
+    """Groups of runs to leave out in turn.
+
+    Args:
+        count: number of groups, fewer where there are few runs.
+
+    Returns:
+        Ids by group. Runs with the same wind and spring go to different groups, and the runs kept always include
+        every spring, wind-off runs, wind-on runs and an input of unknown gain: the others could not be predicted
+        without them. The only run of its kind is in no group.
+    """
+    order = sorted(data.runs, key=lambda run: (run.wind_on, run.spring_stiffness or 0.0, run.wind_speed))
+    free = [run for run in order if _covers(data, [run])]
+    count = min(count, len(free))
+    if count < 2:
+        return []
+    groups: list[list[RunData]] = [[] for _ in range(count)]
+    for i, run in enumerate(free):
+        for turn in range(count):
+            group = groups[(i + turn) % count]
+            if _covers(data, [*group, run]):
+                group.append(run)
+                break
+    return [tuple(run.id for run in group) for group in groups if group]
+
+
+def _covers(data: Data, left_out: list[RunData]) -> bool:
+    """Whether the other runs have every spring, wind on and off, and an input of unknown gain, as all runs have."""
+    gone = {run.id for run in left_out}
+
+    def kinds(runs: Sequence[RunData]) -> tuple[set[object], ...]:
+        return (
+            {run.gain_free for run in runs},
+            {run.spring_stiffness for run in runs},
+            {run.wind_on for run in runs},
+        )
+
+    return kinds(data.runs) == kinds([run for run in data.runs if run.id not in gone])
 
 
 def departure(law: JointLaw) -> Expression:

@@ -247,6 +247,31 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * policy.FALSE_ALARM_RATE))
 
 
+def alike_in_all_runs(fit: Fit) -> bool:
+    """Whether what is slower than the motion repeats itself from run to run, as an error of the sensor does.
+
+    Noise is another one in every run. Let the share of the mean of n runs in the mean of their powers be γ² at a
+    frequency, times being counted from the release. Of independent runs it exceeds x with probability
+    (1 − x)ⁿ⁻¹, whatever the noise's colour.
+
+    Returns:
+        By that test of the frequencies below half the motion's, together at `FALSE_ALARM_RATE`. False where fewer
+        than two runs have the same raster.
+    """
+    runs: dict[tuple[float, float], list[int]] = {}
+    for index, run in enumerate(fit.problem.data.runs):
+        runs.setdefault((run.interval, run.start), []).append(index)
+    (interval, _), alike = max(runs.items(), key=lambda item: len(item[1]))
+    size = min(fit.residuals[index].size for index in alike)
+    below = np.fft.rfftfreq(size, interval)[1:] < 0.5 * min(resonance(fit, index) for index in alike)
+    waves = np.fft.rfft([fit.residuals[index][:size] for index in alike])[:, 1:][:, below]
+    if len(alike) < 2 or not below.any():
+        return False
+    shared = np.abs(waves.mean(axis=0)) ** 2 / np.mean(np.abs(waves) ** 2, axis=0)
+    chance = (1.0 - np.minimum(shared, 1.0)) ** (len(alike) - 1)
+    return bool(chance.min() * chance.size < policy.FALSE_ALARM_RATE)
+
+
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:
     """Least negative log-likelihood, nats, with the corner at or above a frequency over the colour's lowest."""
 

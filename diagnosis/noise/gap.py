@@ -18,7 +18,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start
-from diagnosis.noise.colour import noise_colour, whitened, zero_wanders
+from diagnosis.noise.colour import alike_in_all_runs, noise_colour, whitened, zero_wanders
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.record import Array
@@ -243,7 +243,8 @@ def gap_or_colour(
         whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
         Nor is it believed where there would be more noise than is stated, or where it alone would close the gap of
-        a wandering zero. Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
+        a wandering zero or of an error that every run repeats. Turbulence may hide the colour, which is then sought
+        in the runs with the wind off alone.
 
         A gap within the error of the readings' lattice is not detected: the levels of a camera or an encoder may be
         off by half a step, which follows the motion as long as no noise of half a step blurs it (Widrow and
@@ -266,7 +267,8 @@ def gap_or_colour(
         believed = (
             still and not excessive and noise_colour(source, beyond=policy.BEYOND_THE_MOTION) is not None
         )
-        if believed if test.detected else not zero_wanders(nominal, found):
+        noise_alone = not zero_wanders(nominal, found) and not alike_in_all_runs(nominal)
+        if believed if test.detected else noise_alone:
             return white, coloured, test
     blurred = max(noise.white(step).values()) >= 0.5 * step
     power = nominal.excess * max(run.noise_variance for run in nominal.problem.data.runs)

@@ -14,11 +14,11 @@ from scipy.special import chdtrc
 from diagnosis import policy
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
+from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
-from diagnosis.remainder.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.remainder.formula import choose, propose
-from diagnosis.remainder.paths import COMMON, OF_READING, SINGLE, Path, Places
 from diagnosis.search.investigate import Study
 from diagnosis.where.excess import away_from_motion
 from identification.printing import unit_mark, with_std
@@ -222,7 +222,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
 
     Args:
         unexplained: what is left.
-        kind: of `diagnosis.remainder.paths.SINGLE`.
+        kind: of `diagnosis.likelihood.paths.SINGLE`.
         precision: one over the variance of a coefficient in the prior, in the basis' units.
 
     Returns:

@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc
 
+from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.policy import FALSE_ALARM_RATE, MOST_CAUSES, NEEDLESS_CHI2
+from diagnosis.policy import CHANCE_STDS, FALSE_ALARM_RATE, MOST_CAUSES, NEEDLESS_CHI2
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import ProcessNoise, is_steady_noise, random_moments, with_response
@@ -84,7 +85,7 @@ def weigh_random_moments(
             top = further[0]
         seen = _seen_in(top, nominal.problem.data)
         process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
-        if process is not None and not follows_the_motion(seen.fit):
+        if process is not None and not follows_the_motion(seen.fit) and not obeys_a_law(seen.fit):
             kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
             names = tuple(dict.fromkeys((kind.name, *seen.effects)))
@@ -172,6 +173,23 @@ def follows_the_motion(fitted: Fit) -> bool:
     rate = along["frequency"] + along["frequency of runs"]
     larger = max(motion, rate) / max(min(motion, rate), 1e-300)
     return 2.0 * float(fdtrc(windy, windy, larger)) < FALSE_ALARM_RATE
+
+
+def obeys_a_law(fitted: Fit) -> bool:
+    """Whether most of what a fit leaves would be closed by one law of the wind, the same in all runs.
+
+    A random moment is another one in every run, so that no law fitted to some runs predicts the others. A missing
+    law of angle, rate and wind speed does, and a slow random moment would take its place.
+
+    Returns:
+        Whether the law of the wind (`diagnosis.likelihood.paths.wind`) closes more than half on runs held out of
+        its fit, beyond chance.
+    """
+    unexplained = Unexplained(fitted)
+    if unexplained.held_out != "runs":  # no run can be left out
+        return False
+    closed = unexplained.common("wind").ceiling
+    return closed.closed - CHANCE_STDS * closed.std > 0.5
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:

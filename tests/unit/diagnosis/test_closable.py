@@ -12,13 +12,13 @@ from scipy.signal import lfilter
 
 from diagnosis import _diagnose, diagnose
 from diagnosis.closure import KINDS, Ceiling, closable_table, closable_words
+from diagnosis.likelihood.ceiling import Evidence, Unexplained, best_ridge, held_out, normal, ratio, total
 from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.paths import paths, ranges
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.remainder.ceiling import Evidence, Unexplained, best_ridge, held_out, normal, ratio, total
 from diagnosis.remainder.explain import chosen_kind, closable, steady_line
 from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
-from diagnosis.remainder.paths import paths, ranges
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed

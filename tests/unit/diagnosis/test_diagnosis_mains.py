@@ -92,6 +92,12 @@ def test_white_noise_has_no_hum():
     assert [find_hum(nominal(decays(seed))) for seed in range(12)] == [None] * 12
 
 
+@pytest.mark.parametrize("rate", [112.0, 125.0])
+def test_a_hum_is_found_with_little_more_than_two_samples_a_period(rate):
+    assert find_hum(nominal(humming(decays(rate=rate, duration=8.0), 2e-3))) is not None
+    assert find_hum(nominal(decays(rate=rate, duration=8.0))) is None
+
+
 def test_slow_sampling_cannot_see_the_mains():
     assert find_hum(nominal(decays(rate=100.0, duration=8.0))) is None
 

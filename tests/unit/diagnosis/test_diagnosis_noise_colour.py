@@ -7,10 +7,11 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
+from diagnosis import policy
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.noise import gap
-from diagnosis.noise.colour import _steady, noise_colour, zero_wanders
+from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.policy import FALSE_ALARM_RATE
@@ -96,6 +97,27 @@ def test_coloured_noise_is_taken_for_a_wandering_zero_no_more_often_than_stated(
     fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
     alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
     assert alarms <= binom.ppf(1.0 - 1e-4, trials, FALSE_ALARM_RATE)
+
+
+def warming(count, _rng):
+    return 12.0 * NOISE * (1.0 - np.exp(-5.0 * np.arange(count) / count))
+
+
+def test_a_drift_that_every_run_repeats_is_a_gap_and_no_colour():
+    data = with_zero(coloured(campaign(), "ar1"), warming)
+    assert alike_in_all_runs(nominal(data))
+    _, noise, found = judged(data)
+    assert found.detected
+    assert noise.colour is None
+
+
+@pytest.mark.parametrize("name", COLOURS)
+def test_noise_of_any_colour_repeats_itself_at_the_stated_rate_at_most(name, monkeypatch):
+    monkeypatch.setattr(policy, "FALSE_ALARM_RATE", 0.05)
+    fitted, rng, trials = nominal(campaign()), np.random.default_rng(4), 200
+    draws = [[colour(name, r.size, rng) for r in fitted.residuals] for _ in range(trials)]
+    alarms = sum(alike_in_all_runs(dataclasses.replace(fitted, residuals=noise)) for noise in draws)
+    assert binom.ppf(1e-3, trials, 0.05) <= alarms <= binom.ppf(1.0 - 1e-3, trials, 0.05)
 
 
 @pytest.mark.parametrize("name", COLOURS)

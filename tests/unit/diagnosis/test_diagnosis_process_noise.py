@@ -23,7 +23,7 @@ from diagnosis.search.process_noise import (
     of_all_runs,
     with_response,
 )
-from diagnosis.search.random_moments import weigh_random_moments, wind_off_excess
+from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments, wind_off_excess
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -143,6 +143,30 @@ def test_without_a_random_moment_there_is_nothing_to_gain():
     found = fit_turbulence(nominal(campaign()))
     assert found is not None
     assert found.drop < 20.0  # χ² of two parameters, fitted over a grid
+
+
+def deflected(data, coefficient):
+    """Every wind-on run about the angle where the spring holds a steady moment, as a misaligned flow has it."""
+    runs = []
+    for run, (spring, speed) in zip(data.runs, CONDITIONS, strict=True):
+        pressure = 0.5 * 1.2 * speed**2 * AREA * LENGTH
+        angle = pressure * coefficient / (spring - pressure * CN_BETA)
+        runs.append(replace(run, record=Record(run.record.time_s, run.record.yaw_rad + angle)))
+    return replace(data, runs=tuple(runs))
+
+
+def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
+    base = nominal(deflected(campaign(), 0.005))
+    assert obeys_a_law(base)
+    assert weigh_random_moments(base, [], BOTH) == []
+    monkeypatch.setattr(random_moments, "obeys_a_law", lambda _: False)
+    assert [answer.effects for answer in weigh_random_moments(base, [], BOTH)] == [("buffeting",)]
+
+
+@pytest.mark.parametrize("bandwidth", [0.05, 0.5, 10.0])
+def test_a_random_moment_obeys_no_law(bandwidth):
+    for seed in range(2):
+        assert not obeys_a_law(nominal(buffeted(campaign(), 0.01, bandwidth, seed)))
 
 
 def test_buffeting_is_offered_where_it_blows(windy):

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from diagnosis.answer.held_out import HeldOut, folds, predict_held_out
+from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_data import Data, RunData, folds
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.patch.patched_model import native_closure
 from tests.unit.gap_campaigns import nominal

@@ -10,7 +10,6 @@ import pytest
 
 from diagnosis.answer.candidates import inclusion
 from diagnosis.answer.held_out import (
-    FOLDS,
     Base,
     Subsets,
     fit_seen,
@@ -21,6 +20,7 @@ from diagnosis.answer.held_out import (
 )
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.run_data import FOLDS
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import Candidate
 from diagnosis.search.hypothesis import Hypothesis

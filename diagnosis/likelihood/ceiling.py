@@ -13,10 +13,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.answer.held_out import folds
 from diagnosis.closure import Ceiling
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.remainder.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
+from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
+from diagnosis.likelihood.run_data import folds
 from tunnel_sim.vocabulary.record import Array
 
 _WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, in that of a column of unit response
