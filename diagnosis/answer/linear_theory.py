@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, normal_equations
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
-from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, LEAST_HALF, NEEDLESS_CHI2, OWN_EVIDENCE
+from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, OWN_EVIDENCE, SMALL_SHARE
 from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import WindOnRun
@@ -162,7 +162,7 @@ def coefficient_move(fit: Fit, name: str) -> float:
         middle = order[rank[min(at, rank.size - 1)]]
         for low in (order < middle, order <= middle):  # runs of one condition are not divided
             share = float(weight[low].sum()) / max(total, 1e-300)
-            if LEAST_HALF < share < 1.0 - LEAST_HALF:  # else one half says nothing
+            if SMALL_SHARE < share < 1.0 - SMALL_SHARE:  # else one half says nothing
                 both = 2.0 * share * (1.0 - share)
                 moved = float(pull[low].sum()) / both
                 chance = CHANCE_STDS**2 * total / (2.0 * both)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from diagnosis.policy import SECOND_MODE_LEFT
+from diagnosis.policy import GREATER_PART
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from diagnosis.search.weigh import UNKNOWN
 from identification.examination.self_excited import in_limit_cycle
@@ -54,7 +54,7 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
             hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
             vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
             one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
-            if one is None or two is None or two.left > SECOND_MODE_LEFT * one.left or two.rate.min() < 0.0:
+            if one is None or two is None or two.left > GREATER_PART * one.left or two.rate.min() < 0.0:
                 continue
             order = np.argsort(np.abs(two.frequency - one.frequency[0]))
             resolution = float(two.rate.sum()) / np.pi

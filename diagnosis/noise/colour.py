@@ -89,7 +89,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     Args:
         nominal: any fit whose residuals were scaled as white.
         beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
-        throughout: whether the lowest band and `COLOUR_THROUGHOUT` of all must be steady; otherwise any two do.
+        throughout: whether the lowest band and `THROUGHOUT` of all must be steady; otherwise any two do.
 
     Returns:
         The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
@@ -118,7 +118,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
     steady = _steady(power, count)
-    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= policy.COLOUR_THROUGHOUT)):
+    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= policy.THROUGHOUT)):
         return None
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])

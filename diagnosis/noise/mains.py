@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
 from diagnosis.likelihood.residuals import mains_line, smooth_spectra
 from diagnosis.noise.sensor_noise import SmoothCurve
-from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, HUM_RUNS, SWELL_FALSE_ALARM_RATE
+from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, SWELL_FALSE_ALARM_RATE, THROUGHOUT
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -53,7 +53,7 @@ def find_hum(nominal: Fit) -> float | None:
     if line is None or line.contrast < HUM_CONTRAST:
         return None
     shown = [spectrum.power(line.parameter) > HUM_RUN_DROP for spectrum in smooth_spectra(nominal)]
-    return line.parameter if np.mean(shown) >= HUM_RUNS else None
+    return line.parameter if np.mean(shown) >= THROUGHOUT else None
 
 
 def refine_frequency(campaign: Campaign, frequency: float) -> float:

@@ -95,7 +95,7 @@ def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) 
     of_all, of_one = (
         max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
     )
-    if max(of_all.closed, of_one.closed) < policy.LEAST_CLOSABLE:
+    if max(of_all.closed, of_one.closed) < policy.SMALL_SHARE:
         return "noise"
     among, best = (common, of_all) if of_all.closed >= policy.MOST * of_one.closed else (single, of_one)
     least = best.closed - max(policy.AS_MUCH, best.std)
@@ -117,7 +117,7 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
     sizes = np.array([before[run].size for run in both], np.float64)
     closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-    if closed < policy.LEAST_CLOSABLE:
+    if closed < policy.SMALL_SHARE:
         return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):

@@ -222,7 +222,7 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
     with clock.step("noise"):
         noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.COARSER_STEP * stated
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.CLEARLY_MORE * stated
     with clock.step("nominal fit"):
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum, line = campaign, None, None
@@ -369,7 +369,7 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
     # not white, and follows a slow motion, and a hum that is not a pure line leaves a small share of itself
     own = np.zeros(len(CHANNELS))
     if found.hum is not None:
-        own += policy.HUM_LEFT * found.hum.excess * base.count * _IN_HARMONICS
+        own += policy.AS_MUCH * found.hum.excess * base.count * _IN_HARMONICS
     errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
@@ -426,5 +426,5 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     """
     block = found.nominal.problem.data.runs[0].block
     small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < policy.NOISE_LEAVES for w in weighed)
+    closed = any(w.effects != UNKNOWN and w.share < policy.SMALL_SHARE for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)

@@ -17,7 +17,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.run_data import Data
-from diagnosis.policy import BURST, FALSE_ALARM_RATE, WHITE_INNOVATIONS
+from diagnosis.policy import CLEARLY_MORE, FALSE_ALARM_RATE, WHITE_INNOVATIONS
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
 
@@ -293,7 +293,7 @@ def is_steady_noise(result: ProcessNoise) -> bool:
     """Whether innovations are white and steady, do not come in bursts, and are not those of one run."""
     return (
         departure_from_white(result) <= WHITE_INNOVATIONS
-        and bursts(result, FALSE_ALARM_RATE) <= BURST
+        and bursts(result, FALSE_ALARM_RATE) <= CLEARLY_MORE
         and of_all_runs(result) >= FALSE_ALARM_RATE
     )
 

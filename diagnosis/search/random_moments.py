@@ -21,7 +21,7 @@ from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.policy import CHANCE_STDS, FALSE_ALARM_RATE, MOST_CAUSES, NEEDLESS_CHI2
+from diagnosis.policy import CHANCE_STDS, FALSE_ALARM_RATE, GREATER_PART, MOST_CAUSES, NEEDLESS_CHI2
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import ProcessNoise, is_steady_noise, random_moments, with_response
@@ -189,7 +189,7 @@ def obeys_a_law(fitted: Fit) -> bool:
     if unexplained.held_out != "runs":  # no run can be left out
         return False
     closed = unexplained.common("wind").ceiling
-    return closed.closed - CHANCE_STDS * closed.std > 0.5
+    return closed.closed - CHANCE_STDS * closed.std > GREATER_PART
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:

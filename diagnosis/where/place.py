@@ -78,7 +78,7 @@ def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
         for run in excesses
         if run.p_value() * len(excesses) < policy.LOCAL_FALSE_ALARM_RATE
     }
-    least = policy.NAMED_RUN_SHARE * max(clear.values(), default=0.0)
+    least = policy.SMALL_SHARE * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
@@ -127,7 +127,7 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     if interval is None or found.moment_z < policy.CLEAR_MOMENT:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= policy.BLOW_SHARE * length
+    brief = interval[1] - interval[0] <= policy.SMALL_SHARE * length
     return interval if brief and interval[0] > 0.05 * length else None
 
 
@@ -152,7 +152,7 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     if excess.get("above", 0.0) > policy.DOMINANT_SHARE * whole:
         return Finding("sensor", "most of it is faster than the rig can move")
     if excess.get("0", 0.0) > policy.DOMINANT_SHARE * whole:
-        if excess.get("2f0", 0.0) > policy.SECOND_HARMONIC_SHARE * whole:
+        if excess.get("2f0", 0.0) > policy.LISTED_BAND_SHARE * whole:
             return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
         if condition == "wind_on":
             return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
@@ -167,9 +167,9 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, "every run is driven, so that no decay shows it")
     frequency, damping = drift(list(found.maps.backbones))
-    if frequency > policy.DRIFT_RATIO * max(damping, 0.0) and frequency > 0.0:
+    if frequency > policy.CLEARLY_MORE * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > policy.DRIFT_RATIO * max(frequency, 0.0) and damping > 0.0:
+    if damping > policy.CLEARLY_MORE * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
     return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
 

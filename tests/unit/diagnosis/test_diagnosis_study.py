@@ -11,7 +11,7 @@ import pytest
 
 from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.mains import Hum
-from diagnosis.policy import HUM_LEFT
+from diagnosis.policy import AS_MUCH
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import _noise_explains, _polished, _weighed
 from diagnosis.search.random_moments import RandomAnswer
@@ -139,7 +139,7 @@ def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_its
     """Truth: white residuals that hold a multiple of the share of a hum's power that no pure line removes."""
     hum = Hum(50.0, 1e-3, 1e-5, None, 20.0)
     rng = np.random.default_rng(4)
-    excess = share * HUM_LEFT * hum.excess
+    excess = share * AS_MUCH * hum.excess
     residuals = [np.sqrt(1.0 + excess) * rng.normal(size=r.size) for r in study.nominal.residuals]
     base = replace(study.nominal, residuals=residuals)
     found = _weighed(replace(study, hum=hum, hypotheses=()), base)
