@@ -338,8 +338,9 @@ def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench, sche
             assert one.page.evaluate(NAMELESS) == [], path
 
 
-SIDEWAYS = """() => [...document.querySelectorAll(".printed, .figures figure, .ag-center-cols-viewport")].filter(
-  (one) => one.checkVisibility() && one.scrollWidth > one.clientWidth + 1).map((one) => one.outerHTML.slice(0, 200))"""
+SIDEWAYS = """() => [...document.querySelectorAll(
+  ".printed, .figures figure, .ag-center-cols-viewport")].filter((one) => one.checkVisibility()
+  && one.scrollWidth > one.clientWidth + 1).map((one) => one.outerHTML.slice(0, 200))"""
 NAMELESS = """() => [...document.querySelectorAll(
   "button, a, input, textarea, select, [role=slider], [role=img], iframe, nav")].filter((one) => {
   if (!one.checkVisibility() || one.closest(".ag-root-wrapper, .u-legend")) return false;
