@@ -47,7 +47,9 @@ def two_masses(hold: str, wind_speed: float, *, on_body: bool, start: tuple[floa
     return np.array(found)
 
 
-def run(hold: str, wind_speed: float, steps: int, *, on_body: bool, start: tuple[float, float]) -> RunSettings:
+def run(
+    hold: str, wind_speed: float, steps: int, *, on_body: bool, start: tuple[float, float]
+) -> RunSettings:
     return RunSettings(
         SPRING,
         AeroDerivatives(0.5, -0.11),
