@@ -193,7 +193,10 @@ def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
 
 _MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
 _OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
-_NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
+_NO_MOMENT = (
+    "Without a spring these effects have no moment, and are not tried: {}. Play shows where a spring of stated "
+    "stiffness preloads the joint."
+)
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
 )
@@ -256,9 +259,10 @@ def refuse_undiagnosable(campaign: Campaign) -> None:
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
-            f"runs with a spring and without one ({_ids(loose)}) cannot be diagnosed together yet",
+            f"runs with a spring and without one ({_ids(loose)}) cannot be diagnosed together: the first show the "
+            "sensor's zero, the others a constant moment instead",
             where=campaign.name,
-            remedy="diagnose the two kinds of runs separately",
+            remedy="diagnose the two kinds of runs separately; tunnel identify takes them together",
         )
     if any(run.input_gain is None for run in loose):
         raise TunnelError(

@@ -96,14 +96,13 @@ def excited(fit: Fit) -> PerRunParameters | None:
 
     Returns:
         Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which do nothing in driven
-        runs; None where no run is driven, or no frequency is left beside the motion's own.
+        runs; None where no run on a spring is driven, or no frequency is left beside the motion's own.
     """
     runs, parts, own = fit.problem.data.runs, [], []
     for number, run in enumerate(runs):
-        if run.drive is None:
-            continue
         stated = fit.problem.stated(fit.point.common, fit.point.release[number], run)
-        assert stated.drive is not None
+        if run.drive is None or stated.drive is None or not stated.spring_stiffness > 0.0:
+            continue
         size = 2 ** int(np.ceil(np.log2(2 * run.reading.size)))
         omega = 2.0 * np.pi * np.fft.rfftfreq(size, run.interval)
         # of the mode per rad of its amplitude, as far below its frequency
