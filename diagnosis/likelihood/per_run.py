@@ -27,7 +27,7 @@ class PerRunParameters:
         values: of the effect's parameters that belong to its textbook form, in their order.
         numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
         drop: of χ² by taking it out, dimensionless.
-        of_input: the value of the parameter that says what the effect has to do with the input.
+        of_input: the value of the parameter that says what the effect has to do with the input, dimensionless.
     """
 
     values: tuple[float, ...]
@@ -104,7 +104,7 @@ def excited(fit: Fit) -> PerRunParameters | None:
         if run.drive is None or stated.drive is None or not stated.spring_stiffness > 0.0:
             continue
         size = 2 ** int(np.ceil(np.log2(2 * run.reading.size)))
-        omega = 2.0 * np.pi * np.fft.rfftfreq(size, run.interval)
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(size, run.interval), np.float64)
         # of the mode per rad of its amplitude, as far below its frequency
         static = run.input_means * stated.drive.scale / (REFERENCE_RELEASE * stated.spring_stiffness)
         seen = np.fft.rfft(static, size) * (1j * omega) ** run.derivative

@@ -14,6 +14,7 @@ from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
@@ -189,10 +190,11 @@ class DriveMoment:
         slope = np.where((piece < 0) | self.held, 0.0, slope)
         level = self.values[at] + slope * (starts - kinks[at])
 
-        def forced(j: Array, since: Array) -> Array:  # z' = p z + u, from z = 0
+        def forced(j: NDArray[np.intp], since: Array) -> np.ndarray:  # z' = p z + u, from z = 0
             turn = pole * since
             grown = np.expm1(turn)
-            return np.asarray(level[j] * grown / pole + slope[j] * (grown - turn) / pole**2)
+            found: np.ndarray = level[j] * grown / pole + slope[j] * (grown - turn) / pole**2
+            return found
 
         factor = np.exp(pole * np.diff(starts))
         state = np.concatenate([[0j], forced(np.arange(factor.size), np.diff(starts))])
