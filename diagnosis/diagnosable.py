@@ -19,7 +19,7 @@ from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
-from tunnel_sim.effects import Effect, the_effect
+from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import refuse_untreated
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
@@ -191,11 +191,12 @@ def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
     return max((group for found in groups for group in found), key=len)
 
 
-_ROD = the_effect(channel="stiffness", condition="always", autonomous=False)
-_NOT_TRIED = "On driven runs these effects are not tried yet: {}."
 _MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
 _OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
-_NO_MOMENT = "Without a spring these effects have no moment, and are not tried: {}."
+_NO_MOMENT = (
+    "Without a spring these effects have no moment, and are not tried: {}. Play shows where a spring of stated "
+    "stiffness preloads the joint."
+)
 _NO_ZERO = (
     "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
 )
@@ -258,9 +259,10 @@ def refuse_undiagnosable(campaign: Campaign) -> None:
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
-            f"runs with a spring and without one ({_ids(loose)}) cannot be diagnosed together yet",
+            f"runs with a spring and without one ({_ids(loose)}) cannot be diagnosed together: the first show the "
+            "sensor's zero, the others a constant moment instead",
             where=campaign.name,
-            remedy="diagnose the two kinds of runs separately",
+            remedy="diagnose the two kinds of runs separately; tunnel identify takes them together",
         )
     if any(run.input_gain is None for run in loose):
         raise TunnelError(
@@ -312,8 +314,7 @@ def kinds_for(
     """
     if not campaign.driven:
         return tuple(kind for kind in kinds if not kind.driven), ()
-    kept = tuple(kind for kind in kinds if not (kind.line == "ringing" or kind.skips or kind is _ROD))
-    gone = {_NOT_TRIED: [kind for kind in kinds if kind not in kept]}
+    kept, gone = tuple(kinds), dict[str, list[type[Effect]]]()
     if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
         gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
         kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])

@@ -147,8 +147,5 @@ LINEAR_IN_A_RECORD = frozenset(
 )
 """One record of these is another damped oscillation: what it shows is its own decay, not that of the stated rig."""
 
-NOT_DRIVEN = frozenset({"second_mode", "dropped_samples", ROD})
-"""Families that are not drawn for driven runs, on which the diagnosis does not try them."""
-
 LOST_SAMPLES: Mapping[str, int] = {"dropped_samples/one_instant": 1, "dropped_samples/three_instants": 3}
 """Least number of samples that a form loses, by family and name."""

@@ -6,7 +6,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 import tunnel_reference
-from tunnel_reference.catalogue import NOT_DRIVEN, Form
+from tunnel_reference.catalogue import Form
 
 _MODULES = [
     import_module(f"tunnel_reference.{module.name}")
@@ -15,7 +15,7 @@ _MODULES = [
 ]
 FORMS: tuple[Form, ...] = tuple(form for module in _MODULES for form in module.FORMS)
 FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS if not form.driven}))
-DRIVEN_FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS} - NOT_DRIVEN))
+DRIVEN_FAMILIES: tuple[str, ...] = tuple(sorted({form.family for form in FORMS}))
 """Of driven runs."""
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tunnel_reference.catalogue import Bind, Bound, Draw, Extra, Form, Group, calibration
+from tunnel_reference.catalogue import Bind, Bound, Extra, Form, Group, calibration
 from tunnel_reference.conditions import Array, Conditions
 from tunnel_reference.readings import Order, Params, Reading, ReadingTerm
 
@@ -28,7 +28,7 @@ def missing(r: Reading, p: Params) -> Array:
 
 
 def _lost(instants: int) -> Bind:
-    """Time lost, shared out over instants drawn for every run."""
+    """Time lost, shared out over instants drawn for every run; the input is lost with the reading, or complete."""
 
     def bind(p: float, e: Extra, c: Conditions) -> tuple[Conditions, Bound | None]:
         shares = np.full((c.runs, instants), e.get("own", 0.0))
@@ -39,12 +39,17 @@ def _lost(instants: int) -> Bind:
             "instants": shares,
             "duration": np.full(c.runs, e["duration"]),
         }
-        return replace(c, duration=e["duration"] + _LONGEST), ReadingTerm(missing, Order.LINE, params)
+        lost = ReadingTerm(missing, Order.LINE, params, of_input=e.get("input_lost", 0.0) > 0.5)
+        return replace(c, duration=e["duration"] + _LONGEST), lost
 
     return bind
 
 
-_DRAWN: Draw = lambda g, c: {"seed": float(g.integers(0, 2**31)), "duration": c.duration}  # noqa: E731
+def _drawn(g: np.random.Generator, c: Conditions) -> dict[str, float]:
+    """A seed, the stated duration, and of driven runs whether the input is lost too."""
+    seed = int(g.integers(0, 2**31))
+    drawn = {"seed": float(seed), "duration": c.duration}
+    return drawn if c.drive is None else {**drawn, "input_lost": float(seed % 2)}
 
 
 def _later(p: float, e: Extra, c: Conditions) -> Conditions:
@@ -60,8 +65,8 @@ FORMS = (
     Form("input_delay", "by_run", Group.COMMON, "τ, s", 5e-4, calibration(_later), _BOTH,
          draw=lambda g, _c: {"seed": float(g.integers(0, 2**31)), "spread": 0.1}, limits=(1e-6, 0.05),
          driven=True),
-    Form("dropped_samples", "one_instant", Group.TEXTBOOK, "τ, s", 0.005, _lost(1), draw=_DRAWN,
+    Form("dropped_samples", "one_instant", Group.TEXTBOOK, "τ, s", 0.005, _lost(1), draw=_drawn,
          limits=(1e-3, 0.9 * _LONGEST)),
-    Form("dropped_samples", "three_instants", Group.COMMON, "τ, s", 0.005, _lost(3), draw=_DRAWN,
+    Form("dropped_samples", "three_instants", Group.COMMON, "τ, s", 0.005, _lost(3), draw=_drawn,
          limits=(3e-3, 0.9 * _LONGEST)),
 )  # fmt: skip

@@ -93,7 +93,23 @@ def linear_response(c: Conditions, parameters: Array) -> Array:
     sigma = (damping - flow * REFERENCE_LENGTH * cn_r) / (2.0 * inertia)
     square = (c.spring_stiffness - flow * c.wind_speed * cn_beta) / inertia
     omega = np.sqrt(np.maximum(square - sigma**2, 0.25))
-    pole, h, n = -sigma + 1j * omega, 1.0 / c.sample_rate, c.samples
+    out = oscillator_response(c, -sigma + 1j * omega)
+    per = np.ones(c.runs) if c.drive.on_body else c.spring_stiffness
+    return np.asarray(out * (c.drive.gain * per / inertia)[:, None])
+
+
+def oscillator_response(c: Conditions, pole: np.ndarray) -> Array:
+    """How q̈ − 2 Re λ q̇ + |λ|² q = u follows the input as written from rest, exact for both holds.
+
+    Args:
+        c: with an input.
+        pole: λ by run, shape (runs,), 1/s.
+
+    Returns:
+        q at the samples, shape (runs, samples), in units of the input times s².
+    """
+    assert c.drive is not None
+    h, n = 1.0 / c.sample_rate, len(c.drive.values)
     turn = np.exp(pole * h)
     whole = (turn - 1.0) / pole
     later = np.where(c.drive.held, 0.0, (turn - 1.0 - pole * h) / (pole**2 * h))
@@ -107,9 +123,8 @@ def linear_response(c: Conditions, parameters: Array) -> Array:
         moved[1:] = (whole[r] - later[r]) * u[:-1] + later[r] * u[1:]
         powers = (1.0 - turn[r] ** n * shift**n) / (1.0 - turn[r] * shift)
         z = np.fft.ifft(np.fft.fft(moved, size) * powers)[:n]
-        out[r] = z.imag / omega[r]
-    per = np.ones(c.runs) if c.drive.on_body else c.spring_stiffness
-    return np.asarray(out * (c.drive.gain * per / inertia)[:, None])
+        out[r] = z.imag / pole[r].imag
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,11 +54,13 @@ class ReadingTerm:
 
     Args:
         params: arrays of shape (runs,).
+        of_input: whether the same happens to the input as written.
     """
 
     law: ReadingLaw
     order: Order
     params: dict[str, Array]
+    of_input: bool = False
 
 
 def read_motion(

@@ -16,7 +16,7 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.parameters import SWING
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate, slow_motion
-from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
+from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end, spring_end_angle
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
@@ -112,7 +112,9 @@ class Problem:
             f"{kind.name}.{info.name}"
             for kind in self.effects
             for info in kind.parameters()
-            if (not info.form or kind.name in self.free_forms) and not (info.beside_spring and loose)
+            if not info.of_input
+            and (not info.form or kind.name in self.free_forms)
+            and not (info.beside_spring and loose)
         ]
         held = dict(self.fixed)
         return tuple(name for name in names if name not in held)
@@ -252,9 +254,9 @@ class _Job:
         self.chain = problem.chain(point.common, point.release[run_index], run, effects)
         rig = campaign_rig(problem.data)
         physics = released_by_spring_end(self.chain.physics())
-        if problem.rod_followed:
-            physics = condensed(physics, problem.data)
         driven = physics.drive is not None
+        if problem.rod_followed or driven:
+            physics = condensed(physics, problem.data)
         slow = None if problem.rod_followed or driven else slow_motion(physics, rig)
         self.ringing = None if slow is None else slow.ringing
         if slow is None:
@@ -343,7 +345,10 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
         physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)
     )
     inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
-    return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
+    end = spring_end_angle(physics)
+    return dataclasses.replace(
+        physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia, release_angle=end
+    )
 
 
 def campaign_rig(data: Data) -> Rig:

@@ -5,22 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, normal_equations
 from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
+from diagnosis.likelihood.per_run import PerRunParameters, excited, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
-from diagnosis.likelihood.residuals import (
-    CHANNELS,
-    Line,
-    PerRunParameters,
-    mains_line,
-    misfit,
-    ringing,
-    shedding_line,
-    skip,
-)
+from diagnosis.likelihood.residuals import CHANNELS, Line, mains_line, misfit, shedding_line
 from diagnosis.likelihood.run_data import Data, RunData, departure
 from diagnosis.policy import GROSS_MISFIT
 from identification.signal.decay_fit import Reading, fit_run
@@ -213,11 +206,11 @@ def _of_line(line: Line | None) -> PerRunParameters | None:
 
 
 #: How an effect with a number of its own in every run is found: a periodic one by what sets its frequency.
-_FINDERS: Mapping[str, Callable[[Fit], PerRunParameters | None]] = {
-    "mains": lambda base: _of_line(mains_line(base)),
-    "shedding": lambda base: _of_line(shedding_line(base)),
-    "ringing": ringing,
-    "skips": skip,
+_FINDERS: Mapping[str, Sequence[Callable[[Fit], PerRunParameters | None]]] = {
+    "mains": (lambda base: _of_line(mains_line(base)),),
+    "shedding": (lambda base: _of_line(shedding_line(base)),),
+    "ringing": (ringing, excited),
+    "skips": (skip, partial(skip, with_input=True)),
 }
 
 
@@ -230,17 +223,8 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
         return []
     if kind.line or kind.skips:
-        found_own = _FINDERS[kind.line or "skips"](base)
-        if found_own is None:
-            return []
-        problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
-        infos = zip(found_own.values, _own_parameters(problem, kind), strict=True)
-        values = [np.clip(value, info.lower, info.upper) for value, info in infos]
-        release = np.column_stack([base.point.release, found_own.numbers])
-        point = Point(np.concatenate([base.point.common, values]), release)
-        predicted = misfit(base).excess
-        predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= found_own.drop
-        return [StartingPoint(problem, point, found_own.drop, predicted, base.point.common.size)]
+        alone = [one for find in _FINDERS[kind.line or "skips"] if (one := find(base)) is not None]
+        return sorted((_own_start(base, kind, one) for one in alone), key=lambda start: -start.predicted_drop)
     found = []
     for trial in kind.trials(_circumstances(data)):
         spring = kind.chosen_spring()
@@ -276,6 +260,21 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
         found.append(StartingPoint(problem, point, drop, misfit(base, after).excess, place))
     return sorted(found, key=lambda start: -start.predicted_drop)
+
+
+def _own_start(base: Fit, kind: type[Effect], own: PerRunParameters) -> StartingPoint:
+    fixed = tuple((f"{kind.name}.{i.name}", own.of_input) for i in kind.parameters() if i.of_input)
+    if not base.problem.data.driven:
+        fixed = ()
+    effects = (*base.problem.effects, kind)
+    problem = dataclasses.replace(base.problem, effects=effects, fixed=(*base.problem.fixed, *fixed))
+    infos = zip(own.values, _own_parameters(problem, kind), strict=True)
+    values = [np.clip(value, info.lower, info.upper) for value, info in infos]
+    release = np.column_stack([base.point.release, own.numbers])
+    point = Point(np.concatenate([base.point.common, values]), release)
+    predicted = misfit(base).excess
+    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= own.drop
+    return StartingPoint(problem, point, own.drop, predicted, base.point.common.size)
 
 
 def misses_motion(fit: Fit) -> bool:

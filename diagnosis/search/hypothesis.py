@@ -270,4 +270,6 @@ def _free_forms(fitted: Fit, tolerance: float = 1e-4, only: Collection[str] | No
     }
     start = Point(np.array([(defaults | values)[name] for name in freed.names]), fitted.point.release)
     found = try_fit(freed, start, tolerance=tolerance)
-    return found if found is not None and found.total < fitted.total and is_plausible(found) else None
+    if found is None or not any(found.std(name) > 0.0 for name in freed.names if name not in values):
+        return None  # nor where the runs tell no form at all
+    return found if found.total < fitted.total and is_plausible(found) else None

@@ -12,10 +12,9 @@ from scipy.integrate import solve_ivp
 from tests.reference.rigs import rig
 from tunnel_reference import make
 from tunnel_reference import moments as m
-from tunnel_reference.catalogue import NOT_DRIVEN
 from tunnel_reference.conditions import Input
-from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
-from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES
+from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign
+from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, FORMS
 from tunnel_reference.inputs import linear_response
 from tunnel_reference.integrator import Phase, Term, integrate
 from tunnel_reference.nominal_fit import fit_driven
@@ -116,7 +115,7 @@ def test_driven_draws_drive_some_run_and_keep_the_others(seed):
 
 
 def test_driven_families_are_those_that_a_driven_run_can_show():
-    assert set(DRIVEN_FAMILIES) == (set(FAMILIES) | {"input_delay"}) - NOT_DRIVEN
+    assert set(DRIVEN_FAMILIES) == set(FAMILIES) | {"input_delay"}
 
 
 @pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad"])
@@ -135,3 +134,60 @@ def test_a_driven_campaign_is_written_in_its_scales(column):
     scale = first.spring_stiffness if column == "base_rad" else first.input_gain
     true = c.spring_stiffness[0] if column == "base_rad" else c.drive.gain
     assert first.drive.values * scale == pytest.approx(c.drive.values[:, 0] * true * 0.02)
+
+
+def driven_draw(family: str, form: str, column: str = "moment_nm", *, held: bool = False, **extra: float):
+    """A campaign of two driven runs with one effect of a size given, as it is written."""
+    c = replace(driven(column, held=held), resolution=1e-12, noise_std=1e-15, zero=0.0)
+    kind = next(f for f in FORMS if (f.family, f.name) == (family, form))
+    drawn = kind.draw(np.random.default_rng(5), c) | extra
+    value = extra.get("value", kind.start)
+    effect = EffectDraw(kind, {k: float(v) for k, v in drawn.items()}, 1, 1.0, value)
+    return CampaignDraw("single", c, (effect,), 1)
+
+
+@pytest.mark.parametrize("lost", [0.0, 1.0])
+def test_a_logger_that_loses_rows_loses_those_of_the_input_too(lost):
+    draw = driven_draw("dropped_samples", "one_instant", value=0.05, input_lost=lost)
+    (motion,) = simulate_motions([draw])
+    written = read_and_fit(draw, motion)
+    true, gone, samples = draw.conditions.drive.values, 5, draw.conditions.samples
+    for run in range(2):
+        moved = motion.angle[:, run]
+        first = next(k for k in range(samples) if abs(written.readings[k, run] - moved[k]) > 1e-9)
+        assert written.readings[first:, run] == pytest.approx(moved[first + gone : samples + gone], abs=1e-9)
+        kept = written.draw.conditions.drive.values[:, run]
+        expected = np.delete(true[:, run], slice(first, first + gone)) if lost else true[:, run]
+        assert kept[: expected.size] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("column", ["moment_nm", "base_rad"])
+@pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
+def test_the_input_excites_a_second_mode_as_its_equation_says(column, held):
+    frequency, damping_ratio = 40.0, 0.02
+    draw = driven_draw(
+        "second_mode",
+        "released",
+        column,
+        held=held,
+        value=0.01,
+        frequency=frequency,
+        damping_ratio=damping_ratio,
+    )
+    (motion,) = simulate_motions([draw])
+    c, added = draw.conditions, read_and_fit(draw, motion).readings - motion.angle
+    per = c.drive.gain / (1.0 if column == "base_rad" else c.spring_stiffness)
+    square = frequency**2 * (1.0 + damping_ratio**2)
+    for run in range(2):
+        value, state = c.drive.values[:, run] * np.broadcast_to(per, 2)[run], np.zeros(2)
+        for k in range(c.samples - 1):
+            assert added[k, run] == pytest.approx(0.01 / c.reach * state[0], abs=1e-9)
+            after = value[k] if held else value[k + 1]
+
+            def slope(t, y, now=value[k], then=after):
+                given = now + (then - now) * t * c.sample_rate
+                return [y[1], square * (given - y[0]) - 2.0 * damping_ratio * frequency * y[1]]
+
+            state = solve_ivp(
+                slope, (0.0, 1.0 / c.sample_rate), state, method="DOP853", rtol=1e-10, atol=1e-13
+            ).y[:, -1]

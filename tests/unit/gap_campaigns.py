@@ -64,7 +64,12 @@ def campaign(
         e.name for e in effects if any(i.form and getattr(e, i.name) != i.default for i in e.parameters())
     )
     problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds, free_forms=shaped)
-    values = [getattr(e, i.name) for e in effects for i in e.parameters() if not i.form or e.name in shaped]
+    values = [
+        getattr(e, i.name)
+        for e in effects
+        for i in e.parameters()
+        if not i.of_input and (not i.form or e.name in shaped)
+    ]
     common = np.array([INERTIA, damping, CN_BETA, CN_R, 0.001, *values])
     own = [np.linspace(0.2, 0.8, len(runs))] * len(
         problem.phased

@@ -10,6 +10,7 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
@@ -34,6 +35,9 @@ IN_RUNS = 0.5
 
 MULTIPLES = (1.0, 2.0, 3.0)
 """Multiples of the motion's frequency at which its harmonics lie."""
+
+REFERENCE_RELEASE = 0.35
+"""Release at which all forms of a second mode have the same amplitude, rad."""
 
 Channel = Literal["stiffness", "damping", "forcing", "sensor", "calibration"]
 Condition = Literal["always", "wind_on"]
@@ -302,6 +306,7 @@ class Effect:
 
         Args:
             time_s: true times since the release, s, shape (n,).
+            stated: the input of a driven run is that which acts.
             derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
 
         Returns:
@@ -379,6 +384,11 @@ class EffectChain:
             return run
         return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
 
+    @cached_property
+    def _as_driven(self) -> RunSettings:
+        """The stated run, its input as it acts."""
+        return replace(self.stated, drive=self.physics().drive) if self.stated.drive else self.stated
+
     @property
     def skips(self) -> bool:
         """Whether the motion is read at other times than stated."""
@@ -427,7 +437,7 @@ class EffectChain:
             The measured angle or its derivative, in the same unit, shape (n,).
         """
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            beside = effect.oscillation(time_s, self.stated, drawn, derivative)
+            beside = effect.oscillation(time_s, self._as_driven, drawn, derivative)
             seen = angle if beside is None else angle + beside
             angle = effect.on_angle(seen, time_s, self.stated, drawn)
         return angle

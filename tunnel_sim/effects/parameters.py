@@ -37,6 +37,8 @@ class ParameterInfo:
         beside_spring: whether only a spring of stated stiffness beside the effect makes it known; else it is held.
         chosen_spring: whether it is the stiffness of one of the campaign's springs: chosen, not fitted.
         per_pressure: whether it multiplies ½ρV²Al, so that its unit depends on which sizes are stated.
+        of_input: whether it says what the effect has to do with the input of a driven run; values are tried and not
+            fitted. Free decays do not depend on it.
     """
 
     name: str
@@ -54,6 +56,7 @@ class ParameterInfo:
     beside_spring: bool
     chosen_spring: bool
     per_pressure: bool
+    of_input: bool
 
     def fit_range(self, swing: float) -> tuple[float, float]:
         """Least and greatest value that a fit may take.
@@ -90,6 +93,7 @@ def parameter(
     beside_spring: bool = False,
     chosen_spring: bool = False,
     per_pressure: bool = False,
+    of_input: bool = False,
 ) -> Any:
     """A dataclass field that is an effect's parameter; arguments as in `ParameterInfo`."""
     metadata = {
@@ -106,6 +110,7 @@ def parameter(
         "beside_spring": beside_spring,
         "chosen_spring": chosen_spring,
         "per_pressure": per_pressure,
+        "of_input": of_input,
     }
     return field(default=default, metadata=metadata)
 

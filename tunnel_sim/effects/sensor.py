@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tunnel_sim.effects.base import NEAR_MOTION, Drawn, Effect
+from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn, Effect
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
 from tunnel_sim.physics.forward import backlash
 from tunnel_sim.physics.run_settings import RunSettings
@@ -223,7 +223,8 @@ class DroppedSamples(Effect):
     advice = "Replace the logger, or state the time of every sample"
     equation = (
         "y(t) = β(t) until the instant and β(t + τ) after it, shared out over one sample interval; "
-        "the instant is drawn for every run. With n instants in a run, τ/n is lost at each"
+        "the instant is drawn for every run. With n instants in a run, τ/n is lost at each. In driven runs the "
+        "input is lost with the reading (k = 0), or recorded apart and complete (k = 1)"
     )
     signature = (
         "The phase jumps at an instant of a run; before and after it frequency and damping are the same."
@@ -231,11 +232,16 @@ class DroppedSamples(Effect):
     references = ("Doebelin, Measurement Systems, McGraw-Hill 2003",)
     example = (0.02,)
     autonomous = False
+    tries = 2
     skips = True
 
     lost_time: float = parameter(
         "τ", "s", "time that the missing samples would have taken", scale=0.005, lower=0.0, upper=1.0
     )
+    input_kept: float = parameter(
+        "k", "1", "whether the input of a driven run is complete: 0 or 1",
+        scale=1.0, lower=0.0, upper=1.0, of_input=True,
+    )  # fmt: skip
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
         """The instant, as a share of the run, well inside it."""
@@ -243,12 +249,16 @@ class DroppedSamples(Effect):
         return float(rng.uniform(0.1, 0.9))
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Let the motion go on for as long as it is read."""
-        del stated
+        """Let the motion go on for as long as it is read; an input that is lost too is linear where it is."""
         if self.is_null:
             return run
         self._instants(drawn)  # an error here, before the motion is computed
-        return replace(run, duration=run.duration + self.lost_time + _MARGIN)
+        run = replace(run, duration=run.duration + self.lost_time + _MARGIN)
+        if run.drive is None or stated.drive is None or self.input_kept == 1.0:
+            return run
+        stamps = run.drive.time_s + stated.drive.delay  # since the run's start
+        later = (1.0 - self.input_kept) * (self.on_time(stamps, stated, drawn) - stamps)
+        return replace(run, drive=replace(run.drive, time_s=run.drive.time_s + later))
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """The true time runs ahead of the stamps from every instant on."""
@@ -298,7 +308,7 @@ class MainsHum(Effect):
 _LEAST_DAMPING = 1e-4  # of a structure: judgement; a line that does not decay is not a mode
 _DECAYS = 1.01  # a fit that ends at the least damping has found a line that something drives
 _SLOWEST = 0.1  # of the motion's frequency: judgement; what is slower is a drift in a record of ten cycles
-_REFERENCE_RELEASE = 0.35  # rad: where all exponents give the same amplitude
+_LEAST_SPRING = 1e-9  # N m/rad: a fit may try none
 
 
 @dataclass(frozen=True)
@@ -312,13 +322,18 @@ class SecondMode(Effect):
     advice = "Stiffen what oscillates beside the body, or model both modes"
     equation = (
         "y = β + a exp(−ζ2 ω2 t) cos(ω2 t + φ), φ drawn for every run; other form: a (|β0|/0.35 rad)^n for a, "
-        "β0 the release angle"
+        "β0 the release angle. In driven runs k = 0 is the same from the start on; with k = ±1 the input M "
+        "excites it instead: y = β + k a q/0.35 rad, q̈ + 2 ζ2 ω2 q̇ + ω2² q = ω2² M/Kr"
     )
-    signature = "A decaying line from the release on, at one frequency whatever the spring and the wind."
+    signature = (
+        "A decaying line from the release on, at one frequency whatever the spring and the wind; in driven runs a "
+        "second resonance, or such a line from the start on."
+    )
     references = ("Meirovitch, Fundamentals of Vibrations, McGraw-Hill 2001",)
     example = (0.005, 60.0, 0.01)
     autonomous = False
     line = "ringing"
+    tries = 2
     ahead_of_sensor = True
 
     amplitude: float = parameter(
@@ -334,6 +349,10 @@ class SecondMode(Effect):
     exponent: float = parameter(
         "n", "1", "power of the release angle", scale=1.0, lower=0.0, upper=3.0, default=0.0, form=True
     )
+    by_input: float = parameter(
+        "k", "1", "whether the input of a driven run excites it: 0 or 1, or -1 against its sense",
+        scale=1.0, lower=-1.0, upper=1.0, of_input=True,
+    )  # fmt: skip
 
     def plausible(self, omega: float) -> bool:
         """Whether it is an oscillation of its own: it decays, is not the motion's, and not as slow as a drift."""
@@ -345,11 +364,23 @@ class SecondMode(Effect):
     def oscillation(
         self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int = 0
     ) -> Array | None:
-        """The second oscillation, at a phase of the run's own."""
+        """The second oscillation, at a phase of the run's own or as the input excites it."""
         if self.is_null:
             return None
+        if stated.drive is None or self.by_input == 0.0:
+            return self._ringing(time_s, stated, drawn, derivative)
+        mode = self.frequency, self.damping_ratio
+        spring = max(stated.spring_stiffness, _LEAST_SPRING)
+        static = self.amplitude / (REFERENCE_RELEASE * spring)  # rad per N m
+        excited = self.by_input * static * stated.drive.oscillation(*mode, time_s, derivative)
+        if abs(self.by_input) == 1.0:
+            return excited
+        return excited + (1.0 - abs(self.by_input)) * self._ringing(time_s, stated, drawn, derivative)
+
+    def _ringing(self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int) -> Array:
         phase = self.drawn_number(drawn)
-        size = self.amplitude * (abs(stated.release_angle) / _REFERENCE_RELEASE) ** self.exponent
+        release = REFERENCE_RELEASE if stated.drive else abs(stated.release_angle)
+        size = self.amplitude * (release / REFERENCE_RELEASE) ** self.exponent
         since = np.maximum(time_s, 0.0)  # the body is held before the release
         turn = self.frequency * since
         # a derivative multiplies exp(s t) by s, s = ω2 (i − ζ2)

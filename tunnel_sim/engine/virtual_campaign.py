@@ -164,9 +164,6 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
         if effect.driven and not drives:
             what = "acts on driven runs only, and all runs of the plan are free decays"
             raise TunnelError(what, where=where, remedy="leave it out, or add [drive]")
-        if effect.skips and drives:
-            what = "leaves samples out, which is not simulated for driven runs"
-            raise TunnelError(what, where=where, remedy="leave out the effect or [drive]")
         if effect.on_spring and effect.channel == "damping" and not all(d.on_body for d in drives):
             what = "is a loss in the spring, which is not simulated where its root moves"
             remedy = "leave out the effect, or drive the body by amplitudes_nm"

@@ -14,6 +14,7 @@ from math import inf, isfinite, sqrt
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.physics.moment_law import operation_names, parameter_names
 from tunnel_sim.vocabulary import limits
@@ -164,6 +165,52 @@ class DriveMoment:
         integral = np.append(0.0, np.cumsum(until))[before]
         integral += 0.5 * (given[before] + now) * (ends - times[before])
         return np.asarray(np.diff(integral) / np.diff(ends), np.float64)
+
+    def oscillation(
+        self, frequency: float, damping_ratio: float, time_s: Array, derivative: int = 0
+    ) -> Array:
+        """How an oscillator follows the moment u from rest: q̈ + 2ζω q̇ + ω² q = ω² u, exact for both holds.
+
+        Args:
+            frequency: undamped, ω, rad/s.
+            damping_ratio: ζ below 1, dimensionless.
+            time_s: since the run's start, at which it begins at rest, shape (n,), s.
+            derivative: which derivative of q is asked for: 0, 1 or 2.
+
+        Returns:
+            q in N m, or its derivative per s or s², shape (n,).
+        """
+        ringing = np.sqrt(1.0 - damping_ratio**2)
+        pole = frequency * complex(-damping_ratio, ringing)
+        kinks, last = self.time_s + self.delay, self.values.size - 1
+        starts = np.concatenate([[0.0], kinks[kinks > 0.0]])
+        piece = np.searchsorted(kinks, starts, side="right") - 1  # -1 before the first sample
+        at = np.clip(piece, 0, last)
+        slope = np.append(np.diff(self.values) / np.diff(self.time_s), 0.0)[at]
+        slope = np.where((piece < 0) | self.held, 0.0, slope)
+        level = self.values[at] + slope * (starts - kinks[at])
+
+        def forced(j: NDArray[np.intp], since: Array) -> np.ndarray:  # z' = p z + u, from z = 0
+            turn = pole * since
+            grown = np.expm1(turn)
+            found: np.ndarray = level[j] * grown / pole + slope[j] * (grown - turn) / pole**2
+            return found
+
+        factor = np.exp(pole * np.diff(starts))
+        state = np.concatenate([[0j], forced(np.arange(factor.size), np.diff(starts))])
+        factor = np.concatenate([[0j], factor])
+        reach = 1
+        while reach < state.size:  # of z at the starts, each from twice as many pieces as before
+            state[reach:] += factor[reach:] * state[:-reach]
+            factor[reach:] *= factor[:-reach]
+            reach *= 2
+        j = np.maximum(np.searchsorted(starts, time_s, side="right") - 1, 0)
+        since = np.maximum(time_s - starts[j], 0.0)
+        state = np.exp(pole * since) * state[j] + forced(j, since)
+        values = (pole**derivative * state).imag
+        if derivative == 2:
+            values = values + pole.imag * (level[j] + slope[j] * since)
+        return np.asarray(self.scale * frequency / ringing * values, np.float64)
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def test_a_nearer_start_has_less_of_the_effect_and_nothing_else_changed():
 
 def readings_of(data, effect, common, own, noise=0.0):
     """The same runs with the readings of a model."""
-    values = [getattr(effect, info.name) for info in effect.parameters() if not info.form]
+    values = [getattr(effect, info.name) for info in effect.parameters() if not (info.form or info.of_input)]
     point = Point(np.array([*common, *values]), np.array(own))
     readings = Problem(data, (type(effect),)).predict([point])[0]
     rng = np.random.default_rng(7)

@@ -1,0 +1,287 @@
+"""Effects with numbers of their own in every run, found in the residuals: phases, and instants of skips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import linear_coefficients, resonance
+from diagnosis.likelihood.whitening import correlate
+from tunnel_sim.effects.base import IN_RUNS, MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
+from tunnel_sim.vocabulary.record import Array
+
+_RINGING_PADDING = 4  # zero padding of the spectra
+_DECAYS = (0.0, 1.0, 3.0, 10.0, 30.0, 100.0)  # of a ringing in one run, nepers
+_MOST_SKIPS, _SWEEPS = 3, 4  # skips sought in a run, and how often each is sought again beside the others
+_ROUNDS = 3  # of the search: the first with a time for every skip, the others with the one common time found
+_EDGE = 8  # blocks at either end of a run in which a skip cannot be seen, or distinguished from the release
+
+
+@dataclass(frozen=True, eq=False)
+class PerRunParameters:
+    """What was found.
+
+    Args:
+        values: of the effect's parameters that belong to its textbook form, in their order.
+        numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
+        drop: of χ² by taking it out, dimensionless.
+        of_input: the value of the parameter that says what the effect has to do with the input, dimensionless.
+    """
+
+    values: tuple[float, ...]
+    numbers: Array
+    drop: float
+    of_input: float = 0.0
+
+
+def ringing(fit: Fit) -> PerRunParameters | None:
+    """The strongest decaying line that starts at the release and has one frequency in all runs.
+
+    Returns:
+        Amplitude (rad), angular frequency (rad/s) and damping ratio with every run's phase; None where no
+        frequency is left beside the motion's own.
+
+    Where a frequency is that of a run's own motion, or a multiple of it, that run does not count. At least half of
+    them must: springs and winds differ, and a line that is near the motion of one run is beside that of another.
+    """
+    runs = fit.problem.data.runs
+    step = 1.0 / (_RINGING_PADDING * max(run.duration for run in runs))
+    grid = np.arange(step, 0.4 / max(run.interval for run in runs), step)
+    apart = []  # by run, where the grid is neither the run's own frequency nor a multiple of it
+    for run in runs:
+        padded = _RINGING_PADDING * run.reading.size
+        swing = (run.reading - run.reading.mean()) * np.hanning(run.reading.size)
+        own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
+        apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
+    beside = np.array(apart)
+    free = np.mean(beside, axis=0) >= IN_RUNS
+    if not free.any():
+        return None
+    shortest = min(run.duration for run in runs)
+    tried, drops = [], []
+    for rate in np.array(_DECAYS) / shortest:
+        # complex amplitudes (rad) of exp(−rate t) cos on the grid, and the drops of χ², by run
+        amplitudes, by_run = [], []
+        for run, residual in zip(runs, fit.residuals, strict=True):
+            decay = np.exp(-rate * run.interval * np.arange(residual.size))
+            size = 2 ** int(np.ceil(np.log2(2 * _RINGING_PADDING * residual.size)))
+            transform = np.conj(np.fft.rfft(residual * decay, size))
+            index = np.round(grid * size * run.interval).astype(int)
+            power = float(decay @ decay)
+            amplitude = 2.0 * np.conj(transform[index]) / power
+            amplitudes.append(amplitude * np.sqrt(run.noise_variance) / run.response(grid))
+            by_run.append(0.5 * np.abs(amplitude) ** 2 * power)
+        tried.append((rate, np.array(amplitudes)))
+        drops.append(np.where(free, np.sum(np.array(by_run) * beside, axis=0), 0.0))
+    best = int(np.argmax([drop.max() for drop in drops]))
+    at = int(np.argmax(drops[best]))
+    rate, amplitude = tried[best]
+    exponent = complex(-rate, 2.0 * np.pi * grid[at])
+    omega = abs(exponent)
+    found = amplitude[:, at] / exponent ** runs[0].derivative
+    mean = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
+    return PerRunParameters((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
+
+
+_DAMPINGS = (0.003, 0.01, 0.03, 0.1)  # of a mode that the input excites
+_APART = 0.02  # frequencies tried, relative: within the half-power width of the dampings, or near it
+
+
+def excited(fit: Fit) -> PerRunParameters | None:
+    """The strongest oscillation beside the motion that the input excites from rest, the same in all runs.
+
+    Returns:
+        Amplitude (rad), angular frequency (rad/s) and damping ratio, with phases of 0, which do nothing in driven
+        runs; None where no run on a spring is driven, or no frequency is left beside the motion's own.
+    """
+    runs, parts, own = fit.problem.data.runs, [], []
+    for number, run in enumerate(runs):
+        stated = fit.problem.stated(fit.point.common, fit.point.release[number], run)
+        if run.drive is None or stated.drive is None or not stated.spring_stiffness > 0.0:
+            continue
+        size = 2 ** int(np.ceil(np.log2(2 * run.reading.size)))
+        omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(size, run.interval), np.float64)
+        # of the mode per rad of its amplitude, as far below its frequency
+        static = run.input_means * stated.drive.scale / (REFERENCE_RELEASE * stated.spring_stiffness)
+        seen = np.fft.rfft(static, size) * (1j * omega) ** run.derivative
+        seen *= run.response(omega / (2.0 * np.pi)) / np.sqrt(run.noise_variance)
+        parts.append((omega, seen, np.fft.rfft(fit.residuals[number], size), 2.0 / size))
+        own.append(2.0 * np.pi * resonance(fit, number))
+    if not parts:
+        return None
+    grid = np.exp(
+        np.arange(np.log(0.1 * min(own)), np.log(0.8 * np.pi / max(r.interval for r in runs)), _APART)
+    )
+    grid = grid[np.mean([np.abs(grid / one - 1.0) > NEAR_MOTION for one in own], axis=0) >= IN_RUNS]
+    found = PerRunParameters((0.0, 1.0, 0.0), np.zeros(len(runs)), 0.0)
+    for frequency in grid.tolist():
+        for damping_ratio in _DAMPINGS:
+            product = power = 0.0
+            for omega, seen, left, scale in parts:
+                turn = omega / frequency
+                mode = seen / (1.0 - turn**2 + 2j * damping_ratio * turn)
+                product += scale * float(np.vdot(mode, left).real)
+                power += scale * float(np.vdot(mode, mode).real)
+            if product**2 / power > found.drop:
+                values = abs(product) / power, frequency, damping_ratio
+                sign = float(np.sign(product))
+                found = replace(found, values=values, drop=product**2 / power, of_input=sign)
+    return found if found.of_input else None
+
+
+def skip(fit: Fit, *, with_input: bool = False) -> PerRunParameters | None:
+    """The instants at which the runs jump ahead by one common time.
+
+    Args:
+        with_input: whether the input of driven runs jumps too, so that only their state changes at once; else their
+            reading is that of a later time from there on, as in free decays.
+
+    Returns:
+        The time lost (s) with every run's instants, as many as χ² asks for; None where no run is long enough, or
+        none has an input that could jump.
+    """
+    data = fit.problem.data
+    runs = [_Skipping(fit, number, with_input=with_input) for number in range(len(data.runs))]
+    if any(run.left.size < 4 * _EDGE for run in runs) or (with_input and not data.driven):
+        return None
+    found = []
+    for count in range(1, _MOST_SKIPS + 1):  # so many skips in every run, all of one time
+        steps, lost = [run.steps(count) for run in runs], 0.0
+        for number in range(_ROUNDS):
+            if number > 0:  # two skips close together were one of twice the time, and another one of nothing
+                steps = [run.steps(count, of_run, lost) for run, of_run in zip(runs, steps, strict=True)]
+            times, weights = (
+                np.array([[getattr(step, name) for step in of_run] for of_run in steps])
+                for name in ("time", "weight")
+            )
+            lost = max(float(np.sum(times * weights) / np.sum(weights)), 0.0)
+        drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
+        shares = [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
+        found.append(PerRunParameters((lost * count,), np.array(shares), drop))
+    # of an instant, which is sought among as many blocks
+    cost = 2.0 * sum(np.log(run.left.size) for run in runs)
+    best = max(found, key=lambda one: one.drop - cost * one.numbers.shape[1])
+    return replace(best, of_input=float(data.driven and not with_input))
+
+
+@dataclass(frozen=True)
+class _Skip:
+    """A skip in one run: its block, the time lost (s) and the weight of that (1/s²)."""
+
+    block: int
+    time: float
+    weight: float
+
+
+class _Skipping:
+    """One run, in which skips are sought by linear theory.
+
+    What a second lost at block k adds to the reading of a later block t is a sum over j of a_j(k) b_j(t) z_j^(t−k):
+
+    - The rate of the motion at t, where the reading alone jumps, and in free decays.
+    - The free motion that begins with the rate and the acceleration at k, where the input jumps too.
+
+    The residual changes by what the whitening filter makes of that. What the run's own sensitivities absorb is
+    taken out for all k at once by sums from the end.
+    """
+
+    def __init__(self, fit: Fit, number: int, *, with_input: bool) -> None:
+        run, residual = fit.problem.data.runs[number], fit.residuals[number]
+        self.run = run
+        self.basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
+        rate = np.gradient(run.reading - run.unscaled(residual), run.interval)
+        filled = 1.0 if run.samples is None else np.sqrt(run.samples.count / run.block)
+        scale = filled / np.sqrt(run.noise_variance) * np.ones(rate.size)
+        # a at the skip, b after it, z; not whitened
+        self.terms: list[tuple[np.ndarray, np.ndarray, complex]] = [(np.ones(rate.size), rate, 1.0)]
+        if with_input and run.drive is not None:
+            inertia, damping, stiffness = linear_coefficients(fit, number)
+            one, other = np.roots([inertia, damping, stiffness]) + np.array([0.0, 1e-9j])  # not equal
+            more = np.gradient(rate, run.interval)
+            self.terms = [
+                ((more - second * rate) / (first - second), np.ones(rate.size), np.exp(first * run.interval))
+                for first, second in ((one, other), (other, one))
+            ]
+        self.scale = np.asarray(scale, np.float64)
+        self.left = self._unabsorbed(residual)
+        power = self._powers() - np.sum(self._seen(correlate(self.basis, run.taps)) ** 2, axis=1)
+        self.weight = np.maximum(power, 1e-9 * float(np.sum((self.scale * rate) ** 2)))
+
+    def steps(self, count: int, found: list[_Skip] | None = None, time: float | None = None) -> list[_Skip]:
+        """The skips that leave least, each sought again beside the others.
+
+        Args:
+            found: where the search starts; None starts without any.
+            time: lost at every skip, s; None for a time of its own at each.
+        """
+        found = list(found or [])
+        inside = slice(_EDGE, self.left.size - _EDGE)
+        weight = self.weight[inside]
+        for _ in range(1 if count == 1 else _SWEEPS):
+            for place in range(count):
+                others = found[:place] + found[place + 1 :]
+                change = self._change([(step, step.time if time is None else time) for step in others])
+                seen = self._seen(correlate(self.left - change, self.run.taps))[inside]
+                own = seen / weight
+                lost = np.maximum(own, 0.0) if time is None else time
+                best = int(np.argmax(lost * (2.0 * seen - lost * weight)))
+                found[place : place + 1] = [_Skip(best + _EDGE, float(own[best]), float(weight[best]))]
+        return found
+
+    def drop(self, steps: list[_Skip], time: float) -> float:
+        """Of χ² by skips of one time (s)."""
+        left = self.left - self._change([(step, time) for step in steps])
+        return float(self.left @ self.left - left @ left)
+
+    def share(self, step: _Skip) -> float:
+        """Instant of a skip, as a share of the run."""
+        return float(step.block * self.run.interval / self.run.duration)
+
+    def _change(self, steps: list[tuple[_Skip, float]]) -> Array:
+        added = np.zeros(self.left.size)
+        for step, time in steps:
+            since = np.arange(self.left.size - step.block)
+            added[step.block :] += time * sum(
+                (a[step.block] * b[step.block :] * z**since).real for a, b, z in self.terms
+            )
+        return self._unabsorbed(self.run.scaled(added))
+
+    def _seen(self, whitened: Array) -> Array:
+        """Products of what a second lost at every block adds with values that the filter's transpose changed."""
+        columns = whitened.reshape(len(whitened), -1)
+        found = sum(
+            (a[:, None] * _after((b * self.scale)[:, None] * columns, z)).real for a, b, z in self.terms
+        )
+        return np.asarray(found, np.float64).reshape(whitened.shape)
+
+    def _powers(self) -> Array:
+        """Powers of what a second lost at every block adds."""
+        if len(self.terms) == 1:
+            # the sum from any value to the last is the power of the whitened slope from there on
+            slope = self.terms[0][1] * self.scale
+            lags = np.correlate(self.run.taps, self.run.taps, "full")[self.run.taps.size - 1 :]
+            return _after(slope * (2.0 * correlate(slope, lags) - lags[0] * slope)).real
+        size = self.left.size
+        free = [z ** np.arange(size) / np.sqrt(self.run.noise_variance) for _, _, z in self.terms]
+        whitened = [self.run.white(one.real) + 1j * self.run.white(one.imag) for one in free]
+        power = np.zeros(size)
+        for (a, _, _), one in zip(self.terms, whitened, strict=True):
+            for (other_a, _, _), other in zip(self.terms, whitened, strict=True):
+                # of the first blocks after the skip, as many as follow it
+                power += (a * np.conj(other_a) * np.cumsum(one * np.conj(other))[::-1]).real
+        return power
+
+    def _unabsorbed(self, values: Array) -> Array:
+        return np.asarray(values - self.basis @ (self.basis.T @ values), np.float64)
+
+
+def _after(values: np.ndarray, factor: complex = 1.0) -> np.ndarray:
+    """Sums from each block to the last, every later block times one more power of a factor."""
+    if factor == 1.0:
+        return np.cumsum(values[::-1], axis=0)[::-1]
+    from scipy.signal import lfilter  # only here: slow to load
+
+    found: np.ndarray = lfilter([1.0], [1.0, -factor], values[::-1], axis=0)[::-1]
+    return found
