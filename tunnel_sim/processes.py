@@ -151,20 +151,7 @@ def _serve(header: dict[str, Any]) -> None:
     prepare, work = (getattr(import_module(module), name) for module, name in header["calls"])
     prepare()
     given = sys.stdin.buffer.read()
-    seconds, memory = header["limits"]
-    try:
-        import resource
-    except ImportError:
-        pass  # the system has no such limits: the clock alone holds
-    else:
-        with suppress(OSError, ValueError):  # a lower limit holds already
-            used = int(Path("/proc/self/statm").read_bytes().split()[0]) * resource.getpagesize()
-            resource.setrlimit(resource.RLIMIT_AS, (used + memory, used + memory))
-        with suppress(OSError, ValueError):
-            limit = math.ceil(time.process_time() + seconds)
-            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
-            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-            resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
+    _limit(*header["limits"])
     try:
         found = work(given)
     except MemoryError:
@@ -172,6 +159,22 @@ def _serve(header: dict[str, Any]) -> None:
     with os.fdopen(answer, "wb") as stream:
         stream.write(found)
     os._exit(0)
+
+
+def _limit(seconds: float, memory: int) -> None:
+    """Limit what this process may take from now on; where the system has no such limits, the clock alone holds."""
+    try:
+        import resource
+    except ImportError:
+        return
+    with suppress(OSError, ValueError):  # a lower limit holds already
+        used = int(Path("/proc/self/statm").read_bytes().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (used + memory, used + memory))
+    with suppress(OSError, ValueError):
+        limit = math.ceil(time.process_time() + seconds)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
 
 
 @contextmanager

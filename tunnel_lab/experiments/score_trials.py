@@ -348,7 +348,17 @@ def read_trials(path: Path) -> Results:
                 raise ValueError("a unit that is not the quantity's")
             if (row["value"] is None) != (row["std"] is None):
                 raise ValueError("a value without its standard deviation")
-            if not _can_be_scored(row):
+            truth, value, std, bound = (row[name] for name in ("truth", "value", "std", "bound"))
+            sizes = [abs(number) for number in (truth, value, std, bound) if number is not None]
+            possible = all(size <= limits.LARGEST_NUMBER for size in sizes)  # false for NaN as well
+            possible &= truth != 0.0 if bound is None else not bound <= 0.0
+            if (
+                possible and value is not None
+            ):  # its error is a number over bound, truth and standard deviation
+                scales = [abs(scale) for scale in (truth, std, bound) if scale]
+                errors = (abs(value - truth) / scale for scale in scales)
+                possible = std >= 0.0 and all(error <= limits.LARGEST_NUMBER for error in errors)
+            if not possible:
                 raise ValueError("a number out of all range")
         if not scored or any(cells != wanted for cells in scored.values()):
             raise ValueError("cells that are not those of the grid")
@@ -359,20 +369,6 @@ def packaged_baseline() -> Results:
     """The trials of all estimators on the packaged grid, which ``tunnel score --check packaged`` compares with."""
     with resources.as_file(resources.files("tunnel_lab") / "data" / "score-baseline.parquet") as path:
         return read_trials(path)
-
-
-def _can_be_scored(row: Row) -> bool:
-    """Whether the row's error is a number over its bound, its truth and its standard deviation."""
-    truth, value, std, bound = (row[name] for name in ("truth", "value", "std", "bound"))
-    given = [abs(number) for number in (truth, value, std, bound) if number is not None]
-    if not all(number <= limits.LARGEST_NUMBER for number in given):  # false for NaN as well
-        return False
-    if (bound is not None and bound <= 0.0) or (bound is None and truth == 0.0):
-        return False
-    if value is None:
-        return True
-    scales = [abs(scale) for scale in (truth, std, bound) if scale]
-    return bool(std >= 0.0) and all(abs(value - truth) / scale <= limits.LARGEST_NUMBER for scale in scales)
 
 
 def parquet(frame: pl.DataFrame) -> bytes:
