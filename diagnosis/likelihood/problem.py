@@ -16,7 +16,7 @@ from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.parameters import SWING
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate, slow_motion
-from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end, spring_end_angle
+from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
 from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
@@ -253,10 +253,11 @@ class _Job:
         self.zero = problem.zero(point.common, point.release[run_index])
         self.chain = problem.chain(point.common, point.release[run_index], run, effects)
         rig = campaign_rig(problem.data)
-        physics = released_by_spring_end(self.chain.physics())
+        physics = self.chain.physics()
         driven = physics.drive is not None
         if problem.rod_followed or driven:
             physics = condensed(physics, problem.data)
+        physics = released_by_spring_end(physics)
         slow = None if problem.rod_followed or driven else slow_motion(physics, rig)
         self.ringing = None if slow is None else slow.ringing
         if slow is None:
@@ -345,10 +346,7 @@ def condensed(physics: RunSettings, data: Data) -> RunSettings:
         physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)
     )
     inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
-    end = spring_end_angle(physics)
-    return dataclasses.replace(
-        physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia, release_angle=end
-    )
+    return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
 
 
 def campaign_rig(data: Data) -> Rig:
