@@ -90,23 +90,20 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
     sensor = [t for t in terms if isinstance(t, ReadingTerm)]
     readings = read_motion(conditions, motion, sensor, np.random.default_rng(draw.seed))
     readings = readings[: draw.conditions.samples]  # a motion may outlast the record
-    draw = replace(draw, conditions=_as_written(conditions, motion, sensor, draw.conditions))
+    for term in sensor:
+        drive = draw.conditions.drive
+        if not term.of_input or drive is None:
+            continue
+        # the input as the logger writes it
+        values = np.pad(
+            drive.values, ((0, conditions.samples - draw.conditions.samples), (0, 0)), mode="edge"
+        )
+        read = term.law(Reading(values, motion, conditions, np.random.default_rng(0)), term.params)
+        drive = replace(drive, values=read[: draw.conditions.samples])
+        draw = replace(draw, conditions=replace(draw.conditions, drive=drive))
     fit = (fit_nominal if conditions.drive is None else fit_driven)(draw.conditions, readings)
     power = fit.residual_power / conditions.noise_power
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
-
-
-def _as_written(
-    conditions: Conditions, motion: Motion, terms: Sequence[ReadingTerm], stated: Conditions
-) -> Conditions:
-    """The stated conditions, with the input as the logger writes it."""
-    for term in terms:
-        if term.of_input and stated.drive is not None:
-            whole = conditions.samples - stated.samples
-            values = np.pad(stated.drive.values, ((0, whole), (0, 0)), mode="edge")
-            read = term.law(Reading(values, motion, conditions, np.random.default_rng(0)), term.params)
-            stated = replace(stated, drive=replace(stated.drive, values=read[: stated.samples]))
-    return stated
 
 
 class _Search:

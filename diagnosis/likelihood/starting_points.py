@@ -222,10 +222,20 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data = base.problem.data
     if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
         return []
+    found: list[StartingPoint] = []
     if kind.line or kind.skips:
-        alone = [one for find in _FINDERS[kind.line or "skips"] if (one := find(base)) is not None]
-        return sorted((_own_start(base, kind, one) for one in alone), key=lambda start: -start.predicted_drop)
-    found = []
+        for one in filter(None, (find(base) for find in _FINDERS[kind.line or "skips"])):
+            of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
+            fixed = (*base.problem.fixed, *(of_input if data.driven else ()))
+            problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind), fixed=fixed)
+            infos = zip(one.values, _own_parameters(problem, kind), strict=True)
+            values = [np.clip(value, info.lower, info.upper) for value, info in infos]
+            release = np.column_stack([base.point.release, one.numbers])
+            point = Point(np.concatenate([base.point.common, values]), release)
+            predicted = misfit(base).excess
+            predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= one.drop
+            found.append(StartingPoint(problem, point, one.drop, predicted, base.point.common.size))
+        return sorted(found, key=lambda start: -start.predicted_drop)
     for trial in kind.trials(_circumstances(data)):
         spring = kind.chosen_spring()
         held = {} if spring is None else {spring: trial.values[spring]}
@@ -260,21 +270,6 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
         found.append(StartingPoint(problem, point, drop, misfit(base, after).excess, place))
     return sorted(found, key=lambda start: -start.predicted_drop)
-
-
-def _own_start(base: Fit, kind: type[Effect], own: PerRunParameters) -> StartingPoint:
-    fixed = tuple((f"{kind.name}.{i.name}", own.of_input) for i in kind.parameters() if i.of_input)
-    if not base.problem.data.driven:
-        fixed = ()
-    effects = (*base.problem.effects, kind)
-    problem = dataclasses.replace(base.problem, effects=effects, fixed=(*base.problem.fixed, *fixed))
-    infos = zip(own.values, _own_parameters(problem, kind), strict=True)
-    values = [np.clip(value, info.lower, info.upper) for value, info in infos]
-    release = np.column_stack([base.point.release, own.numbers])
-    point = Point(np.concatenate([base.point.common, values]), release)
-    predicted = misfit(base).excess
-    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= own.drop
-    return StartingPoint(problem, point, own.drop, predicted, base.point.common.size)
 
 
 def misses_motion(fit: Fit) -> bool:

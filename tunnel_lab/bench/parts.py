@@ -170,19 +170,19 @@ class Fault:
 
 
 def show_parts(parts: Iterable[str | TextTable]) -> None:
-    """Tables and paragraphs as the terminal prints them, with names as words."""
-    shown = (_with_words(part) if isinstance(part, TextTable) else part for part in parts)
+    """Tables and paragraphs as the terminal prints them, with names such as ``coulomb friction`` as words."""
+    shown: list[str | TextTable] = []
+    for part in parts:
+        if isinstance(part, TextTable):
+            named = [heading in _NAMED for heading in part.columns]
+            rows = (
+                tuple(cell.replace("_", " ") if name else cell for cell, name in zip(row, named, strict=True))
+                for row in part.rows
+            )
+            shown.append(replace(part, rows=tuple(rows)))
+        else:
+            shown.append(part)
     ui.html(as_html(shown), sanitize=False).classes("printed")  # its texts are escaped
-
-
-def _with_words(table: TextTable) -> TextTable:
-    """A table whose names of effects and parameters are words, such as ``coulomb friction``."""
-    named = [heading in _NAMED for heading in table.columns]
-    rows = (
-        tuple(cell.replace("_", " ") if name else cell for cell, name in zip(row, named, strict=True))
-        for row in table.rows
-    )
-    return replace(table, rows=tuple(rows))
 
 
 def show_facts(facts: Iterable[tuple[str, ...]]) -> None:

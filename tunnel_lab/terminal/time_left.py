@@ -68,16 +68,12 @@ class Reached:
         found = self.left(now)
         if found is None:
             return "time left not known" if self.stage in LEFT else "time left not known yet"
-        (low, small), (high, large) = map(_rounded, found)
+        (low, small), (high, large) = (
+            (round(s / 60.0), "min") if s >= 120.0 else (round(s) if s < 20.0 else 5 * round(s / 5.0), "s")
+            for s in found
+        )
         if low == 0:
             return f"less than {max(high, 1)} {large} left"
         if (low, small) == (high, large):
             return f"about {high} {large} left"
         return f"about {low}{'' if small == large else f' {small}'} to {high} {large} left"
-
-
-def _rounded(seconds: float) -> tuple[int, str]:
-    """A time as a whole number and its unit."""
-    if seconds >= 120.0:
-        return round(seconds / 60.0), "min"
-    return (round(seconds) if seconds < 20.0 else 5 * round(seconds / 5.0)), "s"

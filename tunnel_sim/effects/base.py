@@ -10,7 +10,6 @@ import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
@@ -384,11 +383,6 @@ class EffectChain:
             return run
         return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
 
-    @cached_property
-    def _as_driven(self) -> RunSettings:
-        """The stated run, its input as it acts."""
-        return replace(self.stated, drive=self.physics().drive) if self.stated.drive else self.stated
-
     @property
     def skips(self) -> bool:
         """Whether the motion is read at other times than stated."""
@@ -436,8 +430,11 @@ class EffectChain:
         Returns:
             The measured angle or its derivative, in the same unit, shape (n,).
         """
+        stated = self.stated
+        if stated.drive is not None:  # as it acts
+            stated = replace(stated, drive=self.physics().drive)
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            beside = effect.oscillation(time_s, self._as_driven, drawn, derivative)
+            beside = effect.oscillation(time_s, stated, drawn, derivative)
             seen = angle if beside is None else angle + beside
             angle = effect.on_angle(seen, time_s, self.stated, drawn)
         return angle
