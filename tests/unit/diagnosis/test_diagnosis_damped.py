@@ -11,8 +11,8 @@ from tunnel_sim.effects import effect_from
     ("name", "parameters"),
     [
         (None, {}),
-        ("cubic_stiffness", {"coefficient": -1.0}),
-        ("quadratic_damping", {"coefficient": 0.02}),
+        pytest.param("cubic_stiffness", {"coefficient": -1.0}, marks=pytest.mark.slow),
+        pytest.param("quadratic_damping", {"coefficient": 0.02}, marks=pytest.mark.slow),
         ("coulomb_friction", {"friction_moment": 0.02}),
     ],
 )

@@ -62,7 +62,9 @@ def driven(kind: str, column: str = "moment_nm", *, held: bool = False, gain: fl
 
 
 @pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
-@pytest.mark.parametrize("kind", WAVES)
+@pytest.mark.parametrize(
+    "kind", [k if k in ("multisine", "chirp") else pytest.param(k, marks=pytest.mark.slow) for k in WAVES]
+)
 def test_coefficients_of_a_linear_rig_are_found(kind: str, held: bool) -> None:
     found = identify(driven(kind, held=held), "frequency_response")
     for name, true in TRUTH.items():

@@ -104,6 +104,7 @@ def test_dry_friction_is_named_and_what_vanishes_without_a_spring_is_said() -> N
     assert not any("omega_n" in name for name in found.coefficients.after)
 
 
+@pytest.mark.slow
 def test_a_moment_that_no_effect_explains_counts_as_noise_beside_the_friction() -> None:
     found = diagnose(campaign(joint(FRICTION, 7, unknown=0.5)))
     assert found.causes == ("coulomb_friction",)

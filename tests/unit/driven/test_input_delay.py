@@ -51,7 +51,11 @@ def campaign(delay: float = 0.0, lag: float = 0.0, cubic: float = 0.0) -> Campai
     return Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), (run(0), run(1)))
 
 
-@pytest.mark.parametrize("delay", [0.004, 0.015, -0.004])  # two samples, 3 % of the period, late stamps
+SLOW = pytest.mark.slow
+
+
+# two samples, 3 % of the period, late stamps
+@pytest.mark.parametrize("delay", [0.004, pytest.param(0.015, marks=SLOW), pytest.param(-0.004, marks=SLOW)])
 def test_it_is_named_with_its_value_by_the_whole_vocabulary(delay: float) -> None:
     found = diagnose(campaign(delay))
     assert found.causes == (DELAY.name,)
@@ -63,6 +67,7 @@ def test_it_is_named_with_its_value_by_the_whole_vocabulary(delay: float) -> Non
     assert found.sizes == ()  # it has none in a free decay
 
 
+@SLOW
 def test_it_is_named_beside_another_cause() -> None:
     found = diagnose(campaign(0.015, cubic=2.0))
     assert set(found.causes) == {DELAY.name, "cubic_stiffness"}
@@ -71,7 +76,7 @@ def test_it_is_named_beside_another_cause() -> None:
     assert abs(own.value - 0.015) < 3.0 * own.std
 
 
-@pytest.mark.parametrize("cubic", [0.0, 2.0])
+@pytest.mark.parametrize("cubic", [0.0, pytest.param(2.0, marks=SLOW)])
 def test_it_is_not_named_where_there_is_none(cubic: float) -> None:
     assert diagnose(campaign(cubic=cubic)).causes == (("cubic_stiffness",) if cubic else ())
 

@@ -74,6 +74,7 @@ def test_weights_are_evidences_times_prior_odds_and_large_errors_are_unknown():
     assert found == pytest.approx({names: w / total for names, w in weights.items()}, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_evidence_answers_a_campaign_with_one_cause(training):
     """The nominal model's evidence is less than that of the cause which acts, by far more than the prior odds."""
     from benchmarks.causes.discrepancy import linear
