@@ -104,13 +104,17 @@ class Effect:
     caveat: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        """Refuse a parameter that is not a finite number within its bounds."""
+        """Refuse a parameter that is not a finite number within its bounds, or not whole where it tells cases."""
         for info in self.parameters():
             value = getattr(self, info.name)
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if not (number and info.lower <= value <= info.upper and abs(value) < math.inf):
                 what = f"{info.name} = {value!r} is out of range"
                 remedy = f"give a number from {info.lower:g} to {info.upper:g} in {info.unit}"
+                raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
+            if info.of_input and value != round(value):
+                what = f"{info.name} = {value!r} is none of the cases"
+                remedy = f"give a whole number from {info.lower:g} to {info.upper:g}"
                 raise TunnelError(what, where=f"effect {self.name}", remedy=remedy)
 
     @classmethod

@@ -257,7 +257,7 @@ class DroppedSamples(Effect):
         if run.drive is None or stated.drive is None or self.input_kept == 1.0:
             return run
         stamps = run.drive.time_s + stated.drive.delay  # since the run's start
-        later = (1.0 - self.input_kept) * (self.on_time(stamps, stated, drawn) - stamps)
+        later = self.on_time(stamps, stated, drawn) - stamps
         return replace(run, drive=replace(run.drive, time_s=run.drive.time_s + later))
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
@@ -372,10 +372,7 @@ class SecondMode(Effect):
         mode = self.frequency, self.damping_ratio
         spring = max(stated.spring_stiffness, _LEAST_SPRING)
         static = self.amplitude / (REFERENCE_RELEASE * spring)  # rad per N m
-        excited = self.by_input * static * stated.drive.oscillation(*mode, time_s, derivative)
-        if abs(self.by_input) == 1.0:
-            return excited
-        return excited + (1.0 - abs(self.by_input)) * self._ringing(time_s, stated, drawn, derivative)
+        return self.by_input * static * stated.drive.oscillation(*mode, time_s, derivative)
 
     def _ringing(self, time_s: Array, stated: RunSettings, drawn: Drawn, derivative: int) -> Array:
         phase = self.drawn_number(drawn)

@@ -14,6 +14,7 @@ from tunnel_sim.effects import EffectChain, effect_class, effect_from
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -138,3 +139,11 @@ def test_a_mode_that_the_input_excites_is_named(column: str) -> None:
 @pytest.mark.slow
 def test_without_a_mode_none_is_named() -> None:
     assert diagnose(driven_campaign((0.0, 1.0, 0.1)), kinds=KINDS).causes == ()
+
+
+@pytest.mark.parametrize("value", [0.5, -1.5])
+def test_what_is_none_of_the_cases_is_refused(value: float) -> None:
+    with pytest.raises(TunnelError, match="by_input"):
+        effect_from(
+            "second_mode", {"amplitude": 0.01, "frequency": 60.0, "damping_ratio": 0.01, "by_input": value}
+        )
