@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import free_frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
-from diagnosis.policy import ANOTHER_MODE, SAME_SPRING
+from diagnosis.policy import CLEARLY_MORE, SAME_SPRING
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
@@ -148,11 +148,11 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         for run in kept
         if run.wind_on
         and run.spring_stiffness in still
-        and free_frequency(run, derivative) > ANOTHER_MODE * median(still[run.spring_stiffness])
+        and free_frequency(run, derivative) > CLEARLY_MORE * median(still[run.spring_stiffness])
     ]
     if elsewhere:
         said.append(
-            f"Left out, since they swing in another mode, {ANOTHER_MODE:g} times as fast as the same spring with "
+            f"Left out, since they swing in another mode, {CLEARLY_MORE:g} times as fast as the same spring with "
             f"the wind off or faster: {_ids(elsewhere)}. Diagnose these separately."
         )
         kept = [run for run in kept if run not in elsewhere]

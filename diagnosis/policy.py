@@ -10,49 +10,49 @@ from __future__ import annotations
 # ---- Said once ------------------------------------------------------------------------------------------------
 
 #: Rate at which one question about a campaign is answered falsely: that it has a gap (all tests together), that
-#: its noise is coloured, that its turbulence comes in bursts, belongs to one run or follows the phase of the
-#: motion, or that a term belongs to a formula (all terms of the library together). Convention: one in a thousand.
+#: its noise is coloured, is not as stated, or is a run's own (all runs together), that a run has a hum, that its
+#: turbulence comes in bursts, belongs to one run or follows the phase of the motion, or that a term belongs to a
+#: formula (all terms of the library together). Convention: one in a thousand.
 FALSE_ALARM_RATE = 1e-3
 #: Rate at which a place in the records is named falsely: a run, band or line that shows a gap (all together), or a
 #: band of unsteady noise, which is left out of the spectrum. Convention: one in a hundred.
 LOCAL_FALSE_ALARM_RATE = 0.01
 #: Share by which two things may differ and still count as one: what two sets change, what a textbook form leaves
-#: open, what a further term or another kind of law closes, what a line leaves of a hum. Judgement: far below what
-#: could be told apart.
+#: open, what a formula, a further term or another kind of law closes, what a line leaves of a hum. Judgement: far
+#: below what could be told apart.
 AS_MUCH = 0.02
-#: Share that counts as most of a thing: of the excess in a stated interval, of what laws of single runs close, of
-#: a line that the other half of a run predicts, of an unstated spring that gravity cancels (made with Silverbox in
+#: Share that counts as most of a thing: of the excess in a stated interval, or in one run; of a range, from which
+#: an interval locates nothing; of what laws of single runs close, and what fits to single runs or a form close; of
+#: a line that the other half of a run predicts; of an unstated spring that gravity cancels (made with Silverbox in
 #: sight, 0029). Judgement: the text says four fifths.
 MOST = 0.8
-#: Share that counts as the greater part: of what one free decay leaves, that two may leave for a second mode to be
-#: named; of what a random moment is to explain, that a law of the wind predicts on held-out runs. By the word.
+#: Share that counts as the greater part: of the excess, that makes a band its place (half of that: a line, with
+#: others); of what one free decay leaves, that two may leave for a second mode to be named; of what a random
+#: moment is to explain, that a law of the wind predicts on held-out runs. By the word.
 GREATER_PART = 0.5
 #: Share too small to count: of the largest excess, in a run that is not named; of a record, that holds half of a
 #: blow; of a gap, that effects leave where noise may not be all of it (skipped samples that closed 98 % had been
 #: taken for noise); of what is left, that a law closes; of the information on a coefficient, in a part of the
-#: data. Judgement.
+#: data; of a block mean's noise, by which MuJoCo and the fits' integrator differ. Judgement.
 SMALL_SHARE = 0.1
 #: Share of the runs, or of the bands, that must show a hum, or a colour in still air alone. Judgement, made on a
 #: set where turbulence had hidden a colour: few parts are compared there, so that an unsteady band is easily
 #: overlooked.
 THROUGHOUT = 0.75
-#: Ratio from which one thing is clearly more than another: a step than the stated resolution, one drift of
-#: frequency or damping than the other, a run's mean squared residual than the noise's variance, the greatest power
-#: of short innovations than chance explains, as real turbulence is not quite steady. Judgement.
+#: Ratio from which one thing is clearly more than another: a step than the stated resolution, a noise than the
+#: stated one (in its square: it is often rounded to one digit), one drift of frequency or damping than the other, a
+#: frequency with the wind on than that without (the run swings in another mode), a run's mean squared residual than
+#: the noise's variance, the greatest power of short innovations than chance explains, as real turbulence is not
+#: quite steady. Judgement.
 CLEARLY_MORE = 1.5
 
 # ---- Is there a gap? ------------------------------------------------------------------------------------------
 
 #: Share of `FALSE_ALARM_RATE` at which the noise itself counts as misbehaving. Judgement: it outweighs any cause.
 NOISE_FALSE_ALARM_SHARE = 0.01
-#: The noise below 60 Hz may exceed the noise measured above it by this share. Judgement: quantisation colours it.
+#: The noise below 60 Hz may exceed the noise measured above it by this share, twice the standard deviation that is
+#: allowed where single runs are tested. Judgement: quantisation colours it.
 FLOOR_TOLERANCE = 0.03
-#: Standard deviation of that share, where single runs are tested. Judgement: half of the tolerance.
-FLOOR_STD = 0.015
-#: Standard deviations of the estimate within which records agree with the stated noise. Convention.
-NOISE_AGREES = 3.0
-#: Standard deviations from the mean beyond which a run has a noise of its own. Convention: one run in 20 000.
-NOISE_OF_ITS_OWN = 4.065
 #: Heavier tails than white noise has, by this factor, are accepted. Judgement: sensor noise is not quite normal.
 NOISE_TAILS = 1.15
 #: Ratio of the greatest to the smallest motion among the parts of the records from which noise is seen not to
@@ -61,27 +61,18 @@ COLOUR_AMPLITUDES = 2.0
 #: Where a gap remains, the noise counts as coloured only if its spectrum beyond this multiple of the motion's
 #: frequency is. Judgement: `diagnosis.noise.gap.BANDS` count as the motion's up to there.
 BEYOND_THE_MOTION = 3.5
-#: Stated noise is often rounded to one digit, which changes its square by up to this factor. Arithmetic.
-ROUNDED_NOISE = 1.5
 #: Gap, in noise variances of a sample, below which noise that misbehaves explains all of it. Judgement: as much
 #: again as the noise itself.
 NOISE_EXPLAINS_UP_TO = 1.0
 
 # ---- What is read off the records before any fit --------------------------------------------------------------
 
-#: A run shows a hum when removing the line lowers χ² by this much. By chance at one frequency: one run in 1800.
-HUM_RUN_DROP = 15.0
 #: Drop of χ² at the hum's line over the largest beside it, all runs together. Judgement: rods and corners ring
 #: too.
 HUM_CONTRAST = 4.0
-#: Rate at which a steady hum is said to swell. Judgement.
-SWELL_FALSE_ALARM_RATE = 1e-6
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
-#: Frequency with the wind on over that with it off, from which a run swings in another mode. Judgement: the air
-#: would have to stiffen the spring by 1.25 times its own stiffness.
-ANOTHER_MODE = 1.5
 #: Share of the readings' power in the residual beyond which a fit misses the motion itself. Judgement.
 GROSS_MISFIT = 0.01
 
@@ -91,8 +82,8 @@ GROSS_MISFIT = 0.01
 ALWAYS_FITTED = 7
 #: Predicted drop, as a share of χ², beyond which others are fitted too. Judgement.
 PREDICTED_SHARE = 0.01
-#: Sets of each size to which another effect is added, and effects fitted to each. Judgement: time against
-#: coverage.
+#: Sets of each size to which another effect is added, and effects fitted to each; of long campaigns also the sets,
+#: found on short stretches, that are fitted to long ones. Judgement: time against coverage.
 GROWN_FROM, GROWN_BY = 2, 4
 #: Logarithm of the weight that a set may lose when an effect is added, for the growth to go on from it: less than
 #: an effect costs that closes nothing. Judgement: time against coverage; one of two equal causes closes only half.
@@ -100,8 +91,6 @@ GROWTH_LOSS = 2.8
 #: Block means on which sets are grown in stretches; of longer campaigns every second, third, ... stretch is used.
 #: Judgement: time. Twelve runs of 10 s are below it.
 GROWN_ON = 45_000
-#: Sets of each size, found on short stretches, that are fitted to long ones. Judgement: time against coverage.
-LENGTHENED = 4
 #: Causes named at most. Convention: the vocabulary's one to four, and a small one beside them.
 MOST_CAUSES = 5
 #: Hypotheses whose forms are freed, if they leave more than `AS_MUCH` open with the textbook form (0008).
@@ -125,15 +114,15 @@ MODEL_ERROR = 1e-3
 LEAK = 0.02
 #: χ² of a channel by which a set with a needless effect may be better than one without. By chance alone two
 #: numbers lower it by more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of
-#: 900.
+#: 900. Every instant or phase of a run's own, one number, may gain half of it: it is the best of many tried.
 NEEDLESS_CHI2 = 20.0
 #: Standard deviations by which chance may change what is left, or a slope. Convention.
 CHANCE_STDS = 2.0
 #: Logarithm of the odds that the effects of a set are the causes: a number, and by how much it rises with the
-#: significance of the gap, falls with the logarithm of what is left, and rises with that of the share closed. A
+#: significance of the gap, and falls with the logarithm of what is left over the share closed. A
 #: logistic regression on fits with and without the true effects, simulated and measured; the first number was
 #: raised afterwards, with all open records in sight (0007).
-UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT, UNKNOWN_CLOSED = 0.6, 0.21, 2.0, 2.0
+UNKNOWN_AT, UNKNOWN_GAP, UNKNOWN_LEFT = 0.6, 0.21, 2.0
 #: Stiffness of an unstated spring beside gravity, as a share of both, below which the rig needs no spring. The set
 #: then counts as one with two numbers less: a spring would have to soften by chance, and as much as gravity does.
 #: Judgement, made when three simulated pendulums and a measured one had been given a cubic spring (0018).
@@ -141,8 +130,6 @@ NEEDLESS_SPRING = 0.05
 #: Share of the probability that is spread evenly over all answers. Tuned: how often an answer of overwhelming
 #: weight was wrong, where something was at work that neither fits nor rivals know.
 EVEN_SHARE = 0.03
-#: Of several forms those are freed without which χ² would rise by more than this share of the excess. Tuned.
-FORM_SHARE = 0.2
 
 #: Share of the power of the missing moment that a set may leave as a random one, on a body that nothing holds.
 #: Judgement: half its size. A cause is the greater part of the gap, and any moment moves such a body for good.
@@ -157,26 +144,13 @@ MOMENT_LEFT = 0.25
 #: some. Judgement, on the campaigns with random moments of the blind check's set of 300, opened by then: beside
 #: the true set the greatest is at most 9.0, beside sets that lack an effect it is 16 and more but for one, 8.7.
 WHITE_INNOVATIONS = 10.0
-#: χ² that every instant or phase of a run's own may gain by chance. Judgement: it is the best of many tried.
-OWN_EVIDENCE = 10.0
 
 # ---- Where the gap is -----------------------------------------------------------------------------------------
 
-#: An interval longer than this share of the whole range does not locate anything. Judgement.
-LOCATES_UP_TO = 0.7
-#: Share of the excess that makes a band or a line the place of the gap. Judgement.
-DOMINANT_SHARE = 0.6
-#: Share of the excess in one run, among three or more, beyond which that run alone shows the gap. Judgement.
-SINGLE_RUN_SHARE = 0.85
-#: Share of the excess that fits to single runs leave at most, where the gap lies between runs. Judgement.
-BETWEEN_RUNS_SHARE = 0.2
 #: Standard deviations beyond which the missing moment stands out of the noise. Convention.
 CLEAR_MOMENT = 5.0
 #: Highest frequency of a moment, Hz: the rig's inertia keeps the response to faster ones below any noise. Physics.
 FASTEST_MOMENT = 30.0
-#: Bands with a smaller share of the excess are not listed, and a smaller second harmonic shows no shifted centre.
-#: Judgement.
-LISTED_BAND_SHARE = 0.05
 #: A line is this many times the median around it. Judgement: the skirt of a resonance is not.
 LINE_CONTRAST = 8.0
 
@@ -188,13 +162,9 @@ DECIDED_FROM = 0.5
 #: Probability of the smallest set of answers that is stated, and of what the likely answers have in common.
 #: Convention.
 CREDIBLE = 0.9
-#: Answers less probable than this are not called rivals. Tuned.
-RIVAL_PROBABILITY = 0.05
-#: Candidates less probable than this are counted, not listed. Judgement.
-LISTED_PROBABILITY = 0.01
-#: MuJoCo and the fits' integrator may differ by this share of a block mean's noise, root mean square over a run.
-#: Judgement: a hundredth of the noise's power.
-CONFIRMATION_TOLERANCE = 0.1
+#: Share below which a thing is not worth a line: of the probability, for a rival answer (tuned) or an effect; of
+#: the excess, for a band, or for a second harmonic that shows a shifted centre. Judgement.
+WORTH_NAMING = 0.05
 #: Share of a coefficient's change that counts as its standard deviation where another form may change it as much:
 #: on freeing the forms, by a small cause that is not named, and by the answer where its cause is unknown (0028).
 #: Judgement, made when a blind test had shown Cnβ's intervals too narrow, and tested on campaigns drawn
@@ -214,6 +184,3 @@ NOISE_CONTRADICTED = 3.0
 
 
 # ---- What no effect explains (0023) ---------------------------------------------------------------------------
-
-#: Share of what its kind could close from which a formula needs no further term. Judgement.
-LAW_REACHES = 0.97

@@ -16,7 +16,7 @@ from diagnosis.closure import (
     patch_table,
     rms_shown,
 )
-from diagnosis.policy import CREDIBLE, DECIDED_FROM, LISTED_PROBABILITY
+from diagnosis.policy import CREDIBLE, DECIDED_FROM, WORTH_NAMING
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 from identification.status import Remark
 from tunnel_sim.effects import known_effects
@@ -221,9 +221,9 @@ def misfit_text(document: Document, excess: float) -> str:
 
 
 def inclusion_line(document: Document) -> str:
-    """The effects that may be among the causes, most probable first; empty where none reaches 0.01."""
+    """The effects that may be among the causes, most probable first; empty where none reaches `WORTH_NAMING`."""
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
-    shown = [f"{name} {probability(value)}" for name, value in found if value >= LISTED_PROBABILITY]
+    shown = [f"{name} {probability(value)}" for name, value in found if value >= WORTH_NAMING]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 

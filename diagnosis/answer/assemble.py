@@ -18,7 +18,7 @@ from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
 from diagnosis.closure import PatchedModel
-from diagnosis.policy import MOST, RIVAL_PROBABILITY
+from diagnosis.policy import MOST, WORTH_NAMING
 from diagnosis.printing import decision
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
 from diagnosis.search.investigate import Study, located
@@ -128,7 +128,7 @@ def assemble(
         answer.effects
         for answer in study.weighed[1:]
         if study.named
-        and answer.probability >= RIVAL_PROBABILITY
+        and answer.probability >= WORTH_NAMING
         and answer.effects != UNKNOWN
         and not set(study.fitted) <= set(answer.effects)
     ]

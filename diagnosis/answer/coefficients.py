@@ -23,7 +23,7 @@ from diagnosis.answer.linear_theory import (
     wind_on_runs,
 )
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD, RIVAL_PROBABILITY
+from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD, WORTH_NAMING
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.investigate import Study
 from diagnosis.search.weigh import UNKNOWN
@@ -122,7 +122,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
 
     Args:
         kinds: the effects that may act unnamed. They are considered beside the chosen answer and every answer of
-            `RIVAL_PROBABILITY`, and only where there is a gap.
+            `WORTH_NAMING`, and only where there is a gap.
     """
     with_moment = study.stated(study.fitted) if study.by_moment else None
     chosen = study.chosen if with_moment is None else with_moment.fit
@@ -141,7 +141,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
         elif answer.effects == UNKNOWN:
             unknown = probability
         elif fit is not None and probability > 0.0:
-            small = beside(fit, kinds) if probability >= RIVAL_PROBABILITY else None
+            small = beside(fit, kinds) if probability >= WORTH_NAMING else None
             others.append(Possible(probability, fit, textbook.get(id(fit)), small))
     small = beside(chosen, kinds) if study.causes else None
     first = Possible(own, chosen, textbook.get(id(chosen)), small)

@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, normal_equations
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
-from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, OWN_EVIDENCE, SMALL_SHARE
+from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, SMALL_SHARE
 from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import WindOnRun
@@ -381,4 +381,4 @@ def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | N
     if "cn_beta" in fit.problem.names:  # Cnβ and Cnr come last
         effect = start.problem.effects_at(start.point.common)[-1]
         unseen[-2:] = effect.unseen_form(fit.value("cn_beta"), wind_on_runs(fit))
-    return _Cause(left, moves, unseen, least, greatest, OWN_EVIDENCE * own * len(runs))
+    return _Cause(left, moves, unseen, least, greatest, 0.5 * NEEDLESS_CHI2 * own * len(runs))

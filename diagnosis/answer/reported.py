@@ -11,7 +11,7 @@ from diagnosis.answer.held_out import Base, HeldOut
 from diagnosis.closure import Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Point, Problem, blocks_beyond, campaign_rig, condensed, sample_means
-from diagnosis.policy import CONFIRMATION_TOLERANCE, FALSE_ALARM_RATE
+from diagnosis.policy import FALSE_ALARM_RATE, SMALL_SHARE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
 from tunnel_sim.physics.run_settings import released_by_spring_end
@@ -92,9 +92,9 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
             largest = max(largest, float(np.max(np.abs(difference))))
             rms = float(np.sqrt(np.mean(difference**2)))
             if rms / noise > worst:
-                worst, found = rms / noise, (run, rms, CONFIRMATION_TOLERANCE * noise)
+                worst, found = rms / noise, (run, rms, SMALL_SHARE * noise)
     failure = next((c.failure for c in comparisons if c.failure), "")
-    return Confirmation(worst <= CONFIRMATION_TOLERANCE and not failure, largest, *found, failure=failure)
+    return Confirmation(worst <= SMALL_SHARE and not failure, largest, *found, failure=failure)
 
 
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:

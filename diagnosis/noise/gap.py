@@ -139,7 +139,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
     median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
-    level = noise.estimated / (policy.ROUNDED_NOISE * noise.stated_variance)
+    level = noise.estimated / (policy.CLEARLY_MORE * noise.stated_variance)
     ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
     return float(bdtrc((ordinates - 1) // 2, ordinates, 2.0**-level))
 

@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
 from diagnosis.likelihood.residuals import mains_line, smooth_spectra
 from diagnosis.noise.sensor_noise import SmoothCurve
-from diagnosis.policy import HUM_CONTRAST, HUM_RUN_DROP, SWELL_FALSE_ALARM_RATE, THROUGHOUT
+from diagnosis.policy import FALSE_ALARM_RATE, HUM_CONTRAST, NOISE_FALSE_ALARM_SHARE, THROUGHOUT
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -52,7 +52,8 @@ def find_hum(nominal: Fit) -> float | None:
     line = mains_line(nominal)
     if line is None or line.contrast < HUM_CONTRAST:
         return None
-    shown = [spectrum.power(line.parameter) > HUM_RUN_DROP for spectrum in smooth_spectra(nominal)]
+    by_chance = float(chdtri(2, FALSE_ALARM_RATE))
+    shown = [spectrum.power(line.parameter) > by_chance for spectrum in smooth_spectra(nominal)]
     return line.parameter if np.mean(shown) >= THROUGHOUT else None
 
 
@@ -111,7 +112,7 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
         found = both.T @ reading
         gained += float(found @ np.linalg.solve(share, found)) / variance
         freedom += swelling.shape[1]
-    swells = freedom > 0 and gained > float(chdtri(freedom, SWELL_FALSE_ALARM_RATE))
+    swells = freedom > 0 and gained > float(chdtri(freedom, NOISE_FALSE_ALARM_SHARE * FALSE_ALARM_RATE))
     for run in campaign.runs:
         record = run.record
         flat = np.hanning(record.time_s.size)

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
-from scipy.special import gammaincinv
+from scipy.special import gammaincinv, ndtri
 
 from diagnosis.likelihood.nondimensional import frequency
 from diagnosis.likelihood.prepare import BLOCK_INTERVAL
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.colour import Colour
-from diagnosis.policy import NOISE_AGREES, NOISE_OF_ITS_OWN
+from diagnosis.policy import FALSE_ALARM_RATE
 from identification.signal.decay_fit import mean_of_blocks
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
@@ -248,8 +248,8 @@ def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, f
 def campaign_noise(campaign: Campaign) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
-    It is as stated where the runs agree with one another and their mean agrees with it, within `NOISE_AGREES`
-    standard deviations of the estimate; else the estimate, pooled over runs where they agree with one another. A
+    It is as stated where the runs agree with one another and their mean agrees with it, at
+    `FALSE_ALARM_RATE`; else the estimate, pooled over runs where they agree with one another. A
     data sheet may give the noise before or after rounding: the closer one counts. Where a run contains less noise
     than the accuracy of the fits, that stands in for it.
     """
@@ -281,13 +281,14 @@ def campaign_noise(campaign: Campaign) -> Noise:
             "of the fits, which stands in for it"
         )
         return Noise(used, stated, "floor", reason, pooled, measured=measured)
-    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < NOISE_OF_ITS_OWN * relative))
+    apart, agrees = (-float(ndtri(0.5 * FALSE_ALARM_RATE / tests)) for tests in (variances.size, 1))
+    uniform = bool(np.all(np.abs(variances / pooled - 1.0) < apart * relative))
     used = dict.fromkeys(estimates, pooled) if uniform else estimates
     found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
     source = "estimated"
     if stated is None:
         reason = "the campaign states no noise"
-    elif uniform and abs(pooled / stated - 1.0) < NOISE_AGREES * uncertainty:
+    elif uniform and abs(pooled / stated - 1.0) < agrees * uncertainty:
         used, source = dict.fromkeys(estimates, stated), "stated"
         reason = f"the records agree: {found}"
     else:

@@ -19,7 +19,7 @@ from diagnosis.likelihood.ceiling import Normal, Ridge, Unexplained, held_out, t
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.paths import Ranges
 from diagnosis.likelihood.problem import Point
-from diagnosis.policy import AS_MUCH, FALSE_ALARM_RATE, LAW_REACHES
+from diagnosis.policy import AS_MUCH, FALSE_ALARM_RATE
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
@@ -179,7 +179,7 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
         campaigns, and it must predict held-out runs.
     """
     found = _chosen(unexplained, kind, closable)
-    if kind in ("angle", "rate") and (found is None or found.gained < LAW_REACHES * closable):
+    if kind in ("angle", "rate") and (found is None or found.gained < (1.0 - AS_MUCH) * closable):
         wider = _chosen(unexplained, "state", closable)
         found = found if wider is None or (found and found.gained >= wider.gained) else wider
     return found
@@ -219,7 +219,7 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
-    while len(chosen) < _MOST_TERMS and gained < LAW_REACHES * closable:
+    while len(chosen) < _MOST_TERMS and gained < (1.0 - AS_MUCH) * closable:
         known = [*range(c), *(c + i for i in chosen)]
         inner = whole.matrix[np.ix_(known, known)]
         width = np.sqrt(np.maximum(np.diag(inner), 1e-300))
@@ -278,7 +278,7 @@ def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal |
     for first in (common, base.point.common):
         with suppress(FitError, np.linalg.LinAlgError):
             found.append(fit(problem, Point(np.concatenate([first, own]), base.point.release)))
-            if found[-1].excess < (1.0 - LAW_REACHES) * base.excess:
+            if found[-1].excess < AS_MUCH * base.excess:
                 break
     best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
     return None if best is None or best.total >= base.total else Proposal(table, best)

@@ -284,7 +284,7 @@ def grow_in_stretches(
         # sets with one effect more, from the better of two starts where there are two
         tried = sets_with_one_more([g.short for g in level if g.short is not None], able, progress)
         grown: dict[tuple[str, ...], _Grown] = {}
-        for h in sorted(tried, key=lambda h: h.fit.total)[: policy.LENGTHENED]:
+        for h in sorted(tried, key=lambda h: h.fit.total)[: policy.GROWN_BY]:
             with suppress(FitError, np.linalg.LinAlgError):
                 longer, _ = fit_longer(h.fit, short, data, long_stretch(short))
                 grown[h.names] = _Grown(replace(h, fit=longer), h)

@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
-from diagnosis.policy import FORM_SHARE, FREED_HYPOTHESES, MOST, NEEDLESS_SPRING, OWN_EVIDENCE
+from diagnosis.policy import FREED_HYPOTHESES, MOST, NEEDLESS_CHI2, NEEDLESS_SPRING
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from tunnel_sim.effects.base import IN_RUNS
 from tunnel_sim.vocabulary.record import Array
@@ -77,7 +77,7 @@ class Hypothesis:
                 place = problem.own_places(width)[kind.name]
                 channel = "frequency" if kind.skips else "harmonics"
                 count = (place.stop - place.start) * len(problem.data.runs)
-                found[CHANNELS.index(channel)] += OWN_EVIDENCE * count
+                found[CHANNELS.index(channel)] += 0.5 * NEEDLESS_CHI2 * count
         return found
 
     def fitted_set(self, nominal: Fit) -> FittedSet:
@@ -124,7 +124,9 @@ def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit
 
 def own_gain(problem: Problem, point: Point) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
-    return float(OWN_EVIDENCE * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
+    return float(
+        0.5 * NEEDLESS_CHI2 * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs)
+    )
 
 
 def is_plausible(fitted: Fit) -> bool:
@@ -217,7 +219,7 @@ def with_forms(
                 ]
                 # a form that the runs cannot tell has no standard deviation
                 pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
-                if max(np.square(pulls), default=0.0) > FORM_SHARE * textbook.excess * textbook.count:
+                if max(np.square(pulls), default=0.0) > (1.0 - MOST) * textbook.excess * textbook.count:
                     needed.append(kind.name)
         if needed and tuple(needed) != freed.problem.free_forms:
             freed = _free_forms(textbook, only=needed) or freed

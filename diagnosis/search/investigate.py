@@ -348,7 +348,7 @@ def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
         found = replace(found, hypotheses=(*known, *exchange(best, known, base)))
     with clock.step("forms"):  # of rival sets, free where that pays: growth frees those of few sets
         weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
-        near = [w.effects for w in weighed if w.probability > policy.RIVAL_PROBABILITY]
+        near = [w.effects for w in weighed if w.probability > policy.WORTH_NAMING]
         if len(near) < 2:
             return found
         rivals = [h for h in found.hypotheses if h.names in near and not h.forms]

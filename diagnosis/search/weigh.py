@@ -77,7 +77,7 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
     for given in best.values():
         left = log_misfit(given.excess, by_chance)
         closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
-        doubt = policy.UNKNOWN_LEFT * np.log1p(left) - policy.UNKNOWN_CLOSED * np.log(closed + _LEAST_CLOSED)
+        doubt = policy.UNKNOWN_LEFT * (np.log1p(left) - np.log(closed + _LEAST_CLOSED))
         against.append(float(policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - doubt))
     odds = float(weights @ np.exp(against) / weights.sum()) if best else 0.0
     known = (1.0 - policy.EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)

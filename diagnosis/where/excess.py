@@ -19,7 +19,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import RunData
 from diagnosis.noise.gap import chance
 from diagnosis.noise.sensor_noise import estimate_variance
-from diagnosis.policy import FLOOR_STD, LINE_CONTRAST, LOCAL_FALSE_ALARM_RATE, MOST
+from diagnosis.policy import FLOOR_TOLERANCE, LINE_CONTRAST, LOCAL_FALSE_ALARM_RATE, MOST
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -92,7 +92,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     levels = [run.noise_variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
-    relative = [float(np.hypot(value, FLOOR_STD)) for value in relative]
+    relative = [float(np.hypot(value, 0.5 * FLOOR_TOLERANCE)) for value in relative]
     shared = len(fit.problem.names) / len(data.runs)
     return [
         RunExcess(

@@ -94,7 +94,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     if min(run.p_value for run in shown) * len(runs) > policy.LOCAL_FALSE_ALARM_RATE:
         return Finding(None, f"{undetermined}, since no single run shows it")
     most = max(shown, key=lambda run: run.share)
-    if len(shown) >= 3 and most.share > policy.SINGLE_RUN_SHARE and most.id not in off:
+    if len(shown) >= 3 and most.share > policy.MOST and most.id not in off:
         return Finding(None, f"{undetermined} from one run alone ({most.id})")
     # without coefficients and a gain that these runs lack
     data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
@@ -141,7 +141,7 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
-    lines = [line for line in found.maps.lines if line.share > 0.5 * policy.DOMINANT_SHARE]
+    lines = [line for line in found.maps.lines if line.share > 0.5 * policy.GREATER_PART]
     if lines and len(lines) >= max(1, len(found.maps.runs) // 3):
         hertz = float(np.median([line.frequency for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
@@ -149,15 +149,15 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
             "forcing" if similar < policy.FASTEST_MOMENT else "sensor",
             f"it is a spectral line near {hertz:.3g} Hz",
         )
-    if excess.get("above", 0.0) > policy.DOMINANT_SHARE * whole:
+    if excess.get("above", 0.0) > policy.GREATER_PART * whole:
         return Finding("sensor", "most of it is faster than the rig can move")
-    if excess.get("0", 0.0) > policy.DOMINANT_SHARE * whole:
-        if excess.get("2f0", 0.0) > policy.LISTED_BAND_SHARE * whole:
+    if excess.get("0", 0.0) > policy.GREATER_PART * whole:
+        if excess.get("2f0", 0.0) > policy.WORTH_NAMING * whole:
             return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
         if condition == "wind_on":
             return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
         return Finding("sensor", "most of it is a slow shift of the centre")
-    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > policy.DOMINANT_SHARE * whole:
+    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > policy.GREATER_PART * whole:
         return Finding(
             "sensor", "it contains harmonics of the motion, without a shift of frequency or damping"
         )
@@ -185,7 +185,7 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         frequency = curve.alone_frequency / curve.nominal_frequency - 1.0
         shifts.append((frequency, curve.alone_zeta - curve.nominal_zeta))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
-    if len(sizes) < 2 or left > policy.BETWEEN_RUNS_SHARE * whole:
+    if len(sizes) < 2 or left > (1.0 - policy.MOST) * whole:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several

@@ -76,17 +76,17 @@ def describe(
             text += f"; {ratio:.2g} times as much power with the wind {more} as with it {less}"
     parts, places = [f"{text}."], []
     length, greatest = float(found.maps.time.edges[-1]), float(found.maps.amplitude.edges[-1])
-    if where.time_s is not None and where.time_s[1] - where.time_s[0] < policy.LOCATES_UP_TO * length:
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < policy.MOST * length:
         places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
     amplitude = where.amplitude_rad
-    if amplitude is not None and amplitude[1] - amplitude[0] < policy.LOCATES_UP_TO * greatest:
+    if amplitude is not None and amplitude[1] - amplitude[0] < policy.MOST * greatest:
         places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
     if places:
         parts.append(f"Four fifths of it lie {', '.join(places)}.")
     whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
-    shown = [b for b in found.maps.bands if b.band in bands and b.excess > policy.LISTED_BAND_SHARE * whole]
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > policy.WORTH_NAMING * whole]
     if shown and whole > 0.0:
         shown.sort(key=lambda band: -band.excess)
         listed = (f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)

@@ -51,14 +51,13 @@ WEIGHING = (
     "UNKNOWN_AT",
     "UNKNOWN_GAP",
     "UNKNOWN_LEFT",
-    "UNKNOWN_CLOSED",
     "EVEN_SHARE",
 )
 """Constants that only weigh fits."""
 FACTORS = (0.0, 0.5, 2.0)
 """By which each is multiplied; 0 switches it off."""
 
-ODDS = ("UNKNOWN_AT", "UNKNOWN_GAP", "UNKNOWN_LEFT", "UNKNOWN_CLOSED")
+ODDS = ("UNKNOWN_AT", "UNKNOWN_GAP", "UNKNOWN_LEFT")
 _LEAST = 0.02  # of a probability: what is certain and wrong must not decide alone
 
 Names = tuple[str, ...]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.policy import LISTED_PROBABILITY
+from diagnosis.policy import WORTH_NAMING
 from diagnosis.printing import excess_std, plain, probability
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
@@ -183,7 +183,7 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 @styled
 def candidates_figure(document: Document) -> Figure | None:
     """The answers that are not improbable; None where there are fewer than two, which words say better."""
-    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED_PROBABILITY]
+    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= WORTH_NAMING]
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.policy import LISTED_PROBABILITY
+from diagnosis.policy import WORTH_NAMING
 from diagnosis.printing import misfit_text, noise_powers, plain, probability, run_words, share
 from identification.printing import (
     UNDETERMINED,
@@ -248,7 +248,7 @@ def others(document: Document) -> str:
 
 
 def _listed(document: Document) -> int:
-    probable = [c for c in document["candidates"] if c["probability"] >= LISTED_PROBABILITY]
+    probable = [c for c in document["candidates"] if c["probability"] >= WORTH_NAMING]
     return max(3, len(probable))
 
 

@@ -14,7 +14,7 @@ from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.noise.sensor_noise import campaign_noise
-from diagnosis.policy import CONFIRMATION_TOLERANCE
+from diagnosis.policy import SMALL_SHARE
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -55,7 +55,7 @@ def test_the_two_models_predict_the_same_readings(name, values):
     assert max(np.max(np.abs(d)) for d in found.differences) < 3e-5
     verdict = confirm([found])
     assert verdict.agrees
-    assert verdict.rms_difference < verdict.tolerance == pytest.approx(CONFIRMATION_TOLERANCE * NOISE / 2.0)
+    assert verdict.rms_difference < verdict.tolerance == pytest.approx(SMALL_SHARE * NOISE / 2.0)
 
 
 def test_every_run_may_have_parameters_of_its_own():

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
-from diagnosis.policy import LEAK, MODEL_ERROR, RIVAL_PROBABILITY, SET_PRICE, STEEPNESS
+from diagnosis.policy import LEAK, MODEL_ERROR, SET_PRICE, STEEPNESS, WORTH_NAMING
 from diagnosis.search.weigh import UNKNOWN, FittedSet, main_effect, misfit_scale, weigh
 
 NAMES = ("a", "b", "c", "d", "e")
@@ -101,8 +101,8 @@ def test_what_chance_adds_is_common_to_all_sets():
     left = {("a",): channels(damping=5.0), ("b",): channels(damping=900.0)}
     lower = {key: x - channels(damping=100.0) for key, x in left.items()}
     one, other = probabilities(left, gap), probabilities(lower, gap)
-    assert one[("b",)] < RIVAL_PROBABILITY
-    assert other[("b",)] < RIVAL_PROBABILITY
+    assert one[("b",)] < WORTH_NAMING
+    assert other[("b",)] < WORTH_NAMING
 
 
 def test_a_set_that_leaves_a_significant_channel_untouched_loses_to_unknown():

@@ -45,10 +45,7 @@ def test_the_probabilities_are_those_of_the_decision():
         remains = misfit(left, by_chance)
         closed = log(max(1.0 - remains / gap, 0.0) + 0.02)
         odds[key] = exp(
-            policy.UNKNOWN_AT
-            + policy.UNKNOWN_GAP * gap
-            - policy.UNKNOWN_LEFT * log(1.0 + remains)
-            + policy.UNKNOWN_CLOSED * closed
+            policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - policy.UNKNOWN_LEFT * (log(1.0 + remains) - closed)
         )
     total = sum(weights.values())
     against = sum(weights[key] * odds[key] for key in SETS) / total
