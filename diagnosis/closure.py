@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from diagnosis.policy import GREATER_PART
 from identification.printing import TextTable, significant, unit_mark
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.writing import as_json
@@ -181,6 +182,11 @@ class Ceiling:
     std: float
     held_out: str
 
+    @property
+    def determined(self) -> bool:
+        """Whether the share is known to half of what is left; of a small excess, laws may close more than all."""
+        return self.std < GREATER_PART and self.closed < 1.0 + GREATER_PART
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -262,8 +268,12 @@ def closable_table(document: Mapping[str, Any]) -> TextTable:
     """Share that each kind could close, in per cent; a table without rows where nothing remains beyond chance."""
     found = document.get("closable") or {"ceilings": ()}
     rows = [
-        (KINDS[one["kind"]], percent(max(one["closed"], 0.0), one["std"]), one["held_out"])
-        for one in found["ceilings"]
+        (
+            KINDS[one.kind],
+            percent(max(one.closed, 0.0), one.std) if one.determined else "not determined",
+            one.held_out,
+        )
+        for one in (Ceiling(**given) for given in found["ceilings"])
     ]
     title = "Share of what is left that could be closed at most"
     return TextTable(title, ("by", "share", "held out"), tuple(rows), ("share",))
@@ -274,9 +284,9 @@ def percent(share: float, std: float | None = None) -> str:
 
     Args:
         share: a fraction.
-        std: its standard deviation, a fraction; beyond 1 it is not resolved further.
+        std: its standard deviation, a fraction.
     """
-    beside = "" if std is None else f" ± {min(max(100.0 * std, 0.1), 100.0):.1f}"
+    beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
     return f"{min(100.0 * share, 100.0):.1f}{beside} %"
 
 

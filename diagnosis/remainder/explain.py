@@ -39,8 +39,8 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         significant: whether what remains is beyond chance.
 
     Returns:
-        In the measured campaign's units; None where nothing remains beyond chance, or a random moment is part of
-        the answer, beside which anything would be closed.
+        In the measured campaign's units; None where nothing remains beyond chance, or it is too little to tell how
+        much could be closed, or a random moment is part of the answer, beside which anything would be closed.
 
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
@@ -57,6 +57,8 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     single = {} if line is None else {"line": line.evidence}
     single |= {kind: unexplained.single(kind) for kind in SINGLE}
     kind = chosen_kind(common, single)
+    if kind is None:
+        return None
     law, shape = None, None
     found: Events = ()
     if kind in common:
@@ -90,16 +92,24 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     return Closable(excess, ceilings, kind, words, where, shape, law)
 
 
-def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str:
-    """The simplest kind of `KINDS` that closes about as much as any; of common laws the simpler come first."""
+def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str | None:
+    """The simplest kind of `KINDS` that closes about as much as any; of common laws the simpler come first.
+
+    None where only kinds whose shares are not determined could close more than a small share.
+    """
     of_all, of_one = (
-        max((one.ceiling for one in kinds.values()), key=lambda one: one.closed) for kinds in (common, single)
+        {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined}
+        for kinds in (common, single)
     )
-    if max(of_all.closed, of_one.closed) < policy.SMALL_SHARE:
-        return "noise"
-    among, best = (common, of_all) if of_all.closed >= policy.MOST * of_one.closed else (single, of_one)
+    most_of_all, most_of_one = (
+        max((c.closed for c in kinds.values()), default=0.0) for kinds in (of_all, of_one)
+    )
+    if max(most_of_all, most_of_one) < policy.SMALL_SHARE:
+        return "noise" if len(of_all) + len(of_one) == len(common) + len(single) else None
+    among = of_all if most_of_all >= policy.MOST * most_of_one else of_one
+    best = max(among.values(), key=lambda one: one.closed)
     least = best.closed - max(policy.AS_MUCH, best.std)
-    return next(kind for kind, one in among.items() if one.ceiling.closed >= least)
+    return next(kind for kind, one in among.items() if one.closed >= least)
 
 
 def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarity) -> Law | None:
@@ -134,8 +144,9 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
 
 def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Events, left: str) -> str:
     """What could be closed of what is left, in a few sentences."""
+    determined = [one for one in ceilings if one.determined]
     if kind == "noise":
-        most = max(ceilings, key=lambda one: one.closed)
+        most = max(determined, key=lambda one: one.closed)
         return (
             f"No more than {percent(max(most.closed, 0.0) + _BESIDE * most.std)} of {left} could be closed by any "
             "smooth moment or error of the reading: the rest is noise."
@@ -147,7 +158,7 @@ def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Eve
     ]
     # of others, those that the kind is not a case of
     included = (kind, "state") if kind in ("angle", "rate") else (kind,)
-    others = [one for one in ceilings if one.held_out == best.held_out and one.kind not in included]
+    others = [one for one in determined if one.held_out == best.held_out and one.kind not in included]
     alike = [one for one in others if one.closed >= best.closed - max(policy.AS_MUCH, best.std)]
     if alike:
         said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")

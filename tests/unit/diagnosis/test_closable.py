@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -263,8 +263,8 @@ def test_the_prior_shrinks_what_is_noise_and_keeps_what_is_not():
     assert alone - with_basis == pytest.approx(1600.0, rel=0.2)
 
 
-def evidence(kind, share):
-    return Evidence(Ceiling(kind, share, 0.001, "runs"), 0.0, 1.0)
+def evidence(kind, share, std=0.001):
+    return Evidence(Ceiling(kind, share, std, "runs"), 0.0, 1.0)
 
 
 @pytest.mark.parametrize("quantity", ["angle", "rate"])
@@ -340,6 +340,15 @@ def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
 def test_the_simplest_kind_that_closes_as_much_is_chosen(common, single, kind):
     given = [{name: evidence(name, share) for name, share in kinds.items()} for kinds in (common, single)]
     assert chosen_kind(*given) == kind
+
+
+def test_a_kind_whose_share_is_not_determined_is_not_chosen():
+    common, single = {"angle": evidence("angle", 1.0, std=0.9)}, {"event": evidence("event", 0.6, std=0.1)}
+    assert chosen_kind(common, single) == "event"
+    assert chosen_kind(common, {}) is None
+    assert chosen_kind(common, {"event": evidence("event", 0.01)}) is None
+    table = closable_table({"closable": {"ceilings": [asdict(common["angle"].ceiling)]}})
+    assert table.rows[0][1] == "not determined"
 
 
 @pytest.mark.parametrize("kind", ["angle", "rate", "state", "wind", "time", "reading"])
