@@ -224,10 +224,12 @@ def _settled(
     The set given, where no random moment acts or its filter does not settle. The random moment is estimated from
     what the best set leaves when it is fitted with the sensor's noise alone: the fit with the response as noise
     lets the motion wander as the response does, and its own residuals overstate it. The rounds end where the best
-    set is the one that the random moment was estimated beside.
+    set is the one that the random moment was estimated beside. Where none is, the likeliest of those reached is
+    taken.
     """
     data, known, top = nominal.problem.data, best.fit, best
     windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
+    reached: dict[tuple[str, ...], Hypothesis] = {}
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
             process = _likeliest(random_moments(known, spectra))
@@ -245,10 +247,17 @@ def _settled(
                 top = further[0]
                 further = _evident(top, kinds)
             if top.names == best.names:
-                break
+                return top
+            reached[top.names] = top
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
-    return top
+
+    # the rounds have not ended: the likeliest of the sets that they reached
+    def cost(hypothesis: Hypothesis) -> float:
+        process = _likeliest(random_moments(_seen_in(hypothesis, data).fit, spectra))
+        return np.inf if process is None else process.cost + NEEDLESS_CHI2 * len(hypothesis.effects)
+
+    return min(reached.values(), key=cost) if len(reached) > 1 else top
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
