@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, normal_equations
+from diagnosis.likelihood.least_squares import Fit, damped_step, normal_equations
 from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
 from diagnosis.likelihood.per_run import PerRunParameters, excited, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
@@ -252,20 +252,31 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         change = _moderate_change(base, problem, sizes, scaled, replaced)
         if change is None:
             continue
+        moved = None
+        if trial.second_order:
+            moved = damped_step(base.problem, base.point, [-c for c in change], base.jacobian, 0.0)
+            change = _change(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
         left = project_out(base, change)
         power = sum(float(c @ c) for c in left)
-        if power <= 0.0:
+        if not 0.0 < power < np.inf:
             continue
         slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
+        if moved is not None and slope <= 0.0:
+            continue
         start, drop = sizes.copy(), slope * slope * power
         if scaled is not None:
-            moderate = np.clip(slope * sizes[scaled], -trial.at_most, trial.at_most)
+            by = slope if moved is None else np.sqrt(slope)
+            moderate = np.clip(by * sizes[scaled], -trial.at_most, trial.at_most)
             start[scaled] = np.clip(moderate, own[scaled].lower, own[scaled].upper)
             if start[scaled] == 0.0:
                 start[scaled], drop = 0.01 * sizes[scaled], 0.0
             if replaced is not None:
                 start[scaled] = min(start[scaled], base.point.common[replaced])
         point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
+        if moved is not None and scaled is not None:
+            part = start[scaled] / sizes[scaled]
+            point.common[: moved.common.size] += part * (moved.common - base.point.common)
+            point = Point(point.common, point.release + part * (moved.release - base.point.release))
         place = None if scaled is None else base.point.common.size + scaled
         after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
         found.append(StartingPoint(problem, point, drop, misfit(base, after).excess, place))
@@ -302,6 +313,12 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
     return np.concatenate([common, values])
 
 
+def _change(base: Fit, problem: Problem, point: Point) -> list[Array]:
+    """Change of the scaled prediction from a fit to a point of a problem with further parameters."""
+    moved, runs = problem.predict([point])[0], base.problem.data.runs
+    return [run.scaled(m - run.reading) + r for m, run, r in zip(moved, runs, base.residuals, strict=True)]
+
+
 def _moderate_change(
     base: Fit, problem: Problem, values: Array, scaled: int | None, replaced: int | None = None
 ) -> list[Array] | None:
@@ -310,14 +327,11 @@ def _moderate_change(
     ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
     place of the one that is lowered, None where none may be, and ``replaced`` that of the one that it replaces.
     """
-    data = base.problem.data
     limit = 3.0 * np.sqrt(base.total)
     for _ in range(12):
-        moved = problem.predict([Point(_with_effect(base, values, scaled, replaced), base.point.release)])[0]
-        change = [
-            run.scaled(m - run.reading) + r
-            for m, run, r in zip(moved, data.runs, base.residuals, strict=True)
-        ]
+        change = _change(
+            base, problem, Point(_with_effect(base, values, scaled, replaced), base.point.release)
+        )
         size = float(np.sqrt(sum(float(c @ c) for c in change)))
         if np.isfinite(size) and (size <= limit or scaled is None):
             return change

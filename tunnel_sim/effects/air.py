@@ -107,10 +107,10 @@ class UnsteadyAeroLag(Effect):
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
-        """First a phase lag, then a phase lead."""
+        """First a phase lag, then a phase lead; to first order Cnr absorbs both."""
         del campaign
         scale = cls.parameters()[0].scale
-        return [Trial({"lag": scale}, "lag"), Trial({"lag": -scale}, "lag")]
+        return [Trial({"lag": size}, "lag", second_order=True) for size in (scale, -scale)]
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """To first order a lag only changes Cnr by a·Cnβ; runs show the second-order remainder alone.

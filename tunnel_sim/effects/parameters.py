@@ -169,12 +169,14 @@ class Trial:
 
     Args:
         at_most: greatest absolute value that linear theory may give it, in its unit.
+        second_order: whether the nominal coefficients absorb its first order, so that its square shows.
     """
 
     values: Mapping[str, float]
     scaled: str | None
     at_most: float = inf
     replaces: str | None = None
+    second_order: bool = False
 
 
 @dataclass(frozen=True)
