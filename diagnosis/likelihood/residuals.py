@@ -188,16 +188,18 @@ def shedding_line(fit: Fit) -> Line | None:
     speeds = np.array([chain.physics().wind_speed for chain in chains])  # corrected by the effects of the fit
     spacing = 0.1 * data.width / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
     grid = np.arange(0.02, 0.60, spacing)
-    powers = []
+    powers, limited = [], []
     for i, speed in zip(concerned, speeds, strict=True):
         own = resonance(fit, i)
         frequency = grid * speed / data.width
         power = spectra[i].power(frequency)
         power[np.abs(frequency / own - 1.0) < 0.08] = 0.0  # the free motion's own line is not evidence
+        powers.append(power)
         # no run carries a line alone
-        powers.append(np.minimum(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0))
-    total = np.sum(powers, axis=0)
-    best = float(grid[np.argmax(total)])
+        limited.append(np.minimum(power, 10.0 * float(np.quantile(power, 0.99)) + 1.0))
+    total = np.sum(limited, axis=0)
+    at = int(np.argmax(total))
+    best = float(grid[at])
     floor = float(np.median(total)) / np.log(2.0)
     phases = np.zeros(len(data.runs))
     amplitudes = []
@@ -214,8 +216,8 @@ def shedding_line(fit: Fit) -> Line | None:
         amplitudes.append((abs(value) / abs(gain), abs(gain) ** 2))
     values, weights = np.array(amplitudes).T
     amplitude = float(np.sum(values * weights) / np.sum(weights))
-    drop = float(total.max())
-    return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases)
+    drop = float(np.sum([power[at] for power in powers]))
+    return Line(best, drop, float(total[at]) / max(floor, 1e-9), amplitude, phases)
 
 
 def resonance(fit: Fit, run_index: int) -> float:
