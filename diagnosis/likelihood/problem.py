@@ -217,11 +217,11 @@ class Problem:
         # jobs whose moment law another run may share: the zero and, where no effect knows the time or the release,
         # the release do not matter to it
         first: dict[object, _Job] = {}
-        autonomous = all(kind.autonomous for kind in self.effects)
         for i, point in enumerate(points):
             if not np.all(np.isfinite(point.common)):
                 continue
             effects = self.effects_at(point.common)
+            autonomous = not any(effect.depends_on_release for effect in effects)
             named = zip(self.names, point.common.tolist(), strict=True)
             law = tuple(value for name, value in named if name != "zero")
             for r, run in enumerate(self.data.runs):

@@ -52,7 +52,7 @@ def grow(
     while level:
         children = sets_with_one_more(level, kinds, progress)
         scale = Scale.of(children, gap)
-        if all(_may_gain(child, scale) for child in children):  # else freeing a form gains nothing
+        if all(scale.form_may_gain(child) for child in children):
             count = policy.FREED_HYPOTHESES if not level[0].effects else 1
             children = with_forms(children, gap, policy.AS_MUCH * level[0].fit.excess, count)
         found |= {child.names: child for child in children}

@@ -116,6 +116,12 @@ class Scale:
         """The same of the set with one more effect that leaves nothing."""
         return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
 
+    def form_may_gain(self, hypothesis: Hypothesis) -> bool:
+        """Whether the weight of a set would rise with one more form that leaves nothing."""
+        numbers = hypothesis.further_numbers + 1
+        freed = log_weight(np.zeros(6), self.misfit, len(hypothesis.effects), numbers)
+        return freed > self.weight(hypothesis)
+
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
     """That of more weight beside what the nominal model leaves; the first if they are equal."""

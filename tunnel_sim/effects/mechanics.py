@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isclose, log, pi, sqrt
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Law
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
+from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
 
 
@@ -304,6 +305,9 @@ class QuadraticDamping(Effect):
     exponent: float = exponent("n", "power of the rate in the moment (unchanged at 2 rad/s)", 2.0)
 
 
+_AFTER_EFFECT = parse("size*log((t + lead)/length)", frozenset({"size", "t", "lead", "length"}))
+
+
 @dataclass(frozen=True)
 class StructuralDamping(Effect):
     """Hysteretic loss in spring and rod: the same share of the energy per cycle at every frequency."""
@@ -314,15 +318,48 @@ class StructuralDamping(Effect):
     condition = "always"
     on_spring = True
     advice = "Model the hysteretic loss: the same share of the energy per cycle at every frequency"
-    equation = "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz)"
-    signature = (
-        "Each run is linear, but the damping moment grows with the square root of the spring's stiffness."
+    equation = (
+        "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz); general form: with an after-effect −m (2η/π) Kr β0 ln((t + 1/ωn)/T) of "
+        "the release angle β0 in a run of length T"
     )
-    references = ("Crandall, J. Sound Vib. 11 (1970) 3, doi 10.1016/S0022-460X(70)80105-5",)
+    signature = (
+        "Each run is linear, but the damping moment grows with the square root of the spring's stiffness; the "
+        "centre of the oscillation may creep back from the side of the release."
+    )
+    references = (
+        "Crandall, J. Sound Vib. 11 (1970) 3, doi 10.1016/S0022-460X(70)80105-5",
+        "Nowick & Berry, Anelastic Relaxation in Crystalline Solids, Academic Press 1972",
+    )
     example = (0.02,)
-    law_terms = ("loss_factor",)
 
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0, fit_lower=0.0)
+    after_effect: float = parameter(
+        "m", "1", "after-effect of the release over that of a loss factor common to all frequencies",
+        scale=1.0, lower=-10.0, upper=10.0, form=True,
+    )  # fmt: skip
+
+    def law(self) -> Law:
+        """The loss; the after-effect is a moment in time."""
+        return {"loss_factor": self.loss_factor}
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Add the loss and, where the body was held at its release angle, the spring's after-effect.
+
+        A loss that is the same at all frequencies is that of relaxing elements at all of them. The slow ones have
+        yielded to the release angle, and go back while the body swings.
+        """
+        run = super().on_run(run, stated, drawn)
+        if self.is_null or self.after_effect == 0.0 or stated.drive is not None or not stated.spring_stiffness:
+            return run
+        size = -2.0 / pi * self.after_effect * self.loss_factor * stated.spring_stiffness * stated.release_angle
+        lead = sqrt(stated.yaw_inertia / stated.spring_stiffness)
+        constants = {"size": size, "lead": lead, "length": stated.duration}
+        return run.with_moment(_AFTER_EFFECT.program(constants, {"t": "time"}))
+
+    @property
+    def depends_on_release(self) -> bool:
+        """Whether there is an after-effect."""
+        return self.after_effect != 0.0
 
     def unseen_form(self, cn_beta: float, runs: Sequence[WindOnRun]) -> tuple[float, float]:
         """Runs cannot show which frequency sets the loss: that of the motion, or that of the rig in still air.
