@@ -87,6 +87,7 @@ LINEAR = {
     "flow_misalignment": {"angle": 0.005},
     "sensor_drift": {"drift": 1e-3},
     "wind_speed_offset": {"offset": 0.05},
+    "unsteady_aero_lag": {"lag": 0.2},
 }
 
 
