@@ -13,7 +13,6 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, damped_step, try_fit
 from diagnosis.likelihood.problem import Point
-from diagnosis.policy import NEEDLESS_CHI2
 from tunnel_sim.vocabulary.record import Array
 
 _TOGETHER = 16  # points predicted at once: a campaign's predictions fill memory
@@ -43,14 +42,14 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
         tolerance: as in `fit`.
 
     Returns:
-        The fit given, unless another lowers χ² by more than the best of as many tries does by chance. Its covariance
-        includes the other minima, each by its likelihood.
+        The fit of least χ². Its covariance includes the other minima, each by its likelihood, since the deepest of
+        many shallow minima is so by chance.
     """
     found = _elsewhere(fitted)
     best = fitted
     for one in sorted(found, key=lambda one: one.total)[:_REFITTED]:
         other = try_fit(fitted.problem, one.point, tolerance=tolerance)
-        if other is not None and other.total < min(best.total, fitted.total - NEEDLESS_CHI2):
+        if other is not None and other.total < best.total:
             best = other
     return _with_spread(best, found)
 

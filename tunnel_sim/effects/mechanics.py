@@ -181,6 +181,8 @@ class RodFlexibility(Effect):
 
     def alike(self) -> Sequence[Trial]:
         """Other frequencies of the ringing, within the width of its line: the slow motion shows (1 − s)²/Krod."""
+        if self.is_null:
+            return ()
         first, last = (
             log(s / (1.0 - s)) for s in (self.parameters()[1].fit_lower, self.parameters()[1].fit_upper)
         )
