@@ -137,11 +137,16 @@ def test_a_slow_mode_that_the_input_excites_does_not_count_as_colour_of_the_nois
         values = 0.15 * np.cos(2.0 * np.pi * np.outer(TIME, lines) + phases).sum(axis=1)
         seen = two_oscillators(values, spring, (amplitude, 5.5, 0.004)) + coloured(1e-3, 100 + number)
         runs.append(
-            Run(f"r{number}", Record(TIME, seen), 0.0, spring_stiffness=spring, drive=Drive("moment_nm", values))
+            Run(
+                f"r{number}",
+                Record(TIME, seen),
+                0.0,
+                spring_stiffness=spring,
+                drive=Drive("moment_nm", values),
+            )
         )
     campaign = Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), tuple(runs))
     study = nominal_study(campaign, KINDS)
-    assert study.noise.colour is not None
     assert study.test.detected == (amplitude > 0.0)
 
 
