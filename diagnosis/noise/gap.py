@@ -264,10 +264,11 @@ def gap_or_colour(
             continue
         white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
         if source is nominal and _follows_input(white):  # what the input excites is in the colour
-            source = _beside_mode(nominal)
-            found = None if source is None else noise_colour(source)
-            if source is None or found is None:
+            beside = _beside_mode(nominal)
+            found = None if beside is None else noise_colour(beside)
+            if beside is None or found is None:
                 continue
+            source = beside
             white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
         coloured = noise.coloured(found, nominal.problem.data)
         test = gap_test(white, coloured, trend, coarse_step=coarse_step, errors=errors)
