@@ -12,15 +12,17 @@ from scipy.interpolate import CubicSpline
 from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis import policy
-from diagnosis.likelihood.least_squares import Fit, FitError
+from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
+from diagnosis.likelihood.per_run import excited
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
-from diagnosis.likelihood.starting_points import misses_motion, nominal_start
+from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
 from diagnosis.noise.colour import alike_in_all_runs, noise_colour, whitened, zero_wanders
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
 from identification.status import Outcome, Remark
+from tunnel_sim.effects import the_effect
 from tunnel_sim.vocabulary.record import Array
 
 #: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
@@ -243,8 +245,9 @@ def gap_or_colour(
         whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
         above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
         Nor is it believed where there would be more noise than is stated, or where it alone would close the gap of
-        a wandering zero or of an error that every run repeats. Turbulence may hide the colour, which is then sought
-        in the runs with the wind off alone.
+        a wandering zero, of an error that every run repeats or of an oscillation that the input excites. Such an
+        oscillation is a narrow line, and colour is sought beside it. Turbulence may hide the colour, which is then
+        sought in the runs with the wind off alone.
 
         A gap within the error of the readings' lattice is not detected: the levels of a camera or an encoder may be
         off by half a step, which follows the motion as long as no noise of half a step blurs it (Widrow and
@@ -260,6 +263,13 @@ def gap_or_colour(
         if found is None:
             continue
         white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
+        if source is nominal and _follows_input(white):  # what the input excites is in the colour
+            beside = _beside_mode(nominal)
+            found = None if beside is None else noise_colour(beside)
+            if beside is None or found is None:
+                continue
+            source = beside
+            white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
         coloured = noise.coloured(found, nominal.problem.data)
         test = gap_test(white, coloured, trend, coarse_step=coarse_step, errors=errors)
         still = any(not run.wind_on for run in nominal.problem.data.runs)
@@ -267,7 +277,8 @@ def gap_or_colour(
         believed = (
             still and not excessive and noise_colour(source, beyond=policy.BEYOND_THE_MOTION) is not None
         )
-        noise_alone = not zero_wanders(nominal, found) and not alike_in_all_runs(nominal)
+        repeats = alike_in_all_runs(nominal) or _follows_input(white)
+        noise_alone = not zero_wanders(nominal, found) and not repeats
         if believed if test.detected else noise_alone:
             return white, coloured, test
     blurred = max(noise.white(step).values()) >= 0.5 * step
@@ -286,6 +297,22 @@ def _colour_sources(nominal: Fit) -> Iterator[Fit]:
         only = data.with_runs(still)
         with suppress(FitError, np.linalg.LinAlgError):
             yield refit(Problem(only), nominal_start(only))
+
+
+_TRIED = 2000  # frequencies and dampings of an oscillation, at most
+
+
+def _follows_input(white: Fit) -> bool:
+    """Whether white residuals hold an oscillation that the input excites alike in all runs, as noise does not."""
+    found = excited(white)
+    return found is not None and bool(_TRIED * chdtrc(1.0, found.drop) < policy.FALSE_ALARM_RATE)
+
+
+def _beside_mode(nominal: Fit) -> Fit | None:
+    """The fit with the oscillation that the input excites; None where it fails."""
+    starts = starting_points(nominal, the_effect(line="ringing"))
+    driven = [start for start in starts if any(value != 0.0 for _, value in start.problem.fixed)]
+    return try_fit(driven[0].problem, driven[0].point) if driven else None
 
 
 def chance(total: float, freedom: float, relative: float) -> float:

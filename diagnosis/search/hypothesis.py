@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
+from diagnosis.likelihood.other_minima import deepest
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.policy import FREED_HYPOTHESES, MOST, NEEDLESS_CHI2, NEEDLESS_SPRING
@@ -249,6 +250,7 @@ def polish(chosen: Hypothesis) -> Hypothesis:
     better = _free_forms(first, tolerance=_POLISH) or try_fit(first.problem, first.point, tolerance=_POLISH)
     if better is None or better.total > first.total:
         better = first
+    better = deepest(better, tolerance=_POLISH)
     textbook = None
     if better.problem.free_forms and not first.problem.free_forms:
         textbook = first

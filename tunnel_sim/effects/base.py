@@ -171,6 +171,15 @@ class Effect:
         del omega
         return True
 
+    def alike(self) -> Sequence[Trial]:
+        """Other values of its parameters that change the slow motion alike.
+
+        Returns:
+            Values, with the one that linear theory may scale; χ² may have another minimum near any of them. Empty
+            where it has one.
+        """
+        return ()
+
     def stands(self, stiffness: float) -> float:
         """How far from rest the effect holds a body that has stopped.
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, isclose, log, pi, sqrt
+from math import ceil, cos, exp, isclose, log, pi, sqrt
 
 from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Law
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+
+_RINGING_STEP = 0.02  # relative: the half-power width of a rod's ringing, whose damping is 1 % of critical
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,21 @@ class RodFlexibility(Effect):
         del campaign
         scale = cls.parameters()[0].scale
         return [Trial({"compliance": scale, "inertia_share": s}, "compliance") for s in (0.05, 0.2, 0.5)]
+
+    def alike(self) -> Sequence[Trial]:
+        """Other frequencies of the ringing, within the width of its line: the slow motion shows (1 − s)²/Krod."""
+        if self.is_null:
+            return ()
+        first, last = (
+            log(s / (1.0 - s)) for s in (self.parameters()[1].fit_lower, self.parameters()[1].fit_upper)
+        )
+        count = ceil((last - first) / (2.0 * _RINGING_STEP))  # s/(1 − s) is in inverse proportion to ω²
+        ratios = (exp(first + (last - first) * i / count) for i in range(count + 1))
+        slow = self.compliance * (1.0 - self.inertia_share) ** 2
+        return [
+            Trial({"compliance": slow * (1.0 + r) ** 2, "inertia_share": r / (1.0 + r)}, "compliance")
+            for r in ratios
+        ]
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Let the rod twist, with steps short enough for its own oscillation."""

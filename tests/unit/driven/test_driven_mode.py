@@ -8,8 +8,10 @@ from math import exp, sqrt
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from diagnosis import diagnose
+from diagnosis.search.investigate import nominal_study
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -114,6 +116,38 @@ def driven_campaign(mode: tuple[float, float, float], column: str = "moment_nm")
         given = Drive(column, values if column == "moment_nm" else 2.0 * values)  # type: ignore[arg-type]
         runs.append(Run(f"r{seed}", Record(TIME, seen), 0.0, spring_stiffness=spring, drive=given))
     return Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), tuple(runs))
+
+
+def coloured(size: float, seed: int) -> Array:
+    """Noise of this standard deviation: half its power white, half below a corner at 3 Hz."""
+    rng = np.random.default_rng(seed)
+    keep = np.exp(-2.0 * np.pi * 3.0 / RATE)
+    slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(2 * TIME.size))
+    return np.asarray(size * np.sqrt(0.5) * (slow[TIME.size :] + rng.standard_normal(TIME.size)))
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 2.5e-3])
+def test_a_slow_mode_that_the_input_excites_does_not_count_as_colour_of_the_noise(amplitude: float) -> None:
+    """The mode is below the motion, where the spectrum of coloured noise rises."""
+    runs = []
+    for number in range(8):
+        spring, rng = (16.0, 30.0)[number % 2], np.random.default_rng(number)
+        lines = np.arange(0.5, 8.0, 3.0 / TIME[-1])
+        phases = rng.uniform(0.0, 2.0 * np.pi, lines.size)
+        values = 0.15 * np.cos(2.0 * np.pi * np.outer(TIME, lines) + phases).sum(axis=1)
+        seen = two_oscillators(values, spring, (amplitude, 5.5, 0.004)) + coloured(1e-3, 100 + number)
+        runs.append(
+            Run(
+                f"r{number}",
+                Record(TIME, seen),
+                0.0,
+                spring_stiffness=spring,
+                drive=Drive("moment_nm", values),
+            )
+        )
+    campaign = Campaign("driven", RigProperties(), SensorProperties(sample_rate=RATE), tuple(runs))
+    study = nominal_study(campaign, KINDS)
+    assert study.test.detected == (amplitude > 0.0)
 
 
 KINDS = [
