@@ -39,7 +39,7 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
 
     Args:
         fitted: a fit that may lie in another minimum.
-        tolerance: as in `fit`.
+        tolerance: share of χ² by which a step must lower it for a fit to go on, as in `fit`.
 
     Returns:
         The fit of least χ². Its covariance includes the other minima, each by its likelihood, since the deepest of
