@@ -314,7 +314,7 @@ def _gradients(fit: Fit) -> Array:
 
 def _formal(fit: Fit, gradients: Array) -> Array:
     """Variances of the coefficients from the fit's covariance, to first order, shape (coefficients,)."""
-    found: Array = np.maximum(np.einsum("ci,ij,cj->c", gradients, fit.covariance, gradients), 0.0)
+    found: Array = np.maximum(np.einsum("ci,ij,cj->c", gradients, fit.stated_covariance, gradients), 0.0)
     return found
 
 

@@ -50,7 +50,7 @@ class _Candidate(_Read):
 
 class _Coefficient(_Read):
     value: float
-    std: Annotated[float, Field(ge=0.0)]
+    std: Annotated[float, Field(ge=0.0)] | None  # none where the runs do not determine it
 
 
 class _Coefficients(_Read):

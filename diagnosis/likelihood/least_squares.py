@@ -168,6 +168,8 @@ class Fit:
         jacobian: of the scaled residuals' prediction with respect to the common parameters, by run, shape
             (n, common), and to the run's release, shape (n, 2).
         converged: whether the last step no longer paid.
+        spread: variances and covariances that other minima of χ² add to those, of that shape; None where none does.
+            Linear theory from the fit's own minimum takes ``covariance`` alone.
     """
 
     problem: Problem
@@ -177,6 +179,7 @@ class Fit:
     covariance: Array
     jacobian: list[tuple[Array, Array]] = field(repr=False)
     converged: bool
+    spread: Array | None = field(default=None, repr=False)
 
     @cached_property
     def products(self) -> Products:
@@ -219,7 +222,12 @@ class Fit:
     def std(self, name: str) -> float:
         """Its standard deviation, if the model is right."""
         i = self.problem.names.index(name)
-        return float(np.sqrt(max(self.covariance[i, i], 0.0)))
+        return float(np.sqrt(max(self.stated_covariance[i, i], 0.0)))
+
+    @property
+    def stated_covariance(self) -> Array:
+        """Of the common parameters, other minima included, shape (common, common)."""
+        return self.covariance if self.spread is None else self.covariance + self.spread
 
     def bound(self, name: str) -> str | None:
         """``lower`` or ``upper`` where a common parameter lies at that end of its range; None inside it."""

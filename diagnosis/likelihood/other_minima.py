@@ -39,7 +39,7 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
 
     Args:
         fitted: a fit that may lie in another minimum.
-        tolerance: relative change of χ² at which a fit ends, dimensionless.
+        tolerance: share of χ² by which a step must lower it for a fit to go on, as in `fit`.
 
     Returns:
         The fit of least χ². Its covariance includes the other minima, each by its likelihood, since the deepest of
@@ -109,4 +109,4 @@ def _with_spread(fitted: Fit, found: list[_Elsewhere]) -> Fit:
         if rise < expected:
             weights.append((1.0 - rise / expected) * float(np.exp(-0.5 * rise)))
             spread += weights[-1] * np.outer(apart, apart)
-    return dataclasses.replace(fitted, covariance=fitted.covariance + spread / sum(weights))
+    return dataclasses.replace(fitted, spread=spread / sum(weights))

@@ -204,6 +204,8 @@ def with_forms(
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a good part open and they gain weight.
 
+    Before, the deepest minimum of the textbook form is sought: a rod that misses its ringing lacks no form.
+
     Args:
         gap: what the nominal model leaves.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
@@ -215,6 +217,9 @@ def with_forms(
     ranked = sorted(found, key=lambda h: h.fit.total)
     for place, hypothesis in enumerate(ranked[:count]):
         textbook = hypothesis.fit
+        if textbook.excess > least:
+            textbook = deepest(textbook)
+            ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
         freed = _free_forms(textbook) if textbook.excess > least else None
         if freed is None:
             continue

@@ -28,16 +28,15 @@ COMPLIANCE, SHARE = "rod_flexibility.compliance", "rod_flexibility.inertia_share
 
 
 def conditions(compliance: float, share: float, *, driven: bool, noise: float) -> Conditions:
-    """Three springs in still air, released, or driven by a moment of sines that is held between its samples."""
+    """Three springs in still air, released, or driven by a square motion of their roots."""
     rod = Rod(compliance, share, held_body=True)
     free = rig((16.12, 35.02, 67.98), (0.0, 0.0, 0.0), (0.35, 0.35, 0.35), 2.0, rod=rod, noise_std=noise)
     if not driven:
         return free
     time = np.arange(free.samples) / free.sample_rate
-    waves = sum(np.cos(2.0 * np.pi * f * time + f**2) for f in (1.0, 2.1, 3.3, 5.2))
-    values = np.round(np.outer(waves, [1.0, 1.5, 2.0]), 1)
-    no = np.zeros(3)
-    drive = Input("moment_nm", values, np.ones(3, np.bool_), np.full(3, 0.3), 1.0, stated=True)
+    square = np.sign(np.sin(2.0 * np.pi * 1.7 * time + 0.3))
+    values, no = np.outer(square, [0.15, 0.12, 0.1]), np.zeros(3)
+    drive = Input("base_rad", values, np.ones(3, np.bool_), np.full(3, 0.3), 1.0, stated=True)
     return replace(free, drive=drive, start_angle=no, start_rate=no)
 
 
@@ -57,7 +56,7 @@ def fitted_from(problem: Problem, compliance: float, share: float) -> Fit:
     return fit(problem, Point(np.append(start.common, [compliance, share]), start.release))
 
 
-@pytest.mark.parametrize(("driven", "start"), [(False, 0.05), (False, 0.3), (True, 0.4)])
+@pytest.mark.parametrize(("driven", "start"), [(False, 0.05), (False, 0.3), (True, 0.04), (True, 0.25)])
 def test_the_share_is_found_from_a_start_that_leads_to_another_minimum(driven: bool, start: float) -> None:
     compliance, share = 1.1e-4, 0.16
     given = problem(compliance, share, driven=driven)
@@ -67,8 +66,7 @@ def test_the_share_is_found_from_a_start_that_leads_to_another_minimum(driven: b
     for name, truth in ((COMPLIANCE, compliance), (SHARE, share)):
         assert abs(found.value(name) - truth) < 4.0 * found.std(name)
     assert found.std(SHARE) < 0.02
-    if not driven:  # the release rings more clearly than a smooth input
-        assert abs(first.value(SHARE) - share) > 8.0 * first.std(SHARE)
+    assert abs(first.value(SHARE) - share) > 20.0 * first.std(SHARE)
 
 
 def test_where_the_noise_hides_the_ringing_the_deviation_says_so() -> None:
@@ -79,6 +77,9 @@ def test_where_the_noise_hides_the_ringing_the_deviation_says_so() -> None:
     assert found.std(SHARE) > 5.0 * first.std(SHARE)
     for name, truth in ((COMPLIANCE, 1.1e-4), (SHARE, 0.16)):
         assert abs(found.value(name) - truth) < 3.0 * found.std(name)
+    # of linear theory from this minimum the others are no part: Cnr had got a deviation of 1.9 by them
+    own = fit(found.problem, found.point)
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(np.sqrt(np.diag(own.covariance)), rel=0.1)
     slow = found.value(COMPLIANCE) * (1.0 - found.value(SHARE)) ** 2
     assert slow == pytest.approx(1.1e-4 * 0.84**2, rel=0.05)
 
@@ -90,7 +91,7 @@ def test_an_effect_of_one_minimum_stays_as_it_is() -> None:
     fitted = fit(cubic, Point(np.append(start.common, 0.0), start.release))
     found = deepest(fitted)
     assert found.total == fitted.total
-    assert np.array_equal(found.covariance, fitted.covariance)
+    assert np.array_equal(found.stated_covariance, fitted.covariance)
 
 
 def test_the_other_values_leave_the_slow_motion_as_it_is() -> None:
