@@ -20,6 +20,8 @@ from tunnel_lab.commands import diagnose as commands
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
+
 Tunnel = Callable[..., tuple[int, str, str]]
 SPRING = 16.12
 MODEL = f"""<mujoco><option gravity="0 0 0" timestep="0.001" integrator="RK4"/><worldbody><body>

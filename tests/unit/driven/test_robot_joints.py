@@ -29,23 +29,17 @@ from tests.reference.robot_joints import (
     robot,
     robot_campaign,
 )
-from tunnel_sim.engine import joint_model
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Hold
 from tunnel_sim.vocabulary.errors import TunnelError
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
+
 TRUE = 'armature="0.05" damping="0.4"'
 RUBS = f'{TRUE} frictionloss="0.6" solreffriction="0.002 1"'
 KINDS = ("coulomb_friction", "quadratic_damping", "gravity_stiffness", "input_delay")
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process with limits takes half a second to start, and has tests of its own."""
-    joint_model.prepare()
-    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
 
 
 def own_model(
