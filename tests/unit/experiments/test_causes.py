@@ -22,7 +22,7 @@ from benchmarks.causes.page import page_text
 from benchmarks.causes.score import figures, likely_sets, read_answers, score
 from benchmarks.causes.tracks import TRACKS, draw_all
 from tests.reference.rigs import rig
-from tunnel_reference import draw
+from tunnel_reference import draw, severity
 from tunnel_sim.vocabulary.errors import TunnelError
 
 EXAMPLES = Path(__file__).parents[3] / "benchmarks/causes/examples"
@@ -33,6 +33,7 @@ def made(folder, **more):
     c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
+        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
         make(folder, seed=3, counts=COUNTS, real=False, **more)
     return folder
 
