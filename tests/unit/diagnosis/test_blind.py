@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """Three campaigns of four short runs, made once; tests copy it."""
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     folder = tmp_path_factory.mktemp("blind") / "set"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
@@ -93,7 +93,7 @@ def test_the_published_hash_is_that_of_the_salted_key(blind):
 
 
 def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_path, monkeypatch):
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
     monkeypatch.setattr(severity, "_SUBSTEPS", 2)
     key = make_blind(
@@ -132,7 +132,7 @@ def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch
         return write_campaign(campaign, folder)
 
     monkeypatch.setattr("diagnosis.blind.sets.write_campaign", refuses_the_first)
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
     monkeypatch.setattr(severity, "_SUBSTEPS", 2)
     key = make_blind(

@@ -39,6 +39,7 @@ RUNS = rig(
     speed=(0.0, 20.0, 0.0, 20.0, 0.0, 20.0),
     angle=(0.35, 0.35, 0.35, 0.35, 0.2, 0.25),
     duration=6.0,
+    sample_rate=500.0,
 )
 FORMS = {form.name: form for form in (*OUTSIDE_FORMS, *LAW_FORMS)}
 
@@ -101,7 +102,7 @@ def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp
 
 
 def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
-    alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0)
+    alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0, sample_rate=500.0)
     found = closable(study_of("stops", 0.8, alone, place=0.15), significant=True)
     assert {one.held_out for one in found.ceilings} == {"stretches of time", "short gaps"}
     assert found.kind == "angle"

@@ -47,7 +47,7 @@ def pendulum(amplitude=2.5, duration=40.0, noise=1e-3, friction="sign", quadrati
         Term(moments.quadratic_damping, Phase.MOMENT, {"coefficient": quadratic * ONE}),
         FRICTION[friction],
     ]  # fmt: skip
-    substeps = 10 if friction == "dahl" else 4  # presliding is stiff
+    substeps = 10 if friction == "dahl" else 2  # presliding is stiff
     (motion,) = integrate([conditions], [terms], substeps=substeps)
     reading = motion.angle[:, 0] + np.random.default_rng(6).normal(0.0, noise, conditions.samples)
     run = Run("swing", Record(conditions.time, reading), 0.0, None, None)

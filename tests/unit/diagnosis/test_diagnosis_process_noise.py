@@ -205,7 +205,7 @@ def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
     spring = effect_from("cubic_stiffness", {"coefficient": -0.03})
     base = nominal(buffeted(campaign(friction, spring), 0.02, 4.0))
-    names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping", "sensor_drift")
+    names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping")
     kinds = [effect_class(name) for name in names]
     misled = grow(base, kinds[1:])
     (answer,) = weigh_random_moments(base, misled, kinds)

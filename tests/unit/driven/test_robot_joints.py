@@ -18,6 +18,7 @@ from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.diagnosable import refuse_undiagnosable
 from diagnosis.own_joint import with_law
 from diagnosis.result import Diagnosis
+from tests.marks import slow
 from tests.reference.robot_joints import (
     GEAR,
     LEVEL,
@@ -333,7 +334,7 @@ def test_a_delay_of_the_input_is_named_and_stays_out_of_the_model(tmp_path: Path
     assert any("delay of the input is not part of the model" in note for note in answer.model.notes)
 
 
-@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
+@pytest.mark.parametrize("integrator", [slow("implicitfast"), "Euler"])
 def test_half_a_step_of_the_models_integrator_is_not_a_cause(tmp_path: Path, integrator: str) -> None:
     option = f'timestep="0.002" integrator="{integrator}"'
     data = robot_campaign(robot(TRUE, option=option), start=0.1)

@@ -30,8 +30,9 @@ BODY = '<body name="arm"><joint name="hinge" axis="0 1 0" {}/>{}</body>'
 
 
 @pytest.fixture
-def with_limits(models_in_this_process: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def with_limits(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is about the process with limits waits for it."""
+    request.getfixturevalue("models_in_this_process")
     monkeypatch.setattr(joint_model, "in_limited_process", in_limited_process)
 
 

@@ -14,6 +14,7 @@ import tunnel_sim.envs  # registers
 from diagnosis import diagnose
 from identification import identify
 from identification.campaign.belief import information_gain
+from tests.marks import slow
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.menu import Costs
 from tunnel_lab.envs.session import MEAN, RigTruth, draw_truth, probabilities
@@ -39,7 +40,7 @@ def equal(first, second):
 
 @pytest.mark.parametrize(
     "arguments",
-    [SHORT, {**SHORT, "simulation": "full"}, QUICK_DIAGNOSIS],
+    [SHORT, slow({**SHORT, "simulation": "full"}), QUICK_DIAGNOSIS],
     ids=["identification", "full", "diagnosis"],
 )
 def test_the_public_checkers_pass(arguments, recwarn):

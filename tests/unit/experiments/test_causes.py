@@ -30,7 +30,7 @@ COUNTS = {"none": 1, "one": 2}
 
 
 def made(folder, **more):
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=500.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
         patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact

@@ -24,7 +24,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 @pytest.fixture(scope="module")
 def training(tmp_path_factory):
     folder = tmp_path_factory.mktemp("training")
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
         patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
