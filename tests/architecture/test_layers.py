@@ -76,10 +76,10 @@ def test_the_import_contracts_hold() -> None:
     [
         ("identification/estimate.py", "import mujoco"),
         slow("identification/estimate.py", "import tunnel_sim.engine.model"),
-        ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
+        slow("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
         slow("identification/estimate.py", "import tunnel_lab.terminal.outputs"),
         slow("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
-        ("identification/statistics.py", "import identification.signal.frequency"),
+        slow("identification/statistics.py", "import identification.signal.frequency"),
         ("diagnosis/result.py", "import diagnosis.search.investigate"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.run_settings"),
         slow("tunnel_lab/cli.py", "import tunnel_reference.forms"),

@@ -12,7 +12,7 @@ from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
 RATE, NOISE, GEAR = 250.0, 2e-4, 20.0
-TIME = np.arange(1500) / RATE
+TIME = np.arange(1000) / RATE
 MOTOR = f'<motor name="motor" joint="elbow" gear="{GEAR:g}"/>'
 UPRIGHT, LEVEL = "0 0 1", "0 1 0"  # axes: without and with gravity
 

@@ -22,6 +22,7 @@ from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed
+from tests.marks import slow
 from tests.reference.rigs import rig
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
@@ -216,7 +217,7 @@ def _running_away(*_, **__):
     return np.full(2, 1e300) @ np.full(2, 1e300)
 
 
-@pytest.mark.parametrize("unsolvable", [_singular, _running_away])
+@pytest.mark.parametrize("unsolvable", [_singular, slow(_running_away)])
 def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
     monkeypatch.setattr(_diagnose, "closable", unsolvable)
     found = diagnose(campaign(), kinds=[effect_class("coulomb_friction")])

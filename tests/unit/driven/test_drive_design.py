@@ -97,6 +97,7 @@ def test_no_plain_drive_and_no_free_decay_has_a_lower_bound(
     assert best < size(given, goal)
 
 
+@pytest.mark.slow
 def test_estimates_scatter_as_the_bound_says(free: PlanDocument) -> None:
     plan = expanded(propose_drive(free, RIG, LIMITS[1]))
     bound = plan_bound(plan, RIG)

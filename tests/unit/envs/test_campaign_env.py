@@ -8,7 +8,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from stable_baselines3.common.env_checker import check_env as check_with_sb3
 
 import tunnel_sim.envs  # registers
 from diagnosis import diagnose
@@ -44,6 +43,8 @@ def equal(first, second):
     ids=["identification", "full", "diagnosis"],
 )
 def test_the_public_checkers_pass(arguments, recwarn):
+    from stable_baselines3.common.env_checker import check_env as check_with_sb3  # loads torch
+
     env = make(**arguments)
     check_env(env.unwrapped, skip_render_check=False)
     check_with_sb3(env.unwrapped)
