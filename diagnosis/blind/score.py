@@ -152,7 +152,8 @@ def _kernel(grid: Array, width: float) -> Array:
     """Gaussian density between points of the grid, reflected at 0 and 1, shape (points, points)."""
     place, last = np.arange(grid.size), grid.size - 1
     between = np.arange(-last, 2 * last + 1) / last  # differences and sums of points
-    wrapped = sum(np.exp(-0.5 * ((between - 2.0 * shift) / width) ** 2) for shift in range(-2, 3))
+    shifts = 2.0 * np.arange(-2, 3)[:, None]
+    wrapped = np.exp(-0.5 * ((between - shifts) / width) ** 2).sum(axis=0)
     density = wrapped[place[:, None] - place + last] + wrapped[place[:, None] + place + last]
     return np.asarray(density / (width * np.sqrt(2.0 * np.pi)))
 
