@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+import pytest
 from hypothesis import settings
 
 # Set before NumPy loads, and handed on to the workers and to every command that a test starts.
@@ -13,3 +14,12 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 # A loaded machine may take a second over one example.
 settings.register_profile("without deadline", deadline=None)
 settings.load_profile("without deadline")
+
+
+@pytest.fixture
+def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read models without the process with limits, which takes half a second to start and has tests of its own."""
+    from tunnel_sim.engine import joint_model
+
+    joint_model.prepare()
+    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))

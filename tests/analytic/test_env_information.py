@@ -13,6 +13,7 @@ import tunnel_sim.envs  # noqa: F401  registers the environments
 from identification.signal.decay_fit import information_at
 from identification.signal.free_decay import Decay
 from identification.uncertainty.cramer_rao import campaign_bound
+from tests.marks import slow
 from tunnel_sim.envs.information import UNKNOWNS, Prior, half_log_det
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
@@ -46,7 +47,7 @@ def from_readings(env: Any) -> np.ndarray:
     return env.information() - np.diag(prior**-2.0)
 
 
-@pytest.mark.parametrize(("spring", "speed"), [(3, 10.0), (5, 20.0), (10, 15.0), (5, 0.0)])
+@pytest.mark.parametrize(("spring", "speed"), [(3, 10.0), slow(5, 20.0), slow(10, 15.0), (5, 0.0)])
 def test_one_run_has_the_information_of_the_closed_form(spring: int, speed: float) -> None:
     env, _, info = run({"spring": spring, "wind_speed": speed, "release_angle": 0.3}, duration=5.0)
     inertia = TRUTH["yaw_inertia"]

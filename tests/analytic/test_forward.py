@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from law_cases import CASES, FRICTION, RIG, SAMPLE_RATE, Case
 
+from tests.marks import slow
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -25,7 +26,7 @@ def _difference(settings: RunSettings) -> float:
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c not in FRICTION], ids=lambda case: case.name)
-@pytest.mark.parametrize("timestep", [1e-3, 5e-4])
+@pytest.mark.parametrize("timestep", [1e-3, slow(5e-4)])
 def test_equals_the_model(case: Case, timestep: float) -> None:
     # the same law and the same method: what is left is rounding
     assert _difference(case.settings(timestep)) < 1e-11

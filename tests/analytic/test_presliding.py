@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from law_cases import RIG, Case
 
+from tests.marks import slow
 from tests.reference.effect_cases import settings
 from tests.reference.effect_oracle import Setting, reading
 from tunnel_sim.effects import effect_from
@@ -33,9 +34,9 @@ def _with_friction(run: RunSettings, moment: float, reach: float) -> RunSettings
     [
         (0.004, 0.02, 16.12, 20.0),
         (0.03, 0.005, 67.98, 0.0),
-        (0.4, 0.001, 67.98, 0.0),
-        pytest.param(0.05, 3e-4, 67.98, 0.0, marks=pytest.mark.slow),  # two forward steps for one
-        pytest.param(0.4, 3e-5, 16.12, 20.0, marks=pytest.mark.slow),  # three, and two of MuJoCo's
+        slow(0.4, 0.001, 67.98, 0.0),
+        slow(0.05, 3e-4, 67.98, 0.0),  # two forward steps for one
+        slow(0.4, 3e-5, 16.12, 20.0),  # three, and two of MuJoCo's
     ],
 )
 def test_ten_seconds_stay_far_below_the_noise(

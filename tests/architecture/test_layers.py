@@ -13,6 +13,8 @@ from pathlib import Path
 import grimp
 import pytest
 
+from tests.marks import slow
+
 ROOT = Path(__file__).parents[2]
 TOOLS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]
 PACKAGES = tuple(TOOLS["importlinter"]["root_packages"])
@@ -73,15 +75,15 @@ def test_the_import_contracts_hold() -> None:
     ("module", "line"),
     [
         ("identification/estimate.py", "import mujoco"),
-        ("identification/estimate.py", "import tunnel_sim.engine.model"),
-        ("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
-        ("identification/estimate.py", "import tunnel_lab.terminal.outputs"),
-        ("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
-        ("identification/statistics.py", "import identification.signal.frequency"),
+        slow("identification/estimate.py", "import tunnel_sim.engine.model"),
+        slow("tunnel_sim/vocabulary/record.py", "import identification.estimate"),
+        slow("identification/estimate.py", "import tunnel_lab.terminal.outputs"),
+        slow("tunnel_sim/physics/steps.py", "import tunnel_sim.effects.base"),
+        slow("identification/statistics.py", "import identification.signal.frequency"),
         ("diagnosis/result.py", "import diagnosis.search.investigate"),
         ("tunnel_reference/forms.py", "import tunnel_sim.physics.run_settings"),
-        ("tunnel_lab/cli.py", "import tunnel_reference.forms"),
-        ("tunnel_lab/bench/work.py", "import tunnel_lab.cli"),
+        slow("tunnel_lab/cli.py", "import tunnel_reference.forms"),
+        slow("tunnel_lab/bench/work.py", "import tunnel_lab.cli"),
     ],
 )
 def test_a_planted_breach_is_caught(tmp_path: Path, module: str, line: str) -> None:

@@ -140,29 +140,34 @@ REFERRED = [name for name in VOCABULARY if name not in SOLVED | ON_DRIVEN_RUNS]
 OWN = 1.4995 / RUN.duration
 
 
-def by_the_reference_simulator(name: str, values: dict[str, float]) -> np.ndarray:
-    """The textbook's form: its severity parameter is the effect's, and so are the names of the others."""
-    (value, *_), run = values.values(), RUN
-    extra = {**values, "own": OWN, "duration": run.duration}
-    effect = EffectDraw(forms_of(name)[0], extra, 1, 1.0, value)
+@cache
+def by_the_reference_simulator() -> dict[str, np.ndarray]:
+    """The textbook's forms: their severity parameters are the effects', and so are the names of the others."""
+    run = RUN
     conditions = Conditions(
         np.array([run.spring]), np.array([run.speed]), np.array([run.release]), np.array([run.release]),
         oracle.DENSITY, run.duration, oracle.INERTIA, oracle.DAMPING, oracle.CN_BETA, oracle.CN_R,
         noise_std=0.0, resolution=1e-12,
     )  # fmt: skip
-    draw = CampaignDraw("single", conditions, (effect,), 0)
-    (motion,) = simulate_motions([draw])
-    bound, terms = bind_effects(draw)
-    laws = [term for term in terms if isinstance(term, ReadingTerm)]
-    found = read_reference(bound, motion, laws, np.random.default_rng(0))
-    return np.asarray(found[: conditions.samples, 0])
+    draws = []
+    for name in REFERRED:
+        extra = {**VALUES[name], "own": OWN, "duration": run.duration}
+        effect = EffectDraw(forms_of(name)[0], extra, 1, 1.0, next(iter(VALUES[name].values())))
+        draws.append(CampaignDraw("single", conditions, (effect,), 0))
+    readings = {}
+    for name, draw, motion in zip(REFERRED, draws, simulate_motions(draws), strict=True):
+        bound, terms = bind_effects(draw)
+        laws = [term for term in terms if isinstance(term, ReadingTerm)]
+        found = read_reference(bound, motion, laws, np.random.default_rng(0))
+        readings[name] = np.asarray(found[: conditions.samples, 0])
+    return readings
 
 
 @pytest.mark.parametrize("name", REFERRED)
 def test_effect_matches_the_reference_simulator(name: str) -> None:
     effect = effect_from(name, VALUES[name])
     chain = EffectChain(settings(RUN), (effect,), (OWN,))
-    expected = by_the_reference_simulator(name, VALUES[name])
+    expected = by_the_reference_simulator()[name]
     for motion in (
         forward_motion(RIG, chain.physics(), RUN.sample_rate),
         simulate_motion(build_model(RIG, chain.physics()), RUN.sample_rate),

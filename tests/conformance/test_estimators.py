@@ -10,6 +10,7 @@ import pytest
 from identification import Estimate, Status, identify
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES, make_estimator
 from identification.examination.examine import examine
+from tests.marks import slow
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, angle_of, campaign, with_records
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -227,7 +228,7 @@ def contradictory(case):
 
 
 @each_estimator
-@pytest.mark.parametrize("case", CONTRADICTIONS)
+@pytest.mark.parametrize("case", [slow(c) if "three" in c else c for c in CONTRADICTIONS])
 def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
     estimate = checked(identify(contradictory(case), name, throw=False), contradictory(case))
     assert len(estimate.remarks) == 1
@@ -245,7 +246,7 @@ def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
 
 
 @each_estimator
-@pytest.mark.parametrize("slip", [1e3, 1.0 / 3600.0])
+@pytest.mark.parametrize("slip", [1e3, slow(1.0 / 3600.0)])
 def test_an_inertia_that_the_springs_contradict_widens_the_intervals(name, slip):
     settings = TWO_SPRINGS[::2]
     data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)

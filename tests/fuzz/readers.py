@@ -304,10 +304,10 @@ def sweep_file(folder: Path, rng: Rng) -> None:
 def sweep_folder(folder: Path, rng: Rng) -> None:
     """``sweep.json`` or a part of the results changed, as a sweep that goes on or is summed up meets it."""
     from tunnel_lab.experiments.sweep import open_store
-    from tunnel_lab.experiments.sweep_summary import overall_table, pace_table, summarise
+    from tunnel_lab.experiments.sweep_summary import overall_table, summarise
 
     files = dict(seeds.sweep_folder())
-    names = [name for name in files if name.startswith(("results", "timings"))]
+    names = [name for name in files if name.startswith("results")]
     changed = "sweep.json" if rng.random() < 0.4 else names[rng.integers(len(names))]
     if changed == "sweep.json":
         files[changed] = _json(json.loads(files[changed]), rng)
@@ -322,7 +322,6 @@ def sweep_folder(folder: Path, rng: Rng) -> None:
     store = open_store(folder)
     store.finished()
     overall_table(summarise(store))
-    pace_table(store)
 
 
 def score_grid(folder: Path, rng: Rng) -> None:

@@ -28,6 +28,7 @@ PRELOADED = ["numpy", "scipy.signal", "scipy.optimize", "scipy.stats", "matplotl
 
 #: pytest's status: tests passed, failed, or could not be collected. A crash is a negative status.
 _MEANING = {0: "survived", 1: "killed", 2: "killed"}
+_ELSEWHERE = 99
 #: A conftest or a test file that cannot be imported; where single tests of it are named, pytest's status is 4.
 _NO_IMPORT = re.compile(r"^(ImportError while loading conftest|ERROR tests/)", re.MULTILINE)
 
@@ -133,5 +134,10 @@ def _tests(tests: list[str], copy: str, log: str) -> None:
         del sys.modules[name]
     import pytest
 
+    import tunnel_sim
+
+    if not str(tunnel_sim.__file__).startswith(copy):  # the finder of an editable installation comes first
+        print("the package is imported from elsewhere; install it without -e")
+        os._exit(_ELSEWHERE)
     options = ["-x", "-q", "--tb=line", "-p", "no:cacheprovider", "-n", "0", "--no-header"]
     os._exit(int(pytest.main([*options, *tests])))

@@ -11,8 +11,8 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
 from tunnel_sim.vocabulary.record import Array, Record
 
-RATE, COUNT, NOISE, GEAR = 250.0, 1500, 2e-4, 20.0
-TIME = np.arange(COUNT) / RATE
+RATE, NOISE, GEAR = 250.0, 2e-4, 20.0
+TIME = np.arange(1000) / RATE
 MOTOR = f'<motor name="motor" joint="elbow" gear="{GEAR:g}"/>'
 UPRIGHT, LEVEL = "0 0 1", "0 1 0"  # axes: without and with gravity
 
@@ -37,7 +37,7 @@ def robot(
 
 
 def multisine(seed: int, peak: float) -> Array:
-    """Lines from 0.2 to 4 Hz, shape (COUNT,)."""
+    """Lines from 0.2 to 4 Hz, shape of TIME."""
     lines = np.arange(0.2, 4.0, 0.1)
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size)
     found = np.sin(2.0 * np.pi * np.outer(TIME, lines) + phases).sum(axis=1)
@@ -53,7 +53,7 @@ def positions(
     column: InputColumn = "drive",
     actuator: int = 0,
 ) -> Array:
-    """Positions of the only joint at the samples, rad, shape (COUNT,), from a start in rad and rad/s."""
+    """Positions of the only joint at the samples, rad, shape of TIME, from a start in rad and rad/s."""
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = start
@@ -94,7 +94,7 @@ def robot_campaign(
         values = multisine(seed, peak)
         late = np.concatenate([np.full(delay, values[0]), values[: values.size - delay]])
         reading = positions(xml, late, hold, start=(start, 0.0), column=column)
-        reading = reading + np.random.default_rng([seed, 1]).normal(0.0, NOISE, COUNT)
+        reading = reading + np.random.default_rng([seed, 1]).normal(0.0, NOISE, TIME.size)
         drive = Drive(column, values, hold, gain)
         runs.append(Run(f"r{seed + 1}", Record(TIME, reading), 0.0, drive=drive))
     return Campaign("robot", RigProperties(), SensorProperties(RATE), tuple(runs))

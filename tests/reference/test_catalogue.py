@@ -45,7 +45,14 @@ def test_every_effect_is_a_family_with_its_one_textbook_form_first():
 def motions():
     """Every form at ten times its start (limits kept), and the nominal motion."""
     draws = [
-        drawn(f, min(10 * f.start, f.limits[1] / 2), f.signs[-1], duration=0.75, resolution=1e-9)
+        drawn(
+            f,
+            min(10 * f.start, f.limits[1] / 2),
+            f.signs[-1],
+            duration=0.75,
+            resolution=1e-9,
+            sample_rate=500.0,
+        )
         for f in ALL_FORMS
     ]
     plain = [CampaignDraw("none", draw.conditions, (), 3) for draw in draws]

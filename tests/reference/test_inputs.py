@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference import make
 from tunnel_reference import moments as m
@@ -65,7 +66,7 @@ def solved(c, run, cubic):
 
 @pytest.mark.parametrize("column", ["moment_nm", "drive", "base_rad"])
 @pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
-@pytest.mark.parametrize("delay", [0.0, 0.013])
+@pytest.mark.parametrize("delay", [slow(0.0), 0.013])
 def test_an_input_acts_as_its_equation_says(column, held, delay):
     c = driven(column, held, gain=2.5 if column == "drive" else 1.0, delay=delay)
     cubic = 3.0
@@ -91,7 +92,9 @@ def test_the_closed_form_is_the_integrated_linear_response(column, held):
 
 
 def test_the_nominal_fit_finds_rig_and_gain_again():
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, duration=4.0)
+    c = rig(
+        (21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, duration=4.0, sample_rate=250.0
+    )
     values = np.random.default_rng(1).standard_normal((c.samples, 4)) * 4.0
     unknown = Input("drive", values, np.full(4, False), np.full(4, 0.1), 0.5)
     c = replace(c, drive=unknown, zero=0.002, start_rate=np.full(4, 0.5))

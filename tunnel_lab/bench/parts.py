@@ -40,7 +40,6 @@ FIELDS = {
 """The label of the field, without its example and unit, by the option that states the same."""
 _OPTION = re.compile(r"--([a-z-]+)(?: (?:[A-Z]+\b|\"[^\"]*\"))?")
 
-_THEME = "bench-theme"
 _NAMED = ("answer", "effect", "parameter", "added")  # columns of the names of effects and parameters
 _HEAD = """
 <link rel="stylesheet" href="/static/uplot/uPlot.min.css">
@@ -67,6 +66,7 @@ class Frame:
         self._session, self._stage = session, stage
         ui.add_head_html(_HEAD)
         ui.colors(primary="var(--link)")
+        ui.dark_mode(None)  # as the browser
         ui.page_title(f"{title} · {session.name}" if session else title)
         with ui.element("header").classes("top"):
             ui.link("Skip to the page", "#main").classes("skip")
@@ -75,38 +75,12 @@ class Frame:
                 ui.label(session.name).classes("name")
             ui.element("span").classes("space")
             ui.link("Try it", "/try")
-            self._theme_button()
         if session is not None:
             self.steps = ui.element("nav").props('aria-label="Stages"').classes("steps")
             self.refresh()
         self.main = ui.element("main").props("id=main")
         with self.main, ui.element("h1"):
             ui.html(title, sanitize=False, tag="span")
-
-    def _theme_button(self) -> None:
-        """Automatic, light, dark: kept in a cookie, so that it is the same on every page."""
-        names: dict[str, bool | None] = {"automatic": None, "light": False, "dark": True}
-        now = str(ui.context.client.request.cookies.get(_THEME, "automatic"))
-        dark = ui.dark_mode(names.get(now))
-        button = ui.element("button").props("type=button")
-
-        def show(name: str) -> None:
-            button.clear()
-            with button:
-                ui.html(f"Theme: {name}", sanitize=False, tag="span")
-
-        def turn() -> None:
-            nonlocal now
-            order = list(names)
-            now = order[(order.index(now) + 1) % len(order)] if now in order else order[0]
-            dark.value = names[now]
-            ui.run_javascript(
-                f'document.cookie = "{_THEME}={now}; path=/; SameSite=Strict; max-age=31536000"'
-            )
-            show(now)
-
-        show(now if now in names else "automatic")
-        button.on("click", turn)
 
     def refresh(self, on: ui.element | None = None) -> None:
         """Show the stages as the files allow them now, and the way on in its place."""

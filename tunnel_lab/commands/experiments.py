@@ -145,7 +145,7 @@ def _summarise(folder: Path) -> None:
     if done < shards:
         say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")
     along = map(sweep_summary.axis_table, grouped.values())
-    show_tables(sweep_summary.overall_table(lines), *along, sweep_summary.pace_table(store))
+    show_tables(sweep_summary.overall_table(lines), *along)
     say(sweep_summary.BRACKETS)
     say(f"Written to {target}: {', '.join(path.name for path in written)}")
 

@@ -3,7 +3,7 @@
 ``sweep.json`` in the folder describes the sweep. Every shard is a file in ``results``, and one in ``records`` where
 these are stored. Files are written under a temporary name and renamed, results last: the shard is then finished.
 ``checksums`` holds a file for each shard in the format of ``sha256sum --check``; a part that does not match its
-checksum is repeated. ``timings`` are separate, because they differ every time.
+checksum is repeated.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ import io
 import json
 import os
 import platform
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from importlib.metadata import version
-from itertools import pairwise
 from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +31,7 @@ from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
 from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
-from tunnel_sim.files.reading import as_described, frame_schema, read_frame, read_json, read_regular
+from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
@@ -46,7 +44,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 MANIFEST = "sweep.json"
-RESULTS, RECORDS, TIMINGS, CHECKSUMS = "results", "records", "timings", "checksums"
+RESULTS, RECORDS, CHECKSUMS = "results", "records", "checksums"
 _ELSEWHERE = "name another --out"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The last bit of sums in a linear algebra library depends on its number of threads; a shard uses one."""
@@ -79,27 +77,18 @@ RECORD_COLUMNS: Mapping[str, Any] = {
     **dict.fromkeys(("wind_speed", "spring_stiffness", "sample_rate"), pl.Float64),
     "yaw_rad": pl.List(pl.Float64),
 }
-TIMING_COLUMNS: Mapping[str, Any] = {
-    "shard": pl.UInt32,
-    "step": pl.String,
-    **dict.fromkeys(("cases", "runs"), pl.UInt32),
-    "seconds": pl.Float64,
-}
-_READ_TIMINGS = ("step", "runs", "seconds")
 
 
 @dataclass(frozen=True)
 class Finished:
     """A finished shard, ready to be written: Parquet files, versions, and the number of estimates that raised.
 
-    Results and records (None where they are not stored) do not depend on where or when the shard is done; the times
-    differ every time.
+    Results and records (None where they are not stored) do not depend on where or when the shard is done.
     """
 
     index: int
     results: bytes
     records: bytes | None
-    timings: bytes
     made_with: Mapping[str, str]
     crashes: int
 
@@ -130,7 +119,6 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
         nthread: threads that simulate; the result is the same to the bit whatever their number.
     """
     plan = _sweep(sweep)
-    marks = [("begun", time.perf_counter())]
     cases = list(plan.shard(index))
     groups: dict[tuple[str, float], list[SweepCase]] = {}
     for case in cases:
@@ -139,7 +127,6 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     for group in groups.values():
         done.update(zip((case.index for case in group), _simulate(group, nthread), strict=True))
     campaigns = [(case, done[case.index]) for case in cases]
-    marks.append(("simulate", time.perf_counter()))
     answers: list[tuple[SweepCase, str | None, Estimate | Failure | None]] = []
     for name in plan.document.estimators:
         for case, campaign in campaigns:  # one bad case must not stop the sweep
@@ -154,7 +141,6 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
                 except Exception as error:
                     found = Failure(RAISED, one_line(f"{type(error).__name__}: {error}"))
             answers.append((case, name, found))
-        marks.append((name, time.perf_counter()))
     if not plan.document.estimators:
         answers = [
             (case, None, campaign if isinstance(campaign, Failure) else None) for case, campaign in campaigns
@@ -171,14 +157,10 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
             for run in campaign.runs
         ]  # fmt: skip
         records = _parquet(rows, RECORD_COLUMNS)
-    marks.append(("pack", time.perf_counter()))
-    runs = sum(len(case.plan.conditions) for case in cases)
-    timings = [(index, step, len(cases), runs, end - start) for (_, start), (step, end) in pairwise(marks)]
     return Finished(
         index=index,
         results=results,
         records=records,
-        timings=_parquet(timings, TIMING_COLUMNS),
         made_with={**made_with(), "threads": os.environ.get(ONE_THREAD[0], "several")},
         crashes=sum(isinstance(found, Failure) and found.status == RAISED for _, _, found in answers),
     )
@@ -308,23 +290,8 @@ class Store:
         if shard.records is not None:
             write_whole(self._file(RECORDS, shard.index), shard.records)
             lines += self._line(RECORDS, shard.index, shard.records)
-        write_whole(self._file(TIMINGS, shard.index), shard.timings)
         write_whole(self._file(CHECKSUMS, shard.index), lines.encode())
         write_whole(self._file(RESULTS, shard.index), shard.results)
-
-    def timings(self) -> pl.DataFrame:
-        """Step, runs and seconds of each step of the finished shards, but those whose times were removed."""
-        frames = [pl.DataFrame(schema={name: TIMING_COLUMNS[name] for name in _READ_TIMINGS})]
-        remedy = "remove it: no result depends on it"
-        for path in filter(Path.exists, (self._file(TIMINGS, index) for index in self.finished())):
-            # They have no checksum, so the file may be anything: a FIFO would block Polars.
-            where, content = shown(path), read_regular(path, limits.DATA_BYTES, readable=remedy)
-            with as_described("is not a table of times", where, remedy):
-                schema = frame_schema(content, where, remedy, rows=limits.SCORE_ROWS)
-                if missing := [name for name in _READ_TIMINGS if name not in schema]:
-                    raise ValueError(f"no column {missing[0]}")
-                frames.append(read_frame(content, where, remedy, _READ_TIMINGS))
-        return pl.concat(frames)
 
     def scan(self, dataset: str = RESULTS) -> pl.LazyFrame:
         """The results or records of the finished shards, in the order of the cases.
@@ -368,7 +335,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
         clear_leftovers(folder)
         # A sweep that was stopped before its ``sweep.json`` was written may have left empty folders.
         for path in folder.iterdir() if folder.is_dir() else ():
-            dataset = path.name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS) and path.is_dir()
+            dataset = path.name in (RESULTS, RECORDS, CHECKSUMS) and path.is_dir()
             if not (dataset and not any(path.iterdir())) and not path.name.startswith(f".{MANIFEST}."):
                 raise TunnelError("the folder holds something else", where=where, remedy=_ELSEWHERE)
         output_folder(folder)
@@ -383,7 +350,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
         }
         write_json(folder / MANIFEST, document)  # first: what is stopped afterwards is continued
         store = Store(folder, sweep, versions)
-    for name in (RESULTS, TIMINGS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
+    for name in (RESULTS, CHECKSUMS, *([RECORDS] if sweep.document.records else [])):
         output_folder(folder / name)
     return store
 
@@ -443,6 +410,6 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
         size=lambda index: min(sweep.cases_per_shard, sweep.size - index * sweep.cases_per_shard),
         progress=progress,
     )
-    for name in (RESULTS, RECORDS, TIMINGS, CHECKSUMS):  # partial files that a killed run left
+    for name in (RESULTS, RECORDS, CHECKSUMS):  # partial files that a killed run left
         clear_leftovers(store.folder / name)
     return Outcome(store, found, sum(crashes))

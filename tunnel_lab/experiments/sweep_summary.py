@@ -16,13 +16,12 @@ import numpy as np
 from identification.printing import SYMBOLS, concise, significant, unit
 from identification.scoring import Score, Trials, score
 from identification.statistics import Proportion
-from tunnel_lab.experiments.sweep import TIMINGS, Store
+from tunnel_lab.experiments.sweep import Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.outputs import table
 from tunnel_sim.effects import effect_class
-from tunnel_sim.files.reading import as_described
-from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import read_only
 
 if TYPE_CHECKING:
@@ -285,22 +284,6 @@ def axis_table(lines: Sequence[Line]) -> Table:
         for estimator in dict.fromkeys(line.estimator for line in lines):
             figures = [_figure(cells.get((at, estimator, name))) for name in quantities]
             result.add_row(significant(at), estimator, *figures)
-    return result
-
-
-def pace_table(store: Store) -> Table:
-    """Times of the steps of a sweep per run; they are not comparable under different machine load."""
-    import polars as pl
-
-    each = pl.col("seconds") / pl.col("runs")
-    wanted = [each.quantile(share, "linear").alias(str(share)) for share in (0.5, 0.25, 0.75)]
-    result = table("Time per run", "step", "median [ms]", "quartiles [ms]", right=("median [ms]",))
-    folder = shown(store.folder / TIMINGS)
-    with as_described("cannot be read as a sweep's timings", folder, "remove it: no result depends on it"):
-        steps = store.timings().group_by("step", maintain_order=True).agg(*wanted)
-        for step, *seconds in steps.iter_rows():
-            middle, low, high = (significant(1e3 * float(value), 3) for value in seconds)
-            result.add_row(str(step), middle, f"{low} to {high}")
     return result
 
 

@@ -366,9 +366,16 @@ class StructuralDamping(Effect):
         yielded to the release angle, and go back while the body swings.
         """
         run = super().on_run(run, stated, drawn)
-        if self.is_null or self.after_effect == 0.0 or stated.drive is not None or not stated.spring_stiffness:
+        if (
+            self.is_null
+            or self.after_effect == 0.0
+            or stated.drive is not None
+            or not stated.spring_stiffness
+        ):
             return run
-        size = -2.0 / pi * self.after_effect * self.loss_factor * stated.spring_stiffness * stated.release_angle
+        size = (
+            -2.0 / pi * self.after_effect * self.loss_factor * stated.spring_stiffness * stated.release_angle
+        )
         lead = sqrt(stated.yaw_inertia / stated.spring_stiffness)
         constants = {"size": size, "lead": lead, "length": stated.duration}
         return run.with_moment(_AFTER_EFFECT.program(constants, {"t": "time"}))

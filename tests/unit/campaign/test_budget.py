@@ -8,6 +8,7 @@ import pytest
 
 from identification import identify
 from identification.uncertainty.budget import InputUncertainties, make_budget, with_budget
+from tests.marks import slow
 from tests.reference.free_decays import TWELVE, Setting, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 
@@ -64,7 +65,7 @@ INPUTS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("estimator", ["matrix_pencil", "conventional"])
+@pytest.mark.parametrize("estimator", ["matrix_pencil", slow("conventional")])
 @pytest.mark.parametrize("name", INPUTS)
 def test_common_errors_move_the_estimators_as_the_closed_form_says(noisy, estimator, name):
     step = 1e-4

@@ -16,12 +16,12 @@ Tunnel = Callable[..., tuple[int, str, str]]
 PLAN = """
 name = "driven"
 seed = 3
-springs = [5, 8]
+springs = [5]
 wind_speeds = [0.0, 15.0]
-duration = 12.0
+duration = 6.0
 truth = { cn_beta = 0.495, cn_r = -0.114 }
 sensor.sample_rate = 100.0
-drive = { kind = "multisine", from_hz = 0.5, to_hz = 5.0, amplitudes_nm = [0.2, 0.8], hold = "zero" }
+drive = { kind = "multisine", from_hz = 0.5, to_hz = 5.0, amplitudes_nm = [0.4], hold = "zero" }
 """
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from identification.signal.noise import Residual, noise_level
+from tests.marks import slow
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
 from tunnel_sim.files.campaign_folder import write_campaign
@@ -58,7 +59,7 @@ def numbers(value: object) -> list[float]:
     return [value] if isinstance(value, float) else []
 
 
-@pytest.mark.parametrize("estimator", ["output_error", "conventional"])
+@pytest.mark.parametrize("estimator", ["output_error", slow("conventional")])
 def test_identify(tunnel: Tunnel, any_sensor: Path, tmp_path: Path, estimator: str) -> None:
     file = tmp_path / "estimate.json"
     status, _, err = tunnel("identify", any_sensor, "--json", file, "--estimator", estimator)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from tests.unit.gone_reader import unheard
 
@@ -27,7 +28,10 @@ def test_diagnose_writes_before_it_prints(tiny_campaign: Path, tmp_path: Path) -
     assert unheard("identify", tiny_campaign, "--json", "-") == 0
 
 
-def test_identify_plot_and_effects_write_before_they_print(tiny_campaign: Path, tmp_path: Path) -> None:
+def test_identify_plot_and_effects_write_before_they_print(
+    tiny_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Figure, "savefig", lambda _, stream, **_form: stream.write(b"drawn"))
     assert unheard("identify", tiny_campaign, "--json", tmp_path / "e.json") == 0
     assert (tmp_path / "e.json").exists()
     assert unheard("plot", tiny_campaign, "--out", tmp_path) == 0

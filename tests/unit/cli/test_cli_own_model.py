@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 
 from diagnosis.closure import UNPATCHED
+from tests.reference import robot_joints
 from tests.reference.free_decays import Setting, campaign
 from tests.reference.robot_joints import LEVEL, MOTOR, robot, robot_campaign
 from tunnel_lab.commands import diagnose as commands
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
+
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
 
 Tunnel = Callable[..., tuple[int, str, str]]
 SPRING = 16.12
@@ -124,8 +127,12 @@ def test_a_slide_says_so(tunnel: Tunnel, spring: Path, tmp_path: Path) -> None:
     assert mass == pytest.approx(document["coefficients"]["after"]["yaw_inertia"]["value"])
 
 
-def test_the_control_of_a_robots_joint_from_its_folder(tunnel: Tunnel, tmp_path: Path) -> None:
+def test_the_control_of_a_robots_joint_from_its_folder(
+    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The truth is that of MuJoCo's own steps: friction and a rotor that the model lacks."""
+    monkeypatch.setattr(robot_joints, "TIME", robot_joints.TIME[:750])
+    monkeypatch.setattr("tunnel_lab.report.page.inline_svg", lambda *_: "")  # drawing has tests of its own
     truth = 'armature="0.05" damping="0.4" frictionloss="0.6" solreffriction="0.002 1"'
     folder = write_campaign(robot_campaign(robot(truth, axis=LEVEL), start=1.57), tmp_path / "arm")
     two = f'{MOTOR}<motor name="other" joint="elbow"/>'

@@ -17,7 +17,7 @@ from tests.reference.rigs import rig
 from tests.unit.diagnosis.test_blind_score import document
 from tests.unit.gone_reader import unheard
 from tunnel_lab.cli import main
-from tunnel_reference import draw
+from tunnel_reference import draw, severity
 from tunnel_reference.draw import Mixture
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -26,10 +26,11 @@ from tunnel_sim.vocabulary.errors import TunnelError
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """Three campaigns of four short runs, made once; tests copy it."""
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     folder = tmp_path_factory.mktemp("blind") / "set"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
+        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
         make_blind(
             folder,
             count=3,
@@ -92,8 +93,9 @@ def test_the_published_hash_is_that_of_the_salted_key(blind):
 
 
 def test_the_same_seed_gives_the_same_campaigns_under_another_salt(made, tmp_path, monkeypatch):
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
+    monkeypatch.setattr(severity, "_SUBSTEPS", 2)
     key = make_blind(
         tmp_path / "b", count=3, seed=5, shares={"single": 2.0, "none": 1.0},
         mixture=Mixture(variety=0.0, small=0.0), key=tmp_path / "away.json",
@@ -130,8 +132,9 @@ def test_a_campaign_that_the_reader_refuses_is_drawn_again(tmp_path, monkeypatch
         return write_campaign(campaign, folder)
 
     monkeypatch.setattr("diagnosis.blind.sets.write_campaign", refuses_the_first)
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
+    monkeypatch.setattr(severity, "_SUBSTEPS", 2)
     key = make_blind(
         tmp_path / "set", count=1, seed=5, shares={"single": 1.0}, mixture=Mixture(variety=0.0, small=0.0)
     )

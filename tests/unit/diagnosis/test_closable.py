@@ -22,6 +22,7 @@ from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed
+from tests.marks import slow
 from tests.reference.rigs import rig
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
@@ -39,6 +40,7 @@ RUNS = rig(
     speed=(0.0, 20.0, 0.0, 20.0, 0.0, 20.0),
     angle=(0.35, 0.35, 0.35, 0.35, 0.2, 0.25),
     duration=6.0,
+    sample_rate=500.0,
 )
 FORMS = {form.name: form for form in (*OUTSIDE_FORMS, *LAW_FORMS)}
 
@@ -101,7 +103,7 @@ def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp
 
 
 def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
-    alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0)
+    alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0, sample_rate=500.0)
     found = closable(study_of("stops", 0.8, alone, place=0.15), significant=True)
     assert {one.held_out for one in found.ceilings} == {"stretches of time", "short gaps"}
     assert found.kind == "angle"
@@ -215,7 +217,7 @@ def _running_away(*_, **__):
     return np.full(2, 1e300) @ np.full(2, 1e300)
 
 
-@pytest.mark.parametrize("unsolvable", [_singular, _running_away])
+@pytest.mark.parametrize("unsolvable", [_singular, slow(_running_away)])
 def test_equations_that_cannot_be_solved_are_said(monkeypatch, unsolvable):
     monkeypatch.setattr(_diagnose, "closable", unsolvable)
     found = diagnose(campaign(), kinds=[effect_class("coulomb_friction")])

@@ -20,6 +20,7 @@ from diagnosis.likelihood.least_squares import (
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem, condensed
 from diagnosis.likelihood.starting_points import nominal_start
+from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import campaign, nominal
@@ -268,8 +269,7 @@ def two_inertias(run, compliance, share, time):
     return found.y[0]
 
 
-@pytest.mark.parametrize("speed", [0.0, 25.0])
-@pytest.mark.parametrize("share", [0.1, 0.5])
+@pytest.mark.parametrize(("share", "speed"), [(0.1, 25.0), (0.5, 0.0), slow(0.1, 0.0), slow(0.5, 25.0)])
 def test_a_stiff_rod_condensed_moves_as_the_two_inertias_do(speed, share):
     """What is dropped is of the square of c Kr = 9e-4, and the ringing after the release."""
     compliance = 2e-5

@@ -16,6 +16,7 @@ from diagnosis.search import grow as growth
 from diagnosis.search.grow import exchange, grow, prune, without
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.weigh import weigh
+from tests.marks import slow
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
@@ -55,9 +56,9 @@ def of_three():
     ("name", "values"),
     [
         ("coulomb_friction", {"friction_moment": 0.002}),
-        ("nonlinear_yaw_moment", {"coefficient": -0.5}),
+        slow("nonlinear_yaw_moment", {"coefficient": -0.5}),
         ("rod_flexibility", {"compliance": 8e-5, "inertia_share": 0.1}),
-        ("sensor_clipping", {"limit": 0.33}),
+        slow("sensor_clipping", {"limit": 0.33}),
     ],
 )
 def test_the_effect_put_in_fits_best_and_the_growth_ends_with_it(name, values):
@@ -154,7 +155,7 @@ ALIKE = ("gravity_stiffness", "spring_miscalibration")  # two springs cannot tel
 def test_of_effects_that_do_the_same_one_is_grown_and_the_others_are_weighed_beside_it():
     wrong = effect_from("spring_miscalibration", {"error": 0.004, "spring_stiffness": 16.12})
     friction = effect_from("coulomb_friction", {"friction_moment": 0.002})
-    base, steps = nominal(campaign(wrong, friction, duration=10.0)), []
+    base, steps = nominal(campaign(wrong, friction, duration=8.0)), []
     kinds = [effect_class(name) for name in (*ALIKE, "coulomb_friction", "sensor_drift")]
     ranked = grow(base, kinds, steps.append)
     grown_from = {line.split(" + ")[0] for line in steps if " + " in line}

@@ -21,6 +21,8 @@ from tunnel_sim.physics.run_settings import Motion
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
+
 NOISE = 1e-3
 XML = """<mujoco><option timestep="0.0005" integrator="RK4"/><worldbody><body>
 <joint name="hinge" axis="0 1 0" ref="20" damping="0.002 0.001 0" frictionloss="{}"/>

@@ -15,6 +15,7 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     trend_statistics,
 )
+from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 from tunnel_sim.vocabulary.record import Record
@@ -175,7 +176,7 @@ def trends(count, change=None, jitter=0.0):
     return np.array(found)
 
 
-@pytest.mark.parametrize("jitter", [0.0, 0.5])
+@pytest.mark.parametrize("jitter", [slow(0.0), 0.5])
 def test_trends_of_white_noise_are_standard_normal(jitter):
     found = trends(200, jitter=jitter)[:, :2]
     assert np.all(np.abs(found.mean(axis=0)) < 4.0 / np.sqrt(200))

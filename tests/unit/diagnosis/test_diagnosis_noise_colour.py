@@ -15,6 +15,7 @@ from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zer
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.policy import FALSE_ALARM_RATE
+from tests.marks import slow
 from tests.unit.diagnosis.test_diagnosis_process_noise import buffeted
 from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
 from tunnel_sim.effects import effect_class
@@ -148,7 +149,7 @@ def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
 
 
 @pytest.mark.parametrize(("effect", "size"), [("free_play", 0.01), ("asymmetric_stiffness", 0.3)])
-@pytest.mark.parametrize("damping", [0.02, 0.04])
+@pytest.mark.parametrize("damping", [0.02, slow(0.04)])
 def test_a_gap_of_still_air_is_no_colour(effect, size, damping):
     data = campaign(effect_class(effect)(size), damping=damping)
     _, still = gap._colour_sources(nominal(data))

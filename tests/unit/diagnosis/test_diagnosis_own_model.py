@@ -20,6 +20,8 @@ from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Ru
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
+
 NOISE, RATE, ZERO = 1e-3, 200.0, 0.03
 MASS, LENGTH, GRAVITY = 0.2, 0.25, 9.81
 INERTIA = MASS * LENGTH**2 + 0.4 * MASS * 0.01**2

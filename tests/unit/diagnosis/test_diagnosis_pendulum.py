@@ -36,6 +36,7 @@ FRICTION = {
 }  # fmt: skip
 
 
+@cache
 def pendulum(amplitude=2.5, duration=40.0, noise=1e-3, friction="sign", quadratic=QUADRATIC):
     """A heavy pendulum with dry and quadratic damping, integrated by the reference simulator."""
     conditions = Conditions(
@@ -47,7 +48,7 @@ def pendulum(amplitude=2.5, duration=40.0, noise=1e-3, friction="sign", quadrati
         Term(moments.quadratic_damping, Phase.MOMENT, {"coefficient": quadratic * ONE}),
         FRICTION[friction],
     ]  # fmt: skip
-    substeps = 10 if friction == "dahl" else 4  # presliding is stiff
+    substeps = 10 if friction == "dahl" else 2  # presliding is stiff
     (motion,) = integrate([conditions], [terms], substeps=substeps)
     reading = motion.angle[:, 0] + np.random.default_rng(6).normal(0.0, noise, conditions.samples)
     run = Run("swing", Record(conditions.time, reading), 0.0, None, None)
@@ -117,6 +118,7 @@ def test_a_run_that_still_swings_loses_half_a_cycle_at_most():
     )  # a cycle at this swing is longer than 113 samples
 
 
+@pytest.mark.slow
 def test_presliding_friction_is_fitted_in_stretches():
     """With the textbook form alone, its misfit hides whatever else acts."""
     data = without_rest(without_start(prepared(pendulum(1.0, 20.0, friction="dahl", quadratic=0.0))))

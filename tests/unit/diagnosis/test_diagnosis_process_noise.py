@@ -24,6 +24,7 @@ from diagnosis.search.process_noise import (
     with_response,
 )
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments, wind_off_excess
+from tests.marks import slow
 from tests.unit.gap_campaigns import (
     CN_BETA,
     CN_R,
@@ -163,7 +164,7 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     assert [answer.effects for answer in weigh_random_moments(base, [], BOTH)] == [("buffeting",)]
 
 
-@pytest.mark.parametrize("bandwidth", [0.05, 0.5, 10.0])
+@pytest.mark.parametrize("bandwidth", [0.05, slow(0.5), 10.0])
 def test_a_random_moment_obeys_no_law(bandwidth):
     for seed in range(2):
         assert not obeys_a_law(nominal(buffeted(campaign(), 0.01, bandwidth, seed)))
@@ -201,11 +202,12 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     assert abs(wind_off_excess(found)) < 0.1
 
 
+@pytest.mark.slow
 def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
     spring = effect_from("cubic_stiffness", {"coefficient": -0.03})
     base = nominal(buffeted(campaign(friction, spring), 0.02, 4.0))
-    names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping", "sensor_drift")
+    names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping")
     kinds = [effect_class(name) for name in names]
     misled = grow(base, kinds[1:])
     (answer,) = weigh_random_moments(base, misled, kinds)

@@ -10,6 +10,7 @@ from diagnosis.answer.units import own_parameters, parameter_unit, size_note, si
 from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.result import ParameterEstimate
 from identification import identify
+from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import AREA, LENGTH, Setting
 from tests.unit import gap_campaigns
@@ -39,7 +40,7 @@ def data():
     return free_decays.campaign(SETTINGS, noise=4e-4, duration=5.0, rate=500.0, rng=np.random.default_rng(2))
 
 
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", ["neither", slow("both"), slow("no area"), slow("no length")])
 def test_what_is_identified_is_the_coefficient_times_the_missing_sizes(data, name):
     rig, sizes, units = RIGS[name]
     truth = free_decays.Truth()

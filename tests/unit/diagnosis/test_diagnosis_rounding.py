@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagnosis import vocabulary
 from diagnosis.likelihood.prepare import in_stretches, prepare
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.noise.gap import rounding_errors, with_rounding
@@ -14,11 +15,14 @@ from diagnosis.noise.sensor_noise import (
     typical_step,
 )
 from diagnosis.search.investigate import fit_nominal, investigate
+from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 from tests.unit.gap_campaigns import judged
+from tunnel_sim.effects import ALL_EFFECTS
 
 DEGREE = np.pi / 180.0
+FEW = vocabulary(["coulomb_friction", "cubic_stiffness", "free_play", "sensor_drift", "sensor_quantisation"])
 SETTINGS = (Setting(16.12, 0.0), Setting(20.0, 0.0), Setting(16.12, 20.0), Setting(20.0, 20.0))
 
 
@@ -132,9 +136,10 @@ def test_the_typical_step_has_the_power_of_the_uneven_ones():
     assert np.mean((anywhere - nearest) ** 2) == pytest.approx(typical_step(levels) ** 2 / 12.0, rel=0.02)
 
 
-def test_a_coarse_lattice_of_uneven_steps_is_the_only_cause():
+@pytest.mark.parametrize("kinds", [FEW, slow(ALL_EFFECTS)], ids=["few", "all"])
+def test_a_coarse_lattice_of_uneven_steps_is_the_only_cause(kinds):
     """What the lattice leaves by itself in each channel does not count against it."""
-    found = investigate(coarse())
+    found = investigate(coarse(), kinds)
     assert found.causes == ("sensor_quantisation",)
     assert found.weighed[0].probability > 0.5
     nominal = misfit(found.nominal)

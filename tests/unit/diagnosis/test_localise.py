@@ -25,6 +25,7 @@ from diagnosis.where.place import (
     locate,
     runs_beyond_chance,
 )
+from tests.marks import slow
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
@@ -53,7 +54,7 @@ def test_a_mechanical_gap_shows_with_the_wind_off():
 
 
 @pytest.mark.parametrize(
-    "cause", ["quadratic_damping", "coulomb_friction", "cubic_stiffness", "sensor_drift"]
+    "cause", ["quadratic_damping", slow("coulomb_friction"), slow("cubic_stiffness"), "sensor_drift"]
 )
 def test_the_place_does_not_depend_on_the_names(cause):
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))

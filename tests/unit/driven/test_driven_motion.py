@@ -176,6 +176,7 @@ def test_output_error_finds_inertia_and_damping(columns: tuple[str | None, ...],
     assert gained == ("drive" in columns)
 
 
+@pytest.mark.slow
 def test_its_standard_deviations_are_those_of_the_scatter() -> None:
     scores = []
     for seed in range(40):

@@ -29,7 +29,7 @@ sensor.sample_rate = 100.0
 """
 MOMENT, ROOT = "amplitudes_nm = [0.3]", "amplitudes_rad = [0.03]"
 BAND = "from_hz = 0.5\nto_hz = 5.0\n"
-MULTISINE = f'{PLAN}kind = "multisine"\n{BAND}amplitudes_nm = [0.2, 0.8]\n'
+MULTISINE = f'{PLAN.replace("12.0", "8.0")}kind = "multisine"\n{BAND}amplitudes_nm = [0.2, 0.8]\n'
 KINDS = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "cubic_stiffness")]
 
 
@@ -90,7 +90,7 @@ def test_dry_friction_is_named(load: Callable[[str], CampaignPlan]) -> None:
 def test_the_bits_do_not_depend_on_threads_and_the_noise_only_on_the_seed(
     load: Callable[[str], CampaignPlan],
 ) -> None:
-    plan = load("release_angles_deg = [20.0]" + MULTISINE)
+    plan = load("release_angles_deg = [20.0]" + MULTISINE.replace("duration = 8.0", "duration = 4.0"))
     one, three, other = (
         simulate_campaign(plan, nthread=1),
         simulate_campaign(plan, nthread=3),

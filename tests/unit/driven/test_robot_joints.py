@@ -18,6 +18,7 @@ from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.diagnosable import refuse_undiagnosable
 from diagnosis.own_joint import with_law
 from diagnosis.result import Diagnosis
+from tests.marks import slow
 from tests.reference.robot_joints import (
     GEAR,
     LEVEL,
@@ -29,23 +30,17 @@ from tests.reference.robot_joints import (
     robot,
     robot_campaign,
 )
-from tunnel_sim.engine import joint_model
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Hold
 from tunnel_sim.vocabulary.errors import TunnelError
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
+
 TRUE = 'armature="0.05" damping="0.4"'
 RUBS = f'{TRUE} frictionloss="0.6" solreffriction="0.002 1"'
 KINDS = ("coulomb_friction", "quadratic_damping", "gravity_stiffness", "input_delay")
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process with limits takes half a second to start, and has tests of its own."""
-    joint_model.prepare()
-    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
 
 
 def own_model(
@@ -339,7 +334,7 @@ def test_a_delay_of_the_input_is_named_and_stays_out_of_the_model(tmp_path: Path
     assert any("delay of the input is not part of the model" in note for note in answer.model.notes)
 
 
-@pytest.mark.parametrize("integrator", ["implicitfast", "Euler"])
+@pytest.mark.parametrize("integrator", [slow("implicitfast"), "Euler"])
 def test_half_a_step_of_the_models_integrator_is_not_a_cause(tmp_path: Path, integrator: str) -> None:
     option = f'timestep="0.002" integrator="{integrator}"'
     data = robot_campaign(robot(TRUE, option=option), start=0.1)

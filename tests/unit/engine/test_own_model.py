@@ -21,21 +21,18 @@ from tunnel_sim.processes import in_limited_process
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError
 
+pytestmark = pytest.mark.usefixtures("models_in_this_process")
+
 MASS, LENGTH, G = 0.4, 0.3, 9.81
 BOB = f'<geom name="bob" type="sphere" size="0.02" mass="{MASS}" pos="0 0 {-LENGTH}"/>'
 INERTIA = MASS * LENGTH**2 + 0.4 * MASS * 0.02**2
 BODY = '<body name="arm"><joint name="hinge" axis="0 1 0" {}/>{}</body>'
 
 
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process with limits takes half a second to start: only what is about it waits for it."""
-    joint_model.prepare()
-    monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
-
-
 @pytest.fixture
-def with_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+def with_limits(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is about the process with limits waits for it."""
+    request.getfixturevalue("models_in_this_process")
     monkeypatch.setattr(joint_model, "in_limited_process", in_limited_process)
 
 

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tunnel_sim.engine.model import build_model, build_spec, numerics
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
@@ -161,7 +162,7 @@ def test_progress_counts_all_runs() -> None:
         {"parameters": {"quadratic_damping": -5.0}},  # so fast that MuJoCo's automatic reset would hide it
     ],
 )
-@pytest.mark.parametrize("sample_rate", [1000.0, 50.0])
+@pytest.mark.parametrize("sample_rate", [slow(1000.0), 50.0])
 def test_motion_without_bound_is_refused(changes: dict[str, object], sample_rate: float) -> None:
     wild = replace(PLAIN, duration=20.0, **changes)  # type: ignore[arg-type]
     with pytest.raises(TunnelError, match="without bound"):

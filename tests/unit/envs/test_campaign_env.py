@@ -8,12 +8,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from stable_baselines3.common.env_checker import check_env as check_with_sb3
 
 import tunnel_sim.envs  # registers
 from diagnosis import diagnose
 from identification import identify
 from identification.campaign.belief import information_gain
+from tests.marks import slow
 from tunnel_lab.envs.campaign import CampaignEnv
 from tunnel_lab.envs.menu import Costs
 from tunnel_lab.envs.session import MEAN, RigTruth, draw_truth, probabilities
@@ -39,10 +39,12 @@ def equal(first, second):
 
 @pytest.mark.parametrize(
     "arguments",
-    [SHORT, {**SHORT, "simulation": "full"}, QUICK_DIAGNOSIS],
+    [SHORT, slow({**SHORT, "simulation": "full"}), QUICK_DIAGNOSIS],
     ids=["identification", "full", "diagnosis"],
 )
 def test_the_public_checkers_pass(arguments, recwarn):
+    from stable_baselines3.common.env_checker import check_env as check_with_sb3  # loads torch
+
     env = make(**arguments)
     check_env(env.unwrapped, skip_render_check=False)
     check_with_sb3(env.unwrapped)

@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tunnel_lab.envs.excitation import Resonant
 from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.conditions import FreeDecayConfig
@@ -38,9 +39,9 @@ def episode(share, release, period, *, excites=True):
     return info["record"].yaw_rad, gained
 
 
-@pytest.mark.parametrize("period", [0.01, 0.05])
+@pytest.mark.parametrize("period", [slow(0.01), 0.05])
 @pytest.mark.parametrize("release", [0.02, 0.3])
-@pytest.mark.parametrize("share", [0.95, 1.0, 1.05])
+@pytest.mark.parametrize("share", [0.95, slow(1.0), 1.05])
 def test_the_swing_is_kept_whatever_the_inertia(share, release, period):
     reading, _ = episode(share, release, period)
     last = reading[-400:] - np.mean(reading[-400:])  # four seconds

@@ -10,6 +10,7 @@ from identification.estimators.output_error import OutputError
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.frequency import starting_decay
+from tests.marks import slow
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, campaign, with_records
 from tunnel_sim.vocabulary.record import Record
 
@@ -62,7 +63,7 @@ def test_stated_noise_is_used_when_borne_out():
     assert not level.disagrees
 
 
-@pytest.mark.parametrize("factor", [0.5, 0.8, 1.25, 2.0])
+@pytest.mark.parametrize("factor", [slow(0.5), 0.8, 1.25, slow(2.0)])
 def test_a_wrong_noise_statement_is_caught(factor):
     data = campaign(noise=5e-4, stated_noise=5e-4 * factor, rng=np.random.default_rng(4))
     estimate = identify(data)

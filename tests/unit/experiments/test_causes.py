@@ -21,8 +21,9 @@ from benchmarks.causes.methods import METHODS
 from benchmarks.causes.page import page_text
 from benchmarks.causes.score import figures, likely_sets, read_answers, score
 from benchmarks.causes.tracks import TRACKS, draw_all
+from tests.marks import slow
 from tests.reference.rigs import rig
-from tunnel_reference import draw
+from tunnel_reference import draw, severity
 from tunnel_sim.vocabulary.errors import TunnelError
 
 EXAMPLES = Path(__file__).parents[3] / "benchmarks/causes/examples"
@@ -30,9 +31,10 @@ COUNTS = {"none": 1, "one": 2}
 
 
 def made(folder, **more):
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=500.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
+        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
         make(folder, seed=3, counts=COUNTS, real=False, **more)
     return folder
 
@@ -159,7 +161,7 @@ def test_coefficients_count_within_two_standard_deviations(small):
     assert found["cn_beta after"]["median_relative_error"] == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("command", [[sys.executable, "entry.py"], ["sh", "entry.sh"]])
+@pytest.mark.parametrize("command", [[sys.executable, "entry.py"], slow(["sh", "entry.sh"])])
 def test_the_examples_write_valid_answers(small, tmp_path, command):
     subprocess.run(
         [command[0], str(EXAMPLES / command[1]), str(small / CAMPAIGNS), str(tmp_path / "a")], check=True

@@ -16,7 +16,7 @@ from benchmarks.causes.neural_network import LABELS, Classifier, read_classifier
 from benchmarks.causes.neural_training import Samples, Setting, make_campaigns, read_samples, trained
 from benchmarks.causes.summaries import mirrored, summaries
 from tests.reference.rigs import rig
-from tunnel_reference import draw
+from tunnel_reference import draw, severity
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -24,9 +24,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
 @pytest.fixture(scope="module")
 def training(tmp_path_factory):
     folder = tmp_path_factory.mktemp("training")
-    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4)
+    c = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35,) * 4, sample_rate=250.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(draw, "draw_conditions", lambda _rng: c)
+        patch.setattr(severity, "_SUBSTEPS", 2)  # the motions need not be exact
         seconds = make_campaigns(folder, 2, chunk=1)
     return folder, seconds
 

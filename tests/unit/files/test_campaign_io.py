@@ -69,7 +69,7 @@ def test_what_is_written_reads_back_as_the_same_numbers(tmp_path: Path, run_form
     assert {p.suffix for p in (folder / "runs").iterdir()} == {f".{run_format}"}
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=40)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=20)
 @given(
     values=st.lists(st.floats(-limits.LARGEST_NUMBER, limits.LARGEST_NUMBER), min_size=2, max_size=20),
     suffix=st.sampled_from([".csv", ".parquet"]),

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.marks import slow
+
 HERE = Path(__file__).parent
 START = """
 import mujoco, numpy as np
@@ -84,8 +86,17 @@ for turn in range(50):
     )
 
 
-@pytest.mark.parametrize("action", ["mj_forward", "mj_step", "mj_resetData"])
-@pytest.mark.parametrize("other", [TWO_SENSORS, LONGER], ids=["sensors", "joints"])
+@pytest.mark.parametrize(
+    ("other", "action"),
+    [
+        (TWO_SENSORS, "mj_step"),
+        (LONGER, "mj_forward"),
+        (LONGER, "mj_resetData"),
+        slow(TWO_SENSORS, "mj_forward"),
+        slow(TWO_SENSORS, "mj_resetData"),
+        slow(LONGER, "mj_step"),
+    ],
+)
 def test_a_model_whose_data_has_other_sizes_is_refused(action: str, other: str, tmp_path: Path) -> None:
     # the data of the larger for the smaller: MuJoCo's own part would write beyond the smaller one's
     _run(f"large, small = {other}, {FEW}\nrefused(mujoco.{action}, small, mujoco.MjData(large))", tmp_path)

@@ -41,6 +41,16 @@ def test_a_decay_without_noise_is_found_exactly():
     assert found.values == pytest.approx([ZETA, OMEGA], rel=1e-6)
 
 
+def test_windows_near_the_noise_depart_by_as_much_as_their_information_says():
+    found = demodulate(record(np.random.default_rng(0), noise=0.1, time=np.arange(30_000) / 1000.0))
+    assert isinstance(found, Demodulated)
+    faint = found.information < 50.0
+    assert faint.sum() == 12
+    for departure in (found.logarithm, found.phase):
+        # χ² of 12 values: outside this range once in ten thousand
+        assert 1.2 < np.sum(departure[faint] ** 2 * found.information[faint]) < 41.0
+
+
 def test_the_nominal_fit_is_at_the_bound():
     rng = np.random.default_rng(1)
     bound = damped_sinusoid_bound(

@@ -23,8 +23,8 @@ from diagnosis.result import (
 )
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
-from tunnel_lab.report.drawing import THEMED
-from tunnel_lab.report.figures import diagnosis_figures
+from tunnel_lab.report.drawing import THEMED, inline_svg
+from tunnel_lab.report.figures import diagnosis_figures, waterfall_figure
 from tunnel_lab.report.page import DESCRIPTIONS
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -225,8 +225,15 @@ def test_cautions_and_the_model_behind_the_figures_are_on_the_page(page, documen
     assert 'id="cautions"' not in other
 
 
+@pytest.mark.slow
 def test_the_same_document_gives_the_same_page(page, document, data):
     assert render_report(document, data) == page
+
+
+def test_the_same_document_gives_the_same_text_and_the_same_figure_the_same_drawing(document, written):
+    assert written(document) == written(document)
+    drawings = [inline_svg(waterfall_figure(document), "steps", "The steps.") for _ in range(2)]
+    assert drawings[0] == drawings[1]
 
 
 def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):

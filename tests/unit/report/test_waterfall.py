@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.transforms import Bbox
 
+from tests.marks import slow
 from tests.unit.diagnosis_document import CAUSE, RIVAL, document
 from tests.unit.shown_numbers import assert_shows
 from tunnel_lab.report.figures import waterfall_figure
@@ -110,7 +111,7 @@ WITHOUT = [(28.45, 2.75), (28.7, 2.9), (36.0, 5.0), (60.0, 26.0), (21.85, 2.85)]
 
 @pytest.mark.parametrize("without", WITHOUT)
 @pytest.mark.parametrize("rest", [0.1345, -0.002])
-@pytest.mark.parametrize("unit", ["rad", "rad/s2"])
+@pytest.mark.parametrize("unit", ["rad", slow("rad/s2")])
 def test_nothing_lies_on_anything_else(
     given: Document, without: tuple[float, float], rest: float, unit: str
 ) -> None:

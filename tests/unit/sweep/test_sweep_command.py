@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
@@ -123,12 +122,7 @@ def test_the_summary_of_a_sweep(
     shutil.rmtree(tmp_path / "out" / "summary")
     assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
-    for part in (
-        "All cases, without effects",
-        "Error against noise",
-        "Error against coulomb friction",
-        "Time per run",
-    ):
+    for part in ("All cases, without effects", "Error against noise", "Error against coulomb friction"):
         assert part in said
     files = {path.name: path for path in (tmp_path / "out" / "summary").iterdir()}
     names = ("noise-std", "wind-speed", "coulomb-friction")
@@ -280,34 +274,6 @@ def test_what_runs_cannot_give_is_no_failure(here, tmp_path: Path) -> None:
     assert {"omega_n", "zeta"} <= {line.quantity for line in lines}
     assert not {"cn_beta", "cn_r", "sensor_zero"} & {line.quantity for line in lines}
     assert all(line.score.failures.count == 0 for line in lines)
-
-
-@pytest.mark.slow
-def test_damaged_times_are_named_and_can_be_removed(
-    sweep: Sweep, here, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Times have no checksum; a FIFO in the place of a file would block whoever opens it."""
-    run_sweep(sweep, tmp_path / "out", here)
-    first, second, *others = sorted((tmp_path / "out" / "timings").iterdir())
-    first.unlink()
-    second.unlink()
-    os.mkfifo(second)
-    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
-    assert f"{second}: cannot be read (it is not a regular file); remove it" in unwrapped(capsys)
-    second.unlink()
-    pl.DataFrame({"step": ["pack"]}).write_parquet(second)
-    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 2
-    assert "is not a table of times" in unwrapped(capsys)
-    second.unlink()
-    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
-    assert "Time per run" in capsys.readouterr().out
-    for path in others:
-        path.unlink()
-    assert main(["sweep", "--summary", str(tmp_path / "out")]) == 0
-
-
-def unwrapped(capsys: pytest.CaptureFixture[str]) -> str:
-    return capsys.readouterr().err.replace("\n", "")
 
 
 def test_a_figure_without_quantities_to_draw_is_none() -> None:

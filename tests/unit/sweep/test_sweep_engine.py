@@ -130,13 +130,13 @@ def test_stopped_or_out_of_disk_at_the_beginning_it_continues(
             begin(sweep, tmp_path / "out")
     store = begin(sweep, tmp_path / "out")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
-        ["sweep.json", "results", "records", "timings", "checksums"]
+        ["sweep.json", "results", "records", "checksums"]
     )
     assert store.finished() == []
 
 
 def test_the_folders_that_an_earlier_version_made_first_are_no_obstacle(sweep: Sweep, tmp_path: Path) -> None:
-    for name in ("results", "timings"):
+    for name in ("results", "records"):
         (tmp_path / "out" / name).mkdir(parents=True)
     begin(sweep, tmp_path / "out")
     (tmp_path / "other" / "results").mkdir(parents=True)

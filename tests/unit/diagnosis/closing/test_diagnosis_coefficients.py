@@ -29,6 +29,7 @@ from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.weigh import Weighed
 from identification.printing import estimated
+from tests.marks import slow
 from tests.unit.gap_campaigns import CN_BETA, CN_R, campaign, nominal, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
@@ -167,7 +168,7 @@ def test_normalised_runs_have_frequency_and_damping_ratio(data):
 @pytest.mark.parametrize(
     ("small", "parameters", "name"),
     [
-        ("structural_damping", {"loss_factor": 5e-4}, "cn_r"),
+        slow("structural_damping", {"loss_factor": 5e-4}, "cn_r"),
         ("gravity_stiffness", {"stiffness": 0.02}, "cn_beta"),
     ],
 )
