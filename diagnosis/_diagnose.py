@@ -22,11 +22,10 @@ from diagnosis.diagnosable import (
     refuse_undiagnosable,
 )
 from diagnosis.noise.gap import noise_remarks
-from diagnosis.own_joint import lead_words, recorded, with_law
+from diagnosis.own_joint import investigate_joint, lead_words, recorded, with_law
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress
-from diagnosis.search.lead import investigate_joint
 from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
