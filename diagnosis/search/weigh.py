@@ -106,14 +106,15 @@ def least_excess(excesses: Sequence[Array]) -> Array:
     return np.asarray(np.min([np.zeros(6), *excesses], axis=0), np.float64)
 
 
-def misfit_scale(nominal: ChannelMisfit, chance: float | Array = policy.NEEDLESS_CHI2) -> Array:
+def misfit_scale(nominal: ChannelMisfit, chance: float | Array | None = None) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
     Args:
         nominal: gives the motion.
-        chance: χ² that chance explains, by channel or common to all.
+        chance: χ² that chance explains, by channel or common to all; None: `NEEDLESS_CHI2`.
     """
-    return np.asarray(np.broadcast_to(chance, 6) + policy.MODEL_ERROR**2 * nominal.motion, np.float64)
+    by_chance = policy.NEEDLESS_CHI2 if chance is None else chance
+    return np.asarray(np.broadcast_to(by_chance, 6) + policy.MODEL_ERROR**2 * nominal.motion, np.float64)
 
 
 def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
