@@ -88,6 +88,7 @@ def test_an_unknown_gain_and_a_moving_root_are_taken(column: str, gain: float, e
         assert run.omega_n.value == pytest.approx(np.sqrt(true / 0.1), rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", [FrequencyResponse(), slow(Bayesian())], ids=lambda e: e.name)
 @pytest.mark.parametrize("kind", [slow("multisine"), "random"])
 def test_stated_deviations_are_those_of_the_estimates(kind: str, estimator: Estimator) -> None:
