@@ -33,7 +33,7 @@ def _with_friction(run: RunSettings, moment: float, reach: float) -> RunSettings
     ("moment", "reach", "spring", "speed"),
     [
         (0.004, 0.02, 16.12, 20.0),
-        (0.03, 0.005, 67.98, 0.0),
+        slow(0.03, 0.005, 67.98, 0.0),
         slow(0.4, 0.001, 67.98, 0.0),
         slow(0.05, 3e-4, 67.98, 0.0),  # two forward steps for one
         slow(0.4, 3e-5, 16.12, 20.0),  # three, and two of MuJoCo's

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from diagnosis import Diagnosis, diagnose, vocabulary
 from identification import Estimate, identify
+from tests.marks import slow
 from tests.unit.gap_campaigns import campaign
 from tunnel_sim import Campaign, TunnelError, write_campaign
 from tunnel_sim.effects import effect_from
@@ -35,7 +36,7 @@ def found(data: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Diagnosis
     return diagnose(str(folder), kinds=vocabulary(["quadratic_damping", "coulomb_friction"]))
 
 
-@pytest.mark.parametrize("given", [str, Path, lambda folder: folder / "campaign.toml"])
+@pytest.mark.parametrize("given", [str, slow(Path), lambda folder: folder / "campaign.toml"])
 def test_identify_takes_a_folder_and_a_campaign_alike(
     data: Campaign, tmp_path: Path, given: Callable[[Path], str | Path]
 ) -> None:

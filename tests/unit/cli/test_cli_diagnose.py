@@ -101,6 +101,7 @@ def test_no_gap_is_an_answer_and_no_failure(tunnel: Tunnel, gap_free: Path) -> N
     assert "Gap (× noise power)" not in out
 
 
+@pytest.mark.slow
 def test_a_withheld_effect_is_not_named(tunnel: Tunnel, dry: Path) -> None:
     status, out, _ = tunnel(
         "diagnose", dry, "--effects", "coulomb_friction,sensor_drift", "--exclude", CAUSE, "--json", "-"

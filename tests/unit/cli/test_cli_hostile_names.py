@@ -49,6 +49,7 @@ def test_identify(tunnel: Tunnel, folder: Path) -> None:
     assert r"Runs of [/c] $\bar$" in out
 
 
+@pytest.mark.slow
 def test_diagnose_with_a_report(tunnel: Tunnel, folder: Path, tmp_path: Path) -> None:
     page = tmp_path / r"$\page$.html"
     status, out, err = tunnel("diagnose", folder, "--effects", "mains_hum", "--report", page)

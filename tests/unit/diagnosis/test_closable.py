@@ -102,6 +102,7 @@ def test_its_formula_closes_held_out_runs_and_is_an_effect_of_a_file(detent, tmp
     )
 
 
+@pytest.mark.slow
 def test_the_share_of_a_single_run_is_of_what_its_stretches_show():
     alone = rig(stiffness=(21.02,), speed=(0.0,), angle=(0.35,), duration=10.0, sample_rate=500.0)
     found = closable(study_of("stops", 0.8, alone, place=0.15), significant=True)

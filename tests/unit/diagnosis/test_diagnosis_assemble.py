@@ -17,6 +17,7 @@ from diagnosis.answer.held_out import excess_base
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed
+from tests.marks import slow
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, with_blow
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
@@ -296,7 +297,7 @@ def quiet(effect=None):
     return replace(data, sensor=replace(data.sensor, noise_std=None))
 
 
-@pytest.mark.parametrize(("effect", "causes"), [(None, []), (QUADRATIC, ["quadratic_damping"])])
+@pytest.mark.parametrize(("effect", "causes"), [(None, []), slow(QUADRATIC, ["quadratic_damping"])])
 def test_records_without_noise_are_answered_with_a_status(effect, causes):
     answer = diagnose(quiet(effect), kinds=FEW)
     document = checked(answer)

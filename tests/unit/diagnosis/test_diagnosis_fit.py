@@ -57,6 +57,7 @@ def test_without_noise_the_truth_is_exact():
     assert found.total < 0.1  # of 7500 residuals in noise standard deviations
 
 
+@pytest.mark.slow
 def test_intervals_are_as_wide_as_the_scatter():
     pulls = []
     for seed in range(30):

@@ -57,7 +57,7 @@ def of_three():
     [
         ("coulomb_friction", {"friction_moment": 0.002}),
         slow("nonlinear_yaw_moment", {"coefficient": -0.5}),
-        ("rod_flexibility", {"compliance": 8e-5, "inertia_share": 0.1}),
+        slow("rod_flexibility", {"compliance": 8e-5, "inertia_share": 0.1}),
         slow("sensor_clipping", {"limit": 0.33}),
     ],
 )

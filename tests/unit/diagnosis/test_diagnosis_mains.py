@@ -58,6 +58,7 @@ def test_a_hum_is_found_and_taken_out_whole(frequency):
     assert find_hum(nominal(cleaned)) is None
 
 
+@pytest.mark.slow
 def test_the_amplitude_s_error_is_as_stated():
     pulls = []
     for seed in range(20):

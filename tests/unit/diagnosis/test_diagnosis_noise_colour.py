@@ -78,7 +78,7 @@ def late_step(count, rng):
     return 3.0 * NOISE * (np.arange(count) > rng.uniform(0.3, 0.7) * count)
 
 
-@pytest.mark.parametrize("zero", [random_walk, late_step])
+@pytest.mark.parametrize("zero", [slow(random_walk), late_step])
 def test_a_zero_that_wanders_is_a_gap_and_no_colour(zero):
     """Even where noise of its spectrum would close the gap."""
     data = with_zero(campaign(duration=20.0), zero)
@@ -204,6 +204,7 @@ def test_a_gap_beside_white_noise_leaves_it_white(data):
     assert noise.colour is None
 
 
+@pytest.mark.slow
 def test_the_spectrum_and_its_uncertainty_are_those_of_the_noise():
     """Truth: the spectrum of AR(1) noise beside white noise, from its formula."""
     size, pole = 3.0, 0.9

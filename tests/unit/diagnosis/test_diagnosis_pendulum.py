@@ -190,6 +190,7 @@ def test_a_long_rest_is_left_out():
     assert (whole.runs, none) == (short.runs, ())
 
 
+@pytest.mark.slow
 def test_gravity_keeps_its_sign():
     """Half a turn away gravity of the other sign swings a body alike; the fits of this record end there first."""
     data = pendulum(2.2, 19.0, quadratic=0.0)

@@ -186,6 +186,7 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
     assert answer.effects == ("buffeting", "cubic_stiffness")
 
 
+@pytest.mark.slow
 def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     """Least squares takes the motion that turbulence drives for white noise, and misplaces them."""
     base = nominal(buffeted(campaign(effect_from("dropped_samples", {"lost_time": 0.006})), 0.01, 4.0))

@@ -128,6 +128,7 @@ def test_without_springs_and_sizes_no_density_is_needed():
     assert [run.omega_n.value for run in found.runs] == [r.omega_n.value for r in identify(bare(1.2)).runs]
 
 
+@pytest.mark.slow
 def test_a_lag_is_found_where_no_sizes_are_stated():
     lag = effect_from("unsteady_aero_lag", {"lag": 2.0})
     sized = gap_campaigns.campaign(lag, duration=6.0)

@@ -8,6 +8,7 @@ import pytest
 from diagnosis.answer.other_motions import second_modes
 from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.search.investigate import investigate
+from tests.marks import slow
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -57,7 +58,7 @@ def two_modes(derivative, share):
     return Campaign("two modes", RigProperties(), SensorProperties(100.0, quantity=quantity), tuple(runs))
 
 
-@pytest.mark.parametrize("derivative", [0, 1, 2])
+@pytest.mark.parametrize("derivative", [0, slow(1), slow(2)])
 @pytest.mark.parametrize(
     "share", [0.05, 0.5]
 )  # with the larger one the nominal model misses the motion itself

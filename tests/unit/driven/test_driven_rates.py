@@ -83,6 +83,7 @@ def test_the_rig_is_identified_from_rates(estimator: str, hold: str) -> None:
         assert found.std < 0.02 * truth
 
 
+@pytest.mark.slow
 def test_dry_friction_is_named_on_rates() -> None:
     kinds = [
         effect_class(n) for n in ("coulomb_friction", "quadratic_damping", "cubic_stiffness", "input_delay")

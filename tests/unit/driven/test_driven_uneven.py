@@ -65,6 +65,7 @@ def test_a_linear_rig_has_no_gap() -> None:
     assert diagnose(campaign(0.0)).causes == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.01])
 def test_dry_friction_is_named(friction: float) -> None:
     kinds = [

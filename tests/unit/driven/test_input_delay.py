@@ -87,7 +87,8 @@ def test_it_is_not_named_where_there_is_none(cubic: float) -> None:
     assert diagnose(campaign(cubic=cubic)).causes == (("cubic_stiffness",) if cubic else ())
 
 
-@pytest.mark.parametrize("kinds", [FEW, slow(ALL_EFFECTS)], ids=["few", "all"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kinds", [FEW, ALL_EFFECTS], ids=["few", "all"])
 def test_a_lag_of_the_sensor_far_above_the_band_is_a_delay_of_the_input(
     kinds: Sequence[type[Effect]],
 ) -> None:

@@ -110,6 +110,7 @@ def test_a_departing_model_is_flagged_and_the_intervals_widened(stated, honest):
     )
 
 
+@pytest.mark.slow
 def test_a_departing_model_with_a_zero_in_every_run_is_as_uncertain_as_with_one():
     curved = drifting_stiffness(campaign(noise=5e-4, rng=np.random.default_rng(6)), -2e-3)
     shift = np.random.default_rng(7)

@@ -8,6 +8,7 @@ import pytest
 from identification import NoiseLevel, identify
 from identification.estimators.hilbert import Hilbert
 from identification.signal.run_fit import ResidualCheck
+from tests.marks import slow
 from tests.reference.free_decays import TWELVE, Setting, campaign
 from tunnel_sim.vocabulary.record import Record
 
@@ -64,7 +65,7 @@ def test_deviations_are_raised_to_those_of_least_squares_where_the_model_departs
     assert correlation == pytest.approx(0.5 / 3.0)
 
 
-@pytest.mark.parametrize("name", ["matrix_pencil", "log_decrement", "filter_error", "bayesian"])
+@pytest.mark.parametrize("name", ["matrix_pencil", "log_decrement", slow("filter_error"), slow("bayesian")])
 def test_runs_that_contradict_each_other_widen_the_coefficients(name):
     data = campaign(TWELVE[:6], noise=5e-4, rng=np.random.default_rng(3))
     # One run of a spring half a percent stiffer than stated: its own deviations cannot show it.

@@ -16,6 +16,7 @@ from identification.estimate import Status
 from identification.examination.examine import examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.status import Outcome, Remark
+from tests.marks import slow
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
@@ -82,7 +83,7 @@ def test_other_runs_are_identified_without_the_limit_cycle() -> None:
     assert Status.LIMIT_CYCLE in estimate.statuses
 
 
-@pytest.mark.parametrize("start", [0.01, SETTLED])
+@pytest.mark.parametrize("start", [slow(0.01), SETTLED])
 def test_diagnosis_of_limit_cycles_alone_is_unknown_and_says_so(start: float) -> None:
     answer = diagnose(campaign([excited(start)]))
     assert answer.causes == ("unknown",)

@@ -21,6 +21,7 @@ import pytest
 import scipy.io
 import xlsxwriter
 
+from tests.marks import slow
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.conditions import ImportChoices
@@ -211,7 +212,7 @@ def test_the_size_of_a_mat_file_is_that_of_all_its_arrays(
         read_tables(content, "three.mat")
 
 
-@pytest.mark.parametrize("name", ["log.h5", "log.mat"])
+@pytest.mark.parametrize("name", ["log.h5", slow("log.mat")])
 def test_a_damaged_heap_in_which_hdf5_goes_round_for_ever_is_one_line(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

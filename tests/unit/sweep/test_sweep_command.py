@@ -14,6 +14,7 @@ from typing import Any
 import polars as pl
 import pytest
 
+from tests.marks import slow
 from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
@@ -205,7 +206,12 @@ def test_a_figure_has_a_column_of_panels_for_each_quantity() -> None:
 
 @pytest.mark.parametrize(
     "noise",
-    [(3e-4, 1e-3, 2e-3), (1e-4, 2e-3), (1e-5, 2e-4), (0.0, 1e-3), (1.25e-4, 2.5e-4, 5e-4), (2e-6, 1e-5)],
+    [
+        (3e-4, 1e-3, 2e-3),
+        (0.0, 1e-3),
+        (2e-6, 1e-5),
+        *map(slow, ((1e-4, 2e-3), (1e-5, 2e-4), (1.25e-4, 2.5e-4, 5e-4))),
+    ],
 )
 @styled  # as a figure is saved
 def test_labels_of_the_axes_do_not_touch(noise: tuple[float, ...]) -> None:

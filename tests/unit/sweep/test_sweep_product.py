@@ -96,6 +96,7 @@ def test_a_case_can_be_simulated_by_itself(sweep: Sweep, tmp_path: Path) -> None
         assert np.array_equal(run.record.yaw_rad, np.array(yaw))
 
 
+@pytest.mark.slow
 def test_threads_and_company_leave_the_bits_alone(tmp_path: Path, sweep: Sweep) -> None:
     together = variant(tmp_path, ("cases_per_shard = 1", "cases_per_shard = 12"))
     one, two = (run_shard(together.to_json(), 0, nthread=n) for n in (1, 2))
