@@ -162,8 +162,8 @@ DECIDED_FROM = 0.5
 #: Probability of the smallest set of answers that is stated, and of what the likely answers have in common.
 #: Convention.
 CREDIBLE = 0.9
-#: Share below which a thing is not worth a line: of the probability, for a rival answer (tuned) or an effect; of
-#: the excess, for a band, or for a second harmonic that shows a shifted centre. Judgement.
+#: Share below which a thing is not worth a line: of the probability, for a rival answer (tuned); of the
+#: excess, for a band, or for a second harmonic that shows a shifted centre. Judgement.
 WORTH_NAMING = 0.05
 #: Share of a coefficient's change that counts as its standard deviation where another form may change it as much:
 #: on freeing the forms, by a small cause that is not named, and by the answer where its cause is unknown (0028).

@@ -16,7 +16,7 @@ from diagnosis.closure import (
     patch_table,
     rms_shown,
 )
-from diagnosis.policy import CREDIBLE, DECIDED_FROM, WORTH_NAMING
+from diagnosis.policy import CREDIBLE, DECIDED_FROM
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 from identification.status import Remark
 from tunnel_sim.effects import known_effects
@@ -220,10 +220,14 @@ def misfit_text(document: Document, excess: float) -> str:
     return times if misfit is None else f"{rms_shown(misfit, excess)} ({times})"
 
 
+#: Answers and effects less probable than this are counted, or left out, where they are listed.
+LISTED = 0.01
+
+
 def inclusion_line(document: Document) -> str:
-    """The effects that may be among the causes, most probable first; empty where none reaches `WORTH_NAMING`."""
+    """The effects that may be among the causes, most probable first; empty where none reaches `LISTED`."""
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
-    shown = [f"{name} {probability(value)}" for name, value in found if value >= WORTH_NAMING]
+    shown = [f"{name} {probability(value)}" for name, value in found if value >= LISTED]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 

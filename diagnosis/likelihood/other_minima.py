@@ -46,6 +46,8 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
         many shallow minima is so by chance.
     """
     found = _elsewhere(fitted)
+    if not found:
+        return fitted
     best = fitted
     for one in sorted(found, key=lambda one: one.total)[:_REFITTED]:
         other = try_fit(fitted.problem, one.point, tolerance=tolerance)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.policy import WORTH_NAMING
-from diagnosis.printing import excess_std, plain, probability
+from diagnosis.printing import LISTED, excess_std, plain, probability
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
@@ -183,7 +182,7 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 @styled
 def candidates_figure(document: Document) -> Figure | None:
     """The answers that are not improbable; None where there are fewer than two, which words say better."""
-    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= WORTH_NAMING]
+    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED]
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]

@@ -9,8 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.policy import WORTH_NAMING
-from diagnosis.printing import misfit_text, noise_powers, plain, probability, run_words, share
+from diagnosis.printing import LISTED, misfit_text, noise_powers, plain, probability, run_words, share
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -248,7 +247,7 @@ def others(document: Document) -> str:
 
 
 def _listed(document: Document) -> int:
-    probable = [c for c in document["candidates"] if c["probability"] >= WORTH_NAMING]
+    probable = [c for c in document["candidates"] if c["probability"] >= LISTED]
     return max(3, len(probable))
 
 

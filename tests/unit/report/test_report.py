@@ -184,7 +184,7 @@ def test_what_could_be_closed_is_on_the_page_only_where_something_remains(page, 
     text = Page(page).text
     assert "What could be closed: A moment." in text
     assert "a moment of the angle alone 41.7 ± 2.3 %" in text
-    assert "0.0 ± 100.0 %" in text  # worse than nothing, and beyond any meaning
+    assert "not determined" in text  # worse than nothing, and beyond any meaning
     explained = document | {"closable": None, "maps": None}
     assert "What could be closed" not in written(explained)
     page = written(explained | {"rest": {"significant": False, "p_value": 0.4321, "material": False}})
