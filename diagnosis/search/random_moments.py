@@ -230,6 +230,11 @@ def _settled(
     data, known, top = nominal.problem.data, best.fit, best
     windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
     reached: dict[tuple[str, ...], Hypothesis] = {}
+
+    def cost(hypothesis: Hypothesis) -> float:
+        process = _likeliest(random_moments(_seen_in(hypothesis, data).fit, spectra))
+        return np.inf if process is None else process.cost + NEEDLESS_CHI2 * len(hypothesis.effects)
+
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
             process = _likeliest(random_moments(known, spectra))
@@ -251,13 +256,9 @@ def _settled(
             reached[top.names] = top
             best = _seen_in(top, data)
             known = fit(best.fit.problem, best.fit.point)
-
-    # the rounds have not ended: the likeliest of the sets that they reached
-    def cost(hypothesis: Hypothesis) -> float:
-        process = _likeliest(random_moments(_seen_in(hypothesis, data).fit, spectra))
-        return np.inf if process is None else process.cost + NEEDLESS_CHI2 * len(hypothesis.effects)
-
-    return min(reached.values(), key=cost) if len(reached) > 1 else top
+        if len(reached) > 1:  # to and fro between sets
+            top = min(reached.values(), key=cost)
+    return top
 
 
 def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
