@@ -11,6 +11,7 @@ from law_cases import RIG
 from scipy.integrate import solve_ivp
 
 from tunnel_sim.effects import effect_from
+from tunnel_sim.engine.simulate import simulate_motions
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.plan import AeroDerivatives
@@ -49,12 +50,16 @@ def centre(time: Array, angle: Array) -> Array:
     return means - means.mean()
 
 
-def modelled(after_effect: float, release: float = RELEASE) -> Array:
-    settings = RunSettings(
+def settings(after_effect: float, release: float = RELEASE) -> RunSettings:
+    stated = RunSettings(
         SPRING, AeroDerivatives(0.0, 0.0), INERTIA, 0.0, release_angle=release, duration=LENGTH, timestep=1e-3
     )
     effect = effect_from("structural_damping", {"loss_factor": LOSS, "after_effect": after_effect})
-    return forward_motion(RIG, effect.on_run(settings, settings, None), RATE).angle
+    return effect.on_run(stated, stated, None)
+
+
+def modelled(after_effect: float, release: float = RELEASE) -> Array:
+    return forward_motion(RIG, settings(after_effect, release), RATE).angle
 
 
 def test_the_centre_creeps_as_with_elements_of_all_relaxation_times():
@@ -73,3 +78,9 @@ def test_the_centre_creeps_as_with_elements_of_all_relaxation_times():
 def test_it_is_in_proportion_to_the_release():
     one, other = (modelled(1.0, sign * RELEASE) for sign in (1.0, -1.0))
     np.testing.assert_allclose(one, -other, atol=1e-12)
+
+
+def test_mujoco_integrates_the_same():
+    (found,) = simulate_motions(RIG, [settings(1.0)], RATE)
+    np.testing.assert_allclose(found.angle, modelled(1.0), atol=1e-8)
+    assert np.max(np.abs(found.angle - modelled(0.0))) > 1e-3

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, cos, exp, isclose, log, pi, sqrt
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Law
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.expression import parse
@@ -348,16 +348,13 @@ class StructuralDamping(Effect):
         "Nowick & Berry, Anelastic Relaxation in Crystalline Solids, Academic Press 1972",
     )
     example = (0.02,)
+    law_terms = ("loss_factor",)
 
     loss_factor: float = parameter("η", "1", "loss factor", scale=0.005, lower=-1.0, upper=1.0, fit_lower=0.0)
     after_effect: float = parameter(
         "m", "1", "after-effect of the release over that of a loss factor common to all frequencies",
         scale=1.0, lower=-10.0, upper=10.0, form=True,
     )  # fmt: skip
-
-    def law(self) -> Law:
-        """The loss; the after-effect is a moment in time."""
-        return {"loss_factor": self.loss_factor}
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Add the loss and, where the body was held at its release angle, the spring's after-effect.
