@@ -273,7 +273,10 @@ def closable_table(document: Mapping[str, Any]) -> TextTable:
             percent(max(one.closed, 0.0), one.std) if one.determined else "not determined",
             one.held_out,
         )
-        for one in (Ceiling(**given) for given in found["ceilings"])
+        for one in (
+            Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
+            for given in found["ceilings"]
+        )
     ]
     title = "Share of what is left that could be closed at most"
     return TextTable(title, ("by", "share", "held out"), tuple(rows), ("share",))

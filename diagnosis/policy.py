@@ -22,13 +22,15 @@ LOCAL_FALSE_ALARM_RATE = 0.01
 #: below what could be told apart.
 AS_MUCH = 0.02
 #: Share that counts as most of a thing: of the excess in a stated interval, or in one run; of a range, from which
-#: an interval locates nothing; of what laws of single runs close, and what fits to single runs or a form close; of
-#: a line that the other half of a run predicts; of an unstated spring that gravity cancels (made with Silverbox in
-#: sight, 0029). Judgement: the text says four fifths.
+#: an interval locates nothing; of what laws of single runs, and fits to single runs, close; of a line that the
+#: other half of a run predicts; of an unstated spring that gravity cancels (made with Silverbox in sight, 0029).
+#: Judgement: the text says four fifths. A form counts if χ² would rise by more than the rest, a fifth of the
+#: excess, without it: that number was tuned (0008).
 MOST = 0.8
 #: Share that counts as the greater part: of the excess, that makes a band its place (half of that: a line, with
 #: others); of what one free decay leaves, that two may leave for a second mode to be named; of what a random
-#: moment is to explain, that a law of the wind predicts on held-out runs. By the word.
+#: moment is to explain, that a law of the wind predicts on held-out runs; of what is left, to which the share that
+#: could be closed must be known. By the word.
 GREATER_PART = 0.5
 #: Share too small to count: of the largest excess, in a run that is not named; of a record, that holds half of a
 #: blow; of a gap, that effects leave where noise may not be all of it (skipped samples that closed 98 % had been
@@ -181,6 +183,3 @@ FEW_RUNS = 3
 #: A caution is given where the stated noise is wrong by this factor. Judgement: rounding to one digit reaches half
 #: of it.
 NOISE_CONTRADICTED = 3.0
-
-
-# ---- What no effect explains (0023) ---------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Other minima of χ²: where a fit's parameters may lie instead, and what they add to its covariance.
+"""Other minima of χ²: where a fit's parameters may lie instead, and what they add to its stated covariance.
 
 An effect names other values that change the slow motion alike (`Effect.alike`). χ² may have a narrow minimum at any
 of them, as at every frequency of a rod's ringing, so that Gauss–Newton steps from one lead to no other.
@@ -42,8 +42,8 @@ def deepest(fitted: Fit, *, tolerance: float = 1e-4) -> Fit:
         tolerance: share of χ² by which a step must lower it for a fit to go on, as in `fit`.
 
     Returns:
-        The fit of least χ². Its covariance includes the other minima, each by its likelihood, since the deepest of
-        many shallow minima is so by chance.
+        The fit of least χ². Its stated covariance includes the other minima, each by its likelihood, since the
+        deepest of many shallow minima is so by chance.
     """
     found = _elsewhere(fitted)
     if not found:
@@ -99,7 +99,7 @@ def _by_linear_theory(fitted: Fit, point: Point, residuals: list[Array], held: l
 
 
 def _with_spread(fitted: Fit, found: list[_Elsewhere]) -> Fit:
-    """The fit whose covariance includes how far likely other minima are away.
+    """The fit whose stated covariance includes how far likely other minima are away.
 
     What χ² rises there as the curvature of the fit's own minimum says is in the covariance already.
     """

@@ -158,6 +158,10 @@ def main() -> None:
     reader.add_argument("folders", type=Path, nargs="+", help="campaigns, or sets made by tunnel blind make")
     reader.add_argument("--count", type=int, default=1000, help="campaigns of each folder, from the first")
     given = reader.parse_args()
+    if empty := [str(folder) for folder in given.folders if not any(folder.rglob("campaign.toml"))]:
+        reader.error(
+            f"no campaign.toml in {', '.join(empty)}; name a campaign, or a set of tunnel blind make"
+        )
     for line in table(given.folders, given.count):
         print(line, flush=True)
 
