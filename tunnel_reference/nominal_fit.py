@@ -36,6 +36,7 @@ class NominalFit:
     residual: Array
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a step to a motion that grows without bound is taken back
 def fit_nominal(c: Conditions, readings: Array) -> NominalFit:
     """Fit Izz, Cr, Cnβ, Cnr, the zero and the initial state of every run to the readings.
 

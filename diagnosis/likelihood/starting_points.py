@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, damped_step, normal_equations
+from diagnosis.likelihood.least_squares import Fit, clip, damped_step, normal_equations
 from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
 from diagnosis.likelihood.per_run import PerRunParameters, excited, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
@@ -276,7 +276,8 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         if moved is not None and scaled is not None:
             part = start[scaled] / sizes[scaled]
             point.common[: moved.common.size] += part * (moved.common - base.point.common)
-            point = Point(point.common, point.release + part * (moved.release - base.point.release))
+            release = point.release + part * (moved.release - base.point.release)
+            point = clip(problem, Point(point.common, release))
         place = None if scaled is None else base.point.common.size + scaled
         after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
         found.append(StartingPoint(problem, point, drop, misfit(base, after).excess, place))

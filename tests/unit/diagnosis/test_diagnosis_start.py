@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.least_squares import fit, fit_at
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.residuals import residual_spectra, resonance, shedding_line
@@ -102,6 +102,20 @@ def test_the_predicted_drop_of_a_small_effect_is_the_drop_it_brings(name):
     severity = lead.point.common[lead.problem.names.index(key)]
     assert severity == pytest.approx(next(iter(values.values())), rel=0.25)
     assert abs(found.value(key) - next(iter(values.values()))) < 4.0 * found.std(key)
+
+
+def test_a_lag_moves_no_other_parameter_beyond_its_bounds():
+    """What they absorb grows with the lag, beyond where friction would be negative."""
+    base = nominal(campaign(effect_from("unsteady_aero_lag", {"lag": -1.0})))
+    start = starting_points(base, effect_class("coulomb_friction"))[0]
+    common = start.point.common.copy()
+    common[start.problem.names.index("coulomb_friction.friction_moment")] = 1e-3
+    beside = fit_at(start.problem, replace(start.point, common=common))
+    found = starting_points(beside, effect_class("unsteady_aero_lag"))
+    assert found
+    for one in found:
+        lower, upper = one.problem.bounds
+        assert np.all((lower <= one.point.common) & (one.point.common <= upper))
 
 
 def test_what_these_runs_cannot_show_has_no_lead():
