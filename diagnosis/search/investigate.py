@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -275,7 +275,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     weighed = _weighed(found, found.nominal)
     best = _best(found, weighed) if found.campaign.unrestrained else None
     if best is not None and best.fit.chance < 1.0:
-        again = _weigh_by_moment(found, best, fitted, clock, explained=weighed[0].effects != UNKNOWN)
+        again = _weigh_by_moment(found, weighed, fitted, clock)
         if again is not None:
             return again
     if weighed[0].effects != UNKNOWN:
@@ -289,26 +289,32 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
 
 
 def _weigh_by_moment(
-    found: Study, best: Hypothesis, kinds: Sequence[type[Effect]], clock: _Clock, *, explained: bool
+    found: Study, weighed: Sequence[Weighed], kinds: Sequence[type[Effect]], clock: _Clock
 ) -> Study | None:
     """The study of a body that nothing holds, whose sets are weighed by the moment that they leave.
 
-    Every small error of the moment moves the body for good, so that its angle departs further and further.
+    Every small error of the moment moves the body for good, so that its angle departs further and further. The
+    random moment that counts as noise is what the likeliest set leaves whose moment is small beside the one that
+    the nominal model misses.
 
     Args:
-        best: the set that leaves the random moment, which from then on is noise.
-        explained: whether it also explains the angle.
+        weighed: answers by the angle.
 
     Returns:
-        None where it does not, and that moment is not small beside the one that the nominal model misses.
+        None where no set explains the angle, and none leaves a small moment.
     """
     data = found.nominal.problem.data
-    try:
-        base = fit(Problem(by_moment(best.fit)), found.nominal.point)
-    except (FitError, np.linalg.LinAlgError):
+    bases = []  # the nominal model in the noise that each set leaves
+    for answer in weighed:
+        left = found.hypothesis(answer.effects)
+        if left is None or answer.probability < policy.WORTH_NAMING:
+            continue
+        with suppress(FitError, np.linalg.LinAlgError):
+            bases.append(fit(Problem(by_moment(left.fit)), found.nominal.point))
+    small = [base for base in bases if policy.MOMENT_LEFT * (1.0 + base.excess) >= 1.0]
+    if not bases or (not small and weighed[0].effects == UNKNOWN):
         return None
-    if not explained and policy.MOMENT_LEFT * (1.0 + base.excess) < 1.0:
-        return None
+    base = (small or bases)[0]
 
     def whole(hypothesis: Hypothesis) -> Hypothesis | None:
         fitted = try_fit(replace(hypothesis.fit.problem, data=data), hypothesis.fit.point)

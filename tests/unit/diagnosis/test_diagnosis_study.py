@@ -12,6 +12,7 @@ import pytest
 from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.mains import Hum
 from diagnosis.policy import AS_MUCH
+from diagnosis.search import investigate as investigation
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import _noise_explains, _polished, _weighed
 from diagnosis.search.random_moments import RandomAnswer
@@ -144,3 +145,39 @@ def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_its
     base = replace(study.nominal, residuals=residuals)
     found = _weighed(replace(study, hum=hum, hypotheses=()), base)
     assert found[0].effects == (() if alone else UNKNOWN)
+
+
+@pytest.mark.parametrize(
+    ("first", "powers", "taken"),
+    [
+        ("a", {"a": 40.0, "b": 0.1}, "b"),  # the first leaves more than the nominal model misses
+        ("a", {"a": 0.1, "b": 0.05}, "a"),
+        ("a", {"a": 40.0, "b": 9.0}, "a"),  # it explains the angle
+        ("unknown", {"a": 40.0, "b": 9.0}, None),
+    ],
+)
+def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leaves_little(
+    monkeypatch, first, powers, taken
+):
+    """The power that each set leaves is given over that which the nominal model misses."""
+
+    def fitted(problem, _):
+        return SimpleNamespace(name=problem, excess=1.0 / powers[problem] - 1.0)
+
+    def grown(base, *_):
+        raise LookupError(base.name)
+
+    monkeypatch.setattr(investigation, "by_moment", lambda fit: fit)
+    monkeypatch.setattr(investigation, "Problem", lambda data: data)
+    monkeypatch.setattr(investigation, "fit", fitted)
+    monkeypatch.setattr(investigation, "grow", grown)
+    nominal = SimpleNamespace(problem=SimpleNamespace(data=None), point=None)
+    sets = {(name,): SimpleNamespace(fit=name) for name in powers}
+    found = SimpleNamespace(nominal=nominal, hypothesis=sets.get)
+    weighed = [Weighed((name,), 0.1, 0.3) for name in dict.fromkeys((first, "a", "b"))]
+    clock = investigation._Clock(None)
+    if taken is None:
+        assert investigation._weigh_by_moment(found, weighed, [], clock) is None
+    else:
+        with pytest.raises(LookupError, match=taken):
+            investigation._weigh_by_moment(found, weighed, [], clock)
