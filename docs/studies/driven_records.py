@@ -1,8 +1,8 @@
 """Diagnose measured driven records, and predict motion that no fit has seen.
 
 ``python -m docs.studies.driven_records --data FOLDER [--answers FOLDER]`` writes ``docs/driven-records.md`` and its
-figure. The folder of data holds the campaigns ``silverbox`` and ``emps``. Diagnoses that are in the folder of answers
-already, as JSON, are not made again.
+figure. The folder of data holds the campaigns ``silverbox`` and ``emps``. Diagnoses that are in the folder of
+answers already, as JSON, are not made again.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def gaps(campaign: Campaign, readings: Mapping[str, Array] | None = None) -> Cam
 
 
 def decays(campaign: Campaign) -> tuple[Array, Array]:
-    """Natural frequency (rad/s) and damping ratio of every run, shape (runs, 2); largest swing, shape (runs,), rad."""
+    """Natural frequency (rad/s) and damping ratio by run, shape (runs, 2); largest swing, shape (runs,), rad."""
     rows, swings = [], []
     for run, found in zip(campaign.runs, identify(campaign).runs, strict=True):
         assert found.omega_n is not None
