@@ -160,15 +160,9 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     windows = windows_of(run.record)
     if windows is None:
         return run, None
-    # Whether the amplitude is constant along the whole record, by the upper end of its change's interval.
-    slope, std = _slope(windows.time, windows.amplitude)
-    length = float(np.ptp(windows.time))
-    cycles = length * float(np.median(windows.frequency))
-    changes = (abs(slope) + policy.MISFIT_DEVIATIONS * std) * length
-    if (
-        cycles >= policy.LEAST_STEADY_CYCLES
-        and max(changes, np.log(windows.amplitude).std()) < policy.STEADY_CHANGE
-    ):
+    if _is_steady(windows, 0):
+        slope, std = _slope(windows.time, windows.amplitude)
+        length = float(np.ptp(windows.time))
         amplitude, frequency = float(np.median(windows.amplitude)), float(np.median(windows.frequency))
         what = (
             f"steady oscillation with the wind on, self-excited or forced: {significant(amplitude, 2)} rad at "
@@ -185,15 +179,17 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     first, last = (
         float(np.mean(part**2)) for part in (windows.amplitude[:quarter], windows.amplitude[-quarter:])
     )
-    if not fdtrc(2 * quarter, 2 * quarter, last / first) < policy.REFUSAL_RATE:
-        return run, None
-    # First window of the limit cycle; None where the amplitude still grows at the end.
+    grows = bool(fdtrc(2 * quarter, 2 * quarter, last / first) < policy.REFUSAL_RATE)
+    # First window of the limit cycle; None where the amplitude still grows at the end. A record that begins late
+    # has a short growth, and is known by an amplitude that stays for the greater part of it.
     below = np.flatnonzero(windows.amplitude < policy.SETTLED_SHARE * _last(windows.amplitude))
     start, settled = int(below[-1]) + 1 if below.size else 0, None
     if windows.time.size - start >= policy.LEAST_GROWTH_WINDOWS:
         slope, std = _slope(windows.time[start:], windows.amplitude[start:])
         if slope + policy.MISFIT_DEVIATIONS * std < float(windows.growth_rate[:start].max(initial=0.0)):
             settled = start
+    if not grows and not (0 < start < windows.time.size // 2 and _is_steady(windows, start)):
+        return run, None
     limit = np.inf if settled is None else policy.LINEAR_SHARE * _last(windows.amplitude)
     # From the smallest amplitude to the last window below the limit, rad.
     above = np.flatnonzero(windows.amplitude > limit)
@@ -209,6 +205,17 @@ def _examined(run: Run) -> tuple[Run | None, Remark | None]:
     time = run.record.time_s - run.record.time_s[0]
     inside = (time >= windows.time[part][0] - half) & (time <= windows.time[part][-1] + half)
     return replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside])), remark
+
+
+def _is_steady(windows: AmplitudeWindows, start: int) -> bool:
+    """Whether the amplitude is constant from a window on, by the upper end of its change's interval."""
+    time, amplitude = windows.time[start:], windows.amplitude[start:]
+    length = float(np.ptp(time))
+    if length * float(np.median(windows.frequency[start:])) < policy.LEAST_STEADY_CYCLES:
+        return False
+    slope, std = _slope(time, amplitude)
+    changes = (abs(slope) + policy.MISFIT_DEVIATIONS * std) * length
+    return bool(max(changes, np.log(amplitude).std()) < policy.STEADY_CHANGE)
 
 
 def windows_of(record: Record) -> AmplitudeWindows | None:

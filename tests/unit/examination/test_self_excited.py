@@ -60,6 +60,15 @@ def test_four_windows_of_linear_growth_are_enough() -> None:
     assert sum(np.array(remark.figures["amplitude_rad"]) < 0.3 * SETTLED) == 4
 
 
+@pytest.mark.parametrize("start", [0.1, 0.2])
+def test_a_record_that_begins_late_is_known_by_an_amplitude_that_stays(start: float) -> None:
+    """Most of the record is the limit cycle, so that its last quarter is hardly larger than its first one."""
+    (remark,) = examine(campaign([excited(start, 60.0)])).remarks
+    assert remark.outcome is Outcome.LEFT_OUT
+    assert in_limit_cycle(remark.figures)
+    assert remark.figures["settled_rad"] == pytest.approx(SETTLED, rel=0.02)
+
+
 def test_damping_is_that_of_the_linear_growth() -> None:
     estimate = identify(campaign([excited(0.01)]))
     found = estimate.runs[0].zeta
