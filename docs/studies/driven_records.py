@@ -19,12 +19,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.answer.held_out import fit_seen, one_more
+from diagnosis.answer.held_out import fit_seen
 from diagnosis.diagnosable import choose
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.other_minima import deepest
 from diagnosis.likelihood.problem import Point
-from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search.investigate import nominal_study
 from identification import identify
 from tunnel_lab.plotting.style import save
@@ -39,8 +37,13 @@ ARROW = "arrow"
 _QUIET = 30  # samples over which an input counts as quiet, where its standard deviation is below
 _SILENCE = 1.5e-3  # V
 _DECAY = 98  # samples
-PUBLISHED = {"yaw_inertia": 95.1, "mechanical_damping": 203.5, "friction_moment": 20.4, "moment_offset": -3.2}
-"""Of EMPS, in kg, N s/m, N and N (Janot, Gautier and Brunot 2019)."""
+PUBLISHED = {
+    "yaw_inertia": (95.1, "kg"),
+    "mechanical_damping": (203.5, "N s/m"),
+    "friction_moment": (20.4, "N"),
+    "moment_offset": (3.2, "N"),
+}
+"""Of EMPS, values and units (Janot, Gautier and Brunot 2019, whose offset has the other sign)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,33 +59,30 @@ class Predicted:
     error: Mapping[str, Array]
 
 
-def fitted(campaign: Campaign, names: Sequence[str]) -> tuple[Fit, Fit]:
-    """The nominal model, and that with some effects, fitted to all runs.
+def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
+    """The nominal model, and that with the effects of a diagnosis' likeliest answer, fitted to all runs.
 
     Args:
-        names: of the effects; the one by which linear theory predicts the greatest drop of χ² comes first.
+        document: of the diagnosis; the fit of its effects starts from its parameters.
     """
-    kinds = vocabulary(names)
+    likeliest = document["candidates"][0]
+    parameters = {  # those of a single effect have no prefix
+        name if "." in name else f"{likeliest['effect']}.{name}": given
+        for name, given in likeliest["parameters"].items()
+    }
+    kinds = vocabulary(list(dict.fromkeys(name.split(".")[0] for name in parameters)))
     with answering_with(kinds):
         chosen = choose(campaign, kinds)
-        nominal = nominal_study(chosen.campaign, chosen.kinds).nominal
-        found: Fit | None = nominal
-        left = list(chosen.kinds)
-        while left and found is not None:
-            drops = [starting_points(found, kind)[0].predicted_drop for kind in left]
-            found = one_more(found, left.pop(int(np.argmax(drops))))
-        if found is None:
-            raise RuntimeError(f"{' + '.join(names)} cannot be fitted to {campaign.name}")
-        return nominal, _with_free_forms(found)
-
-
-def _with_free_forms(textbook: Fit) -> Fit:
-    kinds = textbook.problem.effects
-    problem = replace(textbook.problem, free_forms=tuple(kind.name for kind in kinds))
-    values = {f"{kind.name}.{info.name}": info.default for kind in kinds for info in kind.parameters()}
-    values |= dict(zip(textbook.problem.names, textbook.point.common.tolist(), strict=True))
-    start = np.array([values[name] for name in problem.names])
-    return deepest(fit(problem, Point(start, textbook.point.release)))
+        study = nominal_study(chosen.campaign, chosen.kinds)
+    nominal = study.nominal
+    infos = {f"{kind.name}.{info.name}": info for kind in kinds for info in kind.parameters()}
+    freed = {name.split(".")[0] for name in parameters if infos[name].form}
+    problem = replace(nominal.problem, effects=chosen.kinds, free_forms=tuple(sorted(freed)))
+    values = dict(zip(nominal.problem.names, nominal.point.common.tolist(), strict=True))
+    for name, given in parameters.items():
+        values[name] = study.similarity.similar(given["value"], infos[name].unit)
+    start = Point(np.array([values[name] for name in problem.names]), nominal.point.release)
+    return nominal, fit(problem, start)
 
 
 def predicted(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> Predicted:
@@ -135,12 +135,6 @@ def decays(campaign: Campaign) -> tuple[Array, Array]:
     return np.array(rows), np.array(swings)
 
 
-def named(document: Mapping[str, Any]) -> list[str]:
-    """The effects of the likeliest answer that has any, in the order in which they close the gap."""
-    steps = [step["effect"] for step in document["waterfall"] if step["effect"]]
-    return steps or [name for c in document["candidates"] for name in c["effect"].split(" + ")][:1]
-
-
 def arrow_figure(nominal: Predicted, causes: Predicted, interval: float, reach: float) -> Figure:
     """The arrow and the errors of both predictions, as the greatest value in every tenth of a second.
 
@@ -160,7 +154,7 @@ def arrow_figure(nominal: Predicted, causes: Predicted, interval: float, reach: 
         axes.semilogy(0.1 * np.arange(rows.size), 1e3 * rows, label=label, linewidth=1.2)
     axes.axhline(1e3 * reach, color="0.5", linestyle=":", label="largest reading of the multisines")
     axes.set(xlabel="time / s", ylabel="largest in 0.1 s / mV", xlim=(0.0, None))
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.17), ncols=4, fontsize=8, frameon=False)
     return figure
 
 
@@ -172,7 +166,7 @@ def silverbox(campaign: Campaign, document: Mapping[str, Any], image: Path) -> s
         document: the diagnosis of the multisines alone.
         image: the figure to write.
     """
-    nominal, whole = fitted(campaign, named(document))
+    nominal, whole = fitted(campaign, document)
     runs = whole.problem.data.runs
     seen = [np.full(run.reading.size, run.id != ARROW) for run in runs]
     models = {
@@ -252,12 +246,12 @@ def emps(campaign: Campaign, document: Mapping[str, Any]) -> str:
     """
     found = document["candidates"][0]["parameters"] | document["coefficients"]["after"]
     rows = []
-    for name, published in PUBLISHED.items():
+    for name, (published, unit) in PUBLISHED.items():
         key = next(key for key in found if key.endswith(name))
         given = found[key]
         std = "" if given["std"] is None else f" ± {given['std']:.2g}"
-        rows.append(f"| `{key}` | {given['value']:.4g}{std} | {published:g} |")
-    nominal, whole = fitted(campaign, named(document))
+        rows.append(f"| `{key}` | {given['value']:.4g}{std} {unit} | {published:g} {unit} |")
+    nominal, whole = fitted(campaign, document)
     (run,) = whole.problem.data.runs
     half = np.arange(run.reading.size) < run.reading.size // 2
     errors = [1e3 * rms(predicted(model, [half]).error[run.id][~half]) for model in (nominal, whole)]
