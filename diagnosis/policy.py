@@ -22,7 +22,8 @@ LOCAL_FALSE_ALARM_RATE = 0.01
 #: below what could be told apart.
 AS_MUCH = 0.02
 #: Share that counts as most of a thing: of the excess in a stated interval, or in one run; of a range, from which
-#: an interval locates nothing; of what laws of single runs, and fits to single runs, close; of a line that the
+#: an interval locates nothing; of a small gap, that effects close where misbehaving noise may then not be all of
+#: it; of what laws of single runs, and fits to single runs, close; of a line that the
 #: other half of a run predicts; of an unstated spring that gravity cancels (made with Silverbox in sight, 0029).
 #: Judgement: the text says four fifths. A form counts if χ² would rise by more than the rest, a fifth of the
 #: excess, without it: that number was tuned (0008).
@@ -33,9 +34,8 @@ MOST = 0.8
 #: could be closed must be known. By the word.
 GREATER_PART = 0.5
 #: Share too small to count: of the largest excess, in a run that is not named; of a record, that holds half of a
-#: blow; of a gap, that effects leave where noise may not be all of it (skipped samples that closed 98 % had been
-#: taken for noise); of what is left, that a law closes; of the information on a coefficient, in a part of the
-#: data; of a block mean's noise, by which MuJoCo and the fits' integrator differ. Judgement.
+#: blow; of what is left, that a law closes; of the information on a coefficient, in a part of the data; of a block
+#: mean's noise, by which MuJoCo and the fits' integrator differ. Judgement.
 SMALL_SHARE = 0.1
 #: Share of the runs, or of the bands, that must show a hum, or a colour in still air alone. Judgement, made on a
 #: set where turbulence had hidden a colour: few parts are compared there, so that an unsteady band is easily

@@ -432,5 +432,5 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     """
     block = found.nominal.problem.data.runs[0].block
     small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < policy.SMALL_SHARE for w in weighed)
+    closed = any(w.effects != UNKNOWN and w.share < 1.0 - policy.MOST for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)

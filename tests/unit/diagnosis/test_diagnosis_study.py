@@ -111,7 +111,7 @@ def _left(excess: float, block: int, chance: float = 0.01, **given: object) -> S
     return SimpleNamespace(**(found | given))  # type: ignore[return-value]
 
 
-OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.2, 0.5)]
+OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.3, 0.5)]
 
 
 @pytest.mark.parametrize(("chance", "explains"), [(0.9, False), (1.1, True)])
