@@ -7,7 +7,7 @@ RP-1077 (1981), filter error.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,20 +84,13 @@ class _Channel:
     reduced: float  # V/width, Hz
 
 
-def random_moments(fit: Fit, spectra: Collection[str]) -> list[ProcessNoise]:
+def random_moments(fit: Fit) -> list[ProcessNoise]:
     """The random moments that may explain the residuals of a fit.
-
-    Args:
-        spectra: of the effects that may act (`tunnel_sim.effects.Effect.random`).
 
     Returns:
         The best fit of each kind; empty without wind-on runs or where the model is not stable.
     """
-    tried: list[ProcessNoise | None] = []
-    if "broad_band" in spectra:
-        tried += [fit_turbulence(fit), fit_turbulence(fit, centred=True)]
-    if "narrow_band" in spectra:
-        tried.append(fit_wandering_shedding(fit))
+    tried = (fit_turbulence(fit), fit_turbulence(fit, centred=True), fit_wandering_shedding(fit))
     return [one for one in tried if one is not None]
 
 

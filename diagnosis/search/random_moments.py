@@ -8,7 +8,7 @@ agree.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -73,10 +73,10 @@ def weigh_random_moments(
     allowed = {kind.random: kind for kind in kinds if kind.random}
     scale = Scale.of(hypotheses, misfit(nominal))
     best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
-    if not allowed or not _may_act(best, scale, allowed):
+    if not allowed or not _may_act(best, scale):
         return []
     able = [kind for kind in kinds if kind.fitted]
-    top = _settled(best, nominal, able, allowed)
+    top = _settled(best, nominal, able)
     for number in range(_FURTHER + 1):
         if number > 0:  # a small effect that no gap shows may keep the innovations from being white
             further = _evident(top, able)
@@ -84,9 +84,11 @@ def weigh_random_moments(
                 break
             top = further[0]
         seen = _seen_in(top, nominal.problem.data)
-        process = _likeliest([one for one in random_moments(seen.fit, allowed) if is_steady_noise(one)])
+        process = _likeliest([one for one in random_moments(seen.fit) if is_steady_noise(one)])
         if process is not None and not follows_the_motion(seen.fit) and not obeys_a_law(seen.fit):
-            kind = allowed["narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band"]
+            kind = allowed.get("narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band")
+            if kind is None:
+                return []
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
             names = tuple(dict.fromkeys((kind.name, *seen.effects)))
             left = FittedSet(names, share, share * misfit(nominal).excess, seen.further_numbers)
@@ -127,7 +129,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     return [larger[i] for i in order if gains[i] > NEEDLESS_CHI2]
 
 
-def _may_act(best: Hypothesis, scale: Scale, spectra: Collection[str]) -> bool:
+def _may_act(best: Hypothesis, scale: Scale) -> bool:
     """Whether a random moment may be what the best set leaves.
 
     With one that left nothing in the wind the set would weigh more, or what is left is steady noise: a strong
@@ -139,7 +141,7 @@ def _may_act(best: Hypothesis, scale: Scale, spectra: Collection[str]) -> bool:
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
     if log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers) > scale.weight(best):
         return True
-    process = _likeliest(random_moments(best.fit, spectra))
+    process = _likeliest(random_moments(best.fit))
     return process is not None and is_steady_noise(process)
 
 
@@ -216,9 +218,7 @@ def _likeliest(tried: Sequence[ProcessNoise]) -> ProcessNoise | None:
     return min(acting, key=lambda p: p.cost + NEEDLESS_CHI2 * (p.spectrum.centre > 0.0), default=None)
 
 
-def _settled(
-    best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]], spectra: Collection[str]
-) -> Hypothesis:
+def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis:
     """The best set of effects on rows in whose noise the response to the random moment is part.
 
     The set given, where no random moment acts or its filter does not settle. The random moment is estimated from
@@ -232,12 +232,12 @@ def _settled(
     reached: dict[tuple[str, ...], Hypothesis] = {}
 
     def cost(hypothesis: Hypothesis) -> float:
-        process = _likeliest(random_moments(_seen_in(hypothesis, data).fit, spectra))
+        process = _likeliest(random_moments(_seen_in(hypothesis, data).fit))
         return np.inf if process is None else process.cost + NEEDLESS_CHI2 * len(hypothesis.effects)
 
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
-            process = _likeliest(random_moments(known, spectra))
+            process = _likeliest(random_moments(known))
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break

@@ -10,6 +10,7 @@ from scipy.stats import binom
 
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.policy import NEEDLESS_CHI2
 from diagnosis.search import random_moments
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis
@@ -174,6 +175,15 @@ def test_buffeting_is_offered_where_it_blows(windy):
     (answer,) = weigh_random_moments(windy, [], BOTH)
     assert answer.effects == ("buffeting",)
     assert answer.share < 0.1
+
+
+def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
+    """A narrow spectrum that follows the wind takes up turbulence too; the broad one explains it better."""
+    base = nominal(buffeted(campaign(), 0.002, 1.0))
+    narrow = fit_wandering_shedding(base)
+    assert narrow is not None
+    assert narrow.drop > NEEDLESS_CHI2
+    assert weigh_random_moments(base, [], BOTH[1:]) == []
 
 
 def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth_of_the_gap():
