@@ -304,10 +304,12 @@ def _weigh_by_moment(
         None where no set explains the angle, and none leaves a small moment.
     """
     data = found.nominal.problem.data
-    bases = []  # the nominal model in the noise that each set leaves
+    bases: list[
+        Fit
+    ] = []  # the nominal model in the noise that the likeliest set leaves, and others worth naming
     for answer in weighed:
         left = found.hypothesis(answer.effects)
-        if left is None or answer.probability < policy.WORTH_NAMING:
+        if left is None or (bases and answer.probability < policy.WORTH_NAMING):
             continue
         with suppress(FitError, np.linalg.LinAlgError):
             bases.append(fit(Problem(by_moment(left.fit)), found.nominal.point))

@@ -154,6 +154,7 @@ def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_its
         ("a", {"a": 0.1, "b": 0.05}, "a"),
         ("a", {"a": 40.0, "b": 9.0}, "a"),  # it explains the angle
         ("unknown", {"a": 40.0, "b": 9.0}, None),
+        ("unknown", {"a": 0.1, "b": 9.0}, "a"),
     ],
 )
 def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leaves_little(
@@ -174,7 +175,8 @@ def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leav
     nominal = SimpleNamespace(problem=SimpleNamespace(data=None), point=None)
     sets = {(name,): SimpleNamespace(fit=name) for name in powers}
     found = SimpleNamespace(nominal=nominal, hypothesis=sets.get)
-    weighed = [Weighed((name,), 0.1, 0.3) for name in dict.fromkeys((first, "a", "b"))]
+    weighed = [Weighed((name,), 0.1, 0.01) for name in dict.fromkeys((first, "a", "b"))]
+    weighed = weighed if first == "unknown" else [replace(one, probability=0.3) for one in weighed]
     clock = investigation._Clock(None)
     if taken is None:
         assert investigation._weigh_by_moment(found, weighed, [], clock) is None
