@@ -23,8 +23,9 @@ LOCAL_FALSE_ALARM_RATE = 0.01
 AS_MUCH = 0.02
 #: Share that counts as most of a thing: of the excess in a stated interval, or in one run; of a range, from which
 #: an interval locates nothing; of a small gap, that effects close where misbehaving noise may then not be all of
-#: it; of what laws of single runs, and fits to single runs, close; of a line that the
-#: other half of a run predicts; of an unstated spring that gravity cancels (made with Silverbox in sight, 0029).
+#: it (nine tenths before, lowered after one simulated campaign, 0007); of what laws of single runs, and fits to
+#: single runs, close; of a line that the other half of a run predicts; of an unstated spring that gravity cancels
+#: (made with Silverbox in sight, 0029).
 #: Judgement: the text says four fifths. A form counts if χ² would rise by more than the rest, a fifth of the
 #: excess, without it: that number was tuned (0008).
 MOST = 0.8

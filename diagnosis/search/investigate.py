@@ -293,9 +293,9 @@ def _weigh_by_moment(
 ) -> Study | None:
     """The study of a body that nothing holds, whose sets are weighed by the moment that they leave.
 
-    Every small error of the moment moves the body for good, so that its angle departs further and further. The
-    random moment that counts as noise is what the likeliest set leaves whose moment is small beside the one that
-    the nominal model misses.
+    Every small error of the moment moves the body for good, so that its angle departs further and further. So
+    the random moment that a set leaves counts as noise: that of the likeliest set whose moment is small beside the
+    one that the nominal model misses.
 
     Args:
         weighed: answers by the angle.

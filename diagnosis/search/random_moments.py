@@ -67,8 +67,9 @@ def weigh_random_moments(
 
     Returns:
         The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
-        than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes, or
-        where no random moment in the wind could leave little enough of the gap.
+        than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes,
+        where the likeliest is of a kind that is not among ``kinds``, or where no random moment in the wind could
+        leave little enough of the gap.
     """
     allowed = {kind.random: kind for kind in kinds if kind.random}
     scale = Scale.of(hypotheses, misfit(nominal))
