@@ -153,23 +153,29 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:
-        process, spectrum = random.process, random.process.spectrum
-        severity, place = (f"{random.kind.name}.{info.name}" for info in random.kind.parameters())
-        # their spread follows from the number of correlation times in the runs
-        seconds = process.interval * sum(i.size for i in process.innovations)
-        independent = max(seconds * min(4.0 * spectrum.bandwidth, 1.0 / process.interval), 2.0)
-        relative = float(np.sqrt(0.5 / independent))
-        if spectrum.strouhal_number > 0.0:
-            size = float(np.sqrt(2.0)) * spectrum.intensity
-            width = spectrum.bandwidth / max(spectrum.strouhal_number, 1e-9)
-            spread = spectrum.strouhal_number * width * relative
-            found[severity] = ParameterEstimate(size, size * relative, "1")
-            found[place] = ParameterEstimate(spectrum.strouhal_number, spread, "1")
-        else:
-            # a corner above the rig's frequencies looks white: only the size over its square root is known there
-            limit = "upper" if spectrum.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
-            found[severity] = ParameterEstimate(spectrum.intensity, spectrum.intensity * relative, "1")
-            found[place] = ParameterEstimate(spectrum.bandwidth, None, "Hz", limit)
+        seconds = random.process.interval * sum(i.size for i in random.process.innovations)
+        data = study.nominal.problem.data
+        for kind in random.kinds:
+            parts = [one for one in random.process.spectrum if one.band == kind.random]
+            part = max(parts, key=lambda one: one.intensity)
+            intensity = float(np.sqrt(sum(one.intensity**2 for one in parts)))
+            severity, place = (f"{kind.name}.{info.name}" for info in kind.parameters())
+            # their spread follows from the number of correlation times in the runs
+            independent = max(seconds * min(4.0 * part.bandwidth, 1.0 / random.process.interval), 2.0)
+            relative = float(np.sqrt(0.5 / independent))
+            if part.strouhal_number > 0.0:
+                size = float(np.sqrt(2.0)) * intensity
+                speeds = [run.wind_speed for run in data.runs if run.wind_on]
+                reduced = float(np.sqrt(np.mean(np.square(speeds)))) / data.width  # Hz
+                found[severity] = ParameterEstimate(size, size * relative, "1")
+                found[place] = ParameterEstimate(
+                    part.strouhal_number, part.bandwidth / reduced * relative, "1"
+                )
+            else:
+                # a corner above the rig's frequencies looks white: only size over square root is known there
+                limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
+                found[severity] = ParameterEstimate(intensity, intensity * relative, "1")
+                found[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
     own = own_parameters(found, study.campaign, study.similarity)
     single = len({name.split(".")[0] for name in own}) == 1
     return {name.split(".")[1] if single else name: value for name, value in own.items()}

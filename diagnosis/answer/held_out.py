@@ -281,8 +281,9 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     else:
         last = models.random_excess(random)
         without = {name: last + size for name, size in models.read_off.items()}
-        without[random.kind.name] = steps[-1].excess
-        steps.append(Step(random.kind.name, last))
+        moment = " + ".join(kind.name for kind in random.kinds)
+        without[moment] = steps[-1].excess
+        steps.append(Step(moment, last))
     return Waterfall(tuple(steps), without, models.words)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_triangular
 
 from tunnel_sim.vocabulary.record import Array
@@ -26,14 +27,11 @@ def whiten(values: Array, whitening: Array) -> Array:
     """
     if whitening.size == 1:
         return values
-    from scipy.signal import oaconvolve  # only here: slow to load
-
-    taps = whitening.reshape(-1, *[1] * (values.ndim - 1))
     start = _start(whitening.tobytes())[: len(values), : len(values)]
     with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
-        errors = oaconvolve(values, taps, axes=0)[: len(values)]
+        errors = _convolved(values, whitening)
         errors[: len(start)] = start @ values[: len(start)]
-    return np.asarray(errors, np.float64)
+    return errors
 
 
 def colour(errors: Array, whitening: Array) -> Array:
@@ -62,10 +60,7 @@ def correlate(errors: Array, whitening: Array) -> Array:
     """
     if whitening.size == 1:
         return np.asarray(errors * whitening[0], np.float64)
-    from scipy.signal import oaconvolve  # only here: slow to load
-
-    taps = whitening.reshape(-1, *[1] * (errors.ndim - 1))
-    return np.asarray(oaconvolve(errors[::-1], taps, axes=0)[: len(errors)][::-1], np.float64)
+    return _convolved(errors[::-1], whitening)[::-1]
 
 
 def response(whitening: Array, frequency: Array) -> np.ndarray:
@@ -85,6 +80,19 @@ def colouring(whitening: Array) -> float:
         whitening: the filter, shape (order + 1,).
     """
     return 1.0 if whitening.size == 1 else 1.0 / float(_start(whitening.tobytes())[0, 0])
+
+
+def _convolved(values: Array, whitening: Array) -> Array:
+    """The convolution with the filter, of the values' shape."""
+    size = next_fast_len(len(values) + whitening.size - 1, real=True)
+    transform = _transform(whitening.tobytes(), size).reshape(-1, *[1] * (values.ndim - 1))
+    found = irfft(rfft(values, size, axis=0) * transform, size, axis=0, overwrite_x=True)
+    return np.asarray(found[: len(values)], np.float64)
+
+
+@lru_cache(maxsize=32)  # runs of a campaign; SciPy's own convolutions transform the filter in every call
+def _transform(filter_bytes: bytes, size: int) -> np.ndarray:
+    return np.asarray(rfft(np.frombuffer(filter_bytes), size))
 
 
 @lru_cache(maxsize=32)  # runs of a campaign

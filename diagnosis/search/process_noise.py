@@ -1,14 +1,15 @@
 """A random moment on the rig: its likelihood from a steady Kalman filter, and whether it is steady noise.
 
 There are two kinds: turbulence, broad or about one frequency, and vortex shedding with a wandering phase, about a
-frequency that follows the wind. Åström, Introduction to Stochastic Control Theory (1970); Maine & Iliff, NASA
-RP-1077 (1981), filter error.
+frequency that follows the wind. Both at once are one spectrum with two parts. Åström, Introduction to Stochastic
+Control Theory (1970); Maine & Iliff, NASA RP-1077 (1981), filter error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import minimize
@@ -17,7 +18,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.run_data import Data
-from diagnosis.policy import CLEARLY_MORE, FALSE_ALARM_RATE, WHITE_INNOVATIONS
+from diagnosis.policy import CHANCE_STDS, CLEARLY_MORE, FALSE_ALARM_RATE, NEEDLESS_CHI2, WHITE_INNOVATIONS
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
 
@@ -32,8 +33,8 @@ _EVALUATIONS = 60  # of the likelihood beyond the starting grid
 
 
 @dataclass(frozen=True)
-class MomentSpectrum:
-    """A random moment's spectrum: first order about a centre.
+class SpectrumPart:
+    """A part of a random moment's spectrum: first order about a centre.
 
     Args:
         intensity: standard deviation of the moment coefficient, dimensionless.
@@ -47,14 +48,33 @@ class MomentSpectrum:
     centre: float = 0.0
     strouhal_number: float = 0.0
 
+    @property
+    def states(self) -> int:
+        """Number of states of the process: the coefficient, and about a centre its quadrature."""
+        return 2 if self.centre > 0.0 or self.strouhal_number > 0.0 else 1
+
+    @property
+    def band(self) -> Literal["broad_band", "narrow_band"]:
+        """Whether it is turbulence or wandering vortices, as `tunnel_sim.effects.Effect.random` has it."""
+        return "narrow_band" if self.strouhal_number > 0.0 else "broad_band"
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Intensity, bandwidth and, where there is one, the centre or its Strouhal number."""
+        return (self.intensity, self.bandwidth, *(x for x in (self.centre, self.strouhal_number) if x > 0.0))
+
+
+#: The parts of a random moment's spectrum, whose moments are independent of each other.
+Spectrum = tuple[SpectrumPart, ...]
+
 
 @dataclass(frozen=True, eq=False)
 class ProcessNoise:
     """A fitted random moment.
 
     Args:
-        spectrum: as fitted.
-        drop: of −2 ln L against white measurement noise alone, wind-on runs, dimensionless.
+        spectrum: as fitted, of one part or two.
+        drops: of −2 ln L against white measurement noise alone, by wind-on run, shape (runs,), dimensionless.
         by_run: the drop of each wind-on run over the power that the spectrum predicts of its response, in units of
             the noise's, shape (runs,), dimensionless; at least 0.
         cost: −2 ln L without constants, wind-on runs, dimensionless.
@@ -63,13 +83,24 @@ class ProcessNoise:
         interval: between innovations, s.
     """
 
-    spectrum: MomentSpectrum
-    drop: float
+    spectrum: Spectrum
+    drops: Array
     by_run: Array
     cost: float
     excess: float
     innovations: list[Array]
     interval: float
+
+    @property
+    def drop(self) -> float:
+        """Of −2 ln L of all runs, dimensionless."""
+        return float(self.drops.sum())
+
+    @property
+    def price(self) -> float:
+        """What −2 ln L has to fall by beyond one part without a centre, dimensionless."""
+        centres = sum(part.centre > 0.0 for part in self.spectrum)
+        return NEEDLESS_CHI2 * (centres + len(self.spectrum) - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +115,44 @@ class _Channel:
     reduced: float  # V/width, Hz
 
 
-def random_moments(fit: Fit) -> list[ProcessNoise]:
-    """The random moments that may explain the residuals of a fit.
+@dataclass(frozen=True, eq=False)
+class _Form:
+    """A form of a part of a spectrum: from what parameters it is made, and where they are sought."""
 
-    Returns:
-        The best fit of each kind; empty without wind-on runs or where the model is not stable.
-    """
-    tried = (fit_turbulence(fit), fit_turbulence(fit, centred=True), fit_wandering_shedding(fit))
-    return [one for one in tried if one is not None]
+    part: Callable[..., SpectrumPart]
+    grid: Sequence[tuple[float, ...]]
+    bounds: Sequence[tuple[float, float]]
+    steps: Sequence[float]  # of the first simplex, in logarithms
+
+
+_BROAD = _Form(
+    SpectrumPart,
+    [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)],
+    ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH)),
+    (0.5, 0.5),
+)
+_CENTRED = _Form(
+    SpectrumPart,
+    [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)],
+    ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0)),
+    (0.5, 0.5, 0.05),
+)
+
+
+def _wandering(data: Data) -> _Form | None:
+    """Vortex shedding with a wandering phase; None without wind or body width."""
+    fastest = max(run.wind_speed for run in data.runs)
+    if data.width <= 0.0 or fastest <= 0.0:
+        return None
+    # lines spaced so that any frequency lies on one, up to the highest that the filter's samples show
+    reduced = fastest / data.width
+    numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
+    return _Form(
+        lambda s, b, n: SpectrumPart(s, b, strouhal_number=n),
+        [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers],
+        ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0)),
+        (0.5, 0.5, 2e-3),
+    )
 
 
 def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
@@ -103,86 +164,127 @@ def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
     Returns:
         The fit; None without wind-on runs or where the model is not stable.
     """
-    if not centred:
-        grid = [(s, b) for s in (3e-4, 1e-3, 3e-3, 1e-2, 3e-2) for b in (0.3, 3.0, 20.0)]
-        bounds = ((1e-7, 1.0), (0.03, LONGEST_BANDWIDTH))
-        return _fit(fit, lambda x: MomentSpectrum(x[0], x[1]), grid, bounds)
-    about = [(s, b, f) for s in (1e-3, 3e-3, 1e-2) for b in (0.5, 2.0) for f in (1.5, 3.0, 4.5, 6.5, 9.0)]
-    limits = ((1e-7, 1.0), (0.1, LONGEST_BANDWIDTH), (0.3, 20.0))
-    return _fit(fit, lambda x: MomentSpectrum(x[0], x[1], x[2]), about, limits)
+    return _fit(_channels(fit), (_CENTRED if centred else _BROAD,))
 
 
 def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
     """As `fit_turbulence`, by vortex shedding with a wandering phase; None without wind or body width too."""
-    data = fit.problem.data
-    fastest = max(run.wind_speed for run in data.runs)
-    if data.width <= 0.0 or fastest <= 0.0:
-        return None
-    # lines spaced so that any frequency lies on one, up to the highest that the filter's samples show
-    reduced = fastest / data.width
-    numbers = np.arange(_LEAST_STROUHAL, min(0.6, _HIGHEST_LINE / reduced), _LINE_SPACING / reduced)
-    grid = [(s, _LINE_SPACING / 3.0, float(n)) for s in (0.01, 0.05) for n in numbers]
-    bounds = ((1e-7, 5.0), (5e-4, _WIDEST_LINE), (_LEAST_STROUHAL, 1.0))
-    return _fit(fit, lambda x: MomentSpectrum(x[0], x[1], strouhal_number=x[2]), grid, bounds)
+    form = _wandering(fit.problem.data)
+    return None if form is None else _fit(_channels(fit), (form,))
+
+
+def random_moments(fit: Fit) -> list[ProcessNoise]:
+    """The random moments that may explain the residuals of a fit.
+
+    Returns:
+        The best fit of each form, and of the likeliest with a second part beside it where that pays; empty without
+        wind-on runs or where the model is not stable. A spectrum of another shape than first order has two parts
+        of one kind sooner than a part of another kind.
+    """
+    channels, narrow = _channels(fit), _wandering(fit.problem.data)
+    forms = [form for form in (_BROAD, _CENTRED, narrow) if form is not None]
+    found = {form: one for form in forms if (one := _fit(channels, (form,))) is not None}
+    first = likeliest(found.values())
+    if first is None:
+        return list(found.values())
+    (own,) = (form for form in found if found[form] is first)
+    both = [_fit(channels, (own, other), first) for other in forms]
+    return [*found.values(), *(one for one in both if one is not None and _pays_in_all_runs(one, first))]
+
+
+def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise) -> bool:
+    """Whether a second part lowers −2 ln L by more than a needless one may, whichever the runs had been.
+
+    It acts in all runs, while an error of the model is in those of one spring or speed. The scatter between the
+    runs says how much of the fall may be chance.
+    """
+    gains = both.drops - first.drops
+    if gains.size < 2:
+        return False
+    std = float(np.std(gains, ddof=1)) * np.sqrt(gains.size)
+    return bool(gains.sum() - CHANCE_STDS * std > NEEDLESS_CHI2)
+
+
+def likeliest(tried: Iterable[ProcessNoise]) -> ProcessNoise | None:
+    """The random moment that explains residuals best; None where white noise explains them as well."""
+    acting = [one for one in tried if one.drop > NEEDLESS_CHI2]
+    return min(acting, key=lambda one: one.cost + one.price, default=None)
 
 
 def _fit(
-    fit: Fit,
-    spectrum: Callable[[Sequence[float]], MomentSpectrum],
-    grid: Sequence[tuple[float, ...]],
-    bounds: Sequence[tuple[float, float]],
+    channels: Sequence[_Channel], forms: Sequence[_Form], known: ProcessNoise | None = None
 ) -> ProcessNoise | None:
-    channels = [c for i in range(len(fit.residuals)) if (c := _channel(fit, i)) is not None]
+    """The likeliest spectrum of these parts.
+
+    Args:
+        known: the fit without the last part; the fit starts there.
+
+    Returns:
+        None without channels, or where beside the known parts no point of the last one's grid pays.
+    """
     if not channels:
         return None
+    ends = np.cumsum([len(form.bounds) for form in forms])[:-1]
+
+    def spectrum(x: Array) -> Spectrum:
+        split = np.split(np.exp(x), ends)
+        return tuple(form.part(*own.tolist()) for form, own in zip(forms, split, strict=True))
 
     def cost(x: Array) -> float:
-        return sum(c for c, _ in _filtered(channels, spectrum(np.exp(x).tolist())))
+        return sum(c for c, _ in _filtered(channels, [spectrum(x)] * len(channels)))
 
+    grid = np.log(forms[-1].grid)
+    if known is not None:
+        fixed = np.log([value for part in known.spectrum for value in part.parameters])
+        grid = np.hstack([np.tile(fixed, (len(grid), 1)), grid])
     every = [spectrum(x) for x in grid for _ in channels]
-    by_run = np.array([c for c, _ in _filtered(channels * len(grid), every)]).reshape(len(grid), -1)
-    start, ends = np.log(grid[int(np.argmin(by_run.sum(axis=1)))]), np.log(bounds)
-    # steps of half a logarithm in size and bandwidth, and a tenth of that in a centre found by the grid
-    corners = np.vstack([start, start + np.diag([0.5, 0.5, 0.05][: start.size])])
-    if start.size == 3 and ends[2, 1] < 0.5:  # a Strouhal number
-        corners[3, 2] = start[2] + 2e-3
+    costs = np.array([c for c, _ in _filtered(list(channels) * len(grid), every)]).reshape(len(grid), -1)
+    totals = costs.sum(axis=1)
+    if known is not None and not totals.min() < known.cost - NEEDLESS_CHI2:
+        return None
+    start = grid[int(np.argmin(totals))]
+    low, high = np.log([bound for form in forms for bound in form.bounds]).T
+    simplex = np.vstack([start, start + np.diag([step for form in forms for step in form.steps])])
     found = minimize(
         cost,
         start,
         method="Nelder-Mead",
-        bounds=[(np.log(low), np.log(high)) for low, high in bounds],
+        bounds=list(zip(low, high, strict=True)),
         options={
             "maxfev": _EVALUATIONS * len(start) // 2,
             "xatol": 0.02,
             "fatol": 0.5,
-            "initial_simplex": np.clip(corners, ends[:, 0], ends[:, 1]),
+            "initial_simplex": np.clip(simplex, low, high),
         },
     )
-    best = spectrum(np.exp(found.x).tolist())
-    costs, innovations = zip(*_filtered(channels, best), strict=True)
+    return _fitted(channels, spectrum(found.x), float(found.fun))
+
+
+def _fitted(channels: Sequence[_Channel], spectrum: Spectrum, cost: float) -> ProcessNoise:
+    costs, innovations = zip(*_filtered(channels, [spectrum] * len(channels)), strict=True)
     kept = [c.residual[_skip(c) :] / np.sqrt(c.variance) for c in channels]
     count = sum(i.size for i in innovations)
     white = [float(k.size * np.log(c.variance) + k @ k) for c, k in zip(channels, kept, strict=True)]
     drops = np.array(white) - np.array(costs)
     # power of the response to a unit moment at the end of each run that began at rest, in that of the noise
-    unit = MomentSpectrum(1.0, LONGEST_BANDWIDTH)
+    unit = (SpectrumPart(1.0, LONGEST_BANDWIDTH),)
     power = []
     for channel, a, q in zip(channels, *_discrete(channels, [unit] * len(channels)), strict=True):
         for _ in range(int(np.log2(channel.residual.size))):
             a, q = a @ a, q + a @ q @ a.T
         power.append(q[0, 0] / channel.variance)
     return ProcessNoise(
-        best,
-        float(drops.sum()),
+        spectrum,
+        drops,
         np.maximum(drops, 0.0) / np.array(power),
-        float(found.fun),
+        cost,
         sum(float(i @ i) for i in innovations) / count - 1.0,
         list(innovations),
         channels[0].interval,
     )
 
 
-def with_response(fit: Fit, spectrum: MomentSpectrum) -> Data | None:
+def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
     """The runs of a fit, the noise of those in the wind being the sensor's and the response to a random moment.
 
     Args:
@@ -194,13 +296,17 @@ def with_response(fit: Fit, spectrum: MomentSpectrum) -> Data | None:
     """
     runs = list(fit.problem.data.runs)
     channels = {i: c for i in range(len(runs)) if (c := _channel(fit, i, 0.0)) is not None}
-    filters = _filters(list(channels.values()), spectrum)
+    filters = _filters(list(channels.values()), [spectrum] * len(channels))
     for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
             return None
         variance = runs[i].noise_variance * spread / channel.variance
         runs[i] = replace(runs[i], innovations=(numerator, denominator), noise_variance=variance)
     return fit.problem.data.with_runs(tuple(runs)) if channels else None
+
+
+def _channels(fit: Fit) -> list[_Channel]:
+    return [c for i in range(len(fit.residuals)) if (c := _channel(fit, i)) is not None]
 
 
 def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Channel | None:
@@ -228,14 +334,8 @@ def _skip(channel: _Channel) -> int:
     return min(channel.residual.size // 4, round(_SETTLE / channel.interval))
 
 
-def _filtered(
-    channels: Sequence[_Channel], spectra: MomentSpectrum | Sequence[MomentSpectrum]
-) -> list[tuple[float, Array]]:
-    """−2 ln L (without constants) and scaled innovations of the steady filter, by run.
-
-    Args:
-        spectra: of all runs, or one for each.
-    """
+def _filtered(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[tuple[float, Array]]:
+    """−2 ln L (without constants) and scaled innovations of the steady filter, by run."""
     from scipy.signal import lfilter  # only here: slow to load
 
     results = []
@@ -249,34 +349,34 @@ def _filtered(
     return results
 
 
-def _filters(
-    channels: Sequence[_Channel], spectra: MomentSpectrum | Sequence[MomentSpectrum]
-) -> list[tuple[Array, Array, float]]:
+def _filters(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> list[tuple[Array, Array, float]]:
     """The filter from residuals to innovations, numerator and denominator, and their variance, rad², by run."""
-    each = [spectra] * len(channels) if isinstance(spectra, MomentSpectrum) else spectra
-    transition, disturbance = _discrete(channels, each)
+    transition, disturbance = _discrete(channels, spectra)
     variance = np.array([c.variance for c in channels])
     return steady_filters(transition, disturbance, variance)
 
 
-def _discrete(channels: Sequence[_Channel], spectra: Sequence[MomentSpectrum]) -> tuple[Array, Array]:
-    """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra have a centre, or none.
+def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tuple[Array, Array]:
+    """Transition and disturbance over one interval, shape (runs, n, n) each; all spectra are of the same form.
 
-    States: angle, rate, moment coefficient; about a centre, the coefficient's quadrature too.
+    States: angle, rate, and of each part the moment coefficient; about a centre, the coefficient's quadrature too.
     """
-    centred = spectra[0].centre > 0.0 or spectra[0].strouhal_number > 0.0
-    size = 4 if centred else 3
+    size = 2 + sum(part.states for part in spectra[0])
     dynamics = np.zeros((len(channels), size, size))
     drive = np.zeros_like(dynamics)
     for own, noise, channel, spectrum in zip(dynamics, drive, channels, spectra, strict=True):
-        corner = 2.0 * np.pi * spectrum.bandwidth
         own[:2, :2] = channel.oscillator
-        own[1, 2] = channel.moment
-        own[range(2, size), range(2, size)] = -corner
-        if centred:
-            turn = 2.0 * np.pi * (spectrum.centre + spectrum.strouhal_number * channel.reduced)
-            own[2, 3], own[3, 2] = -turn, turn
-        noise[range(2, size), range(2, size)] = 2.0 * corner * spectrum.intensity**2
+        first = 2
+        for part in spectrum:
+            places = range(first, first + part.states)
+            corner = 2.0 * np.pi * part.bandwidth
+            own[1, first] = channel.moment
+            own[places, places] = -corner
+            if part.states == 2:
+                turn = 2.0 * np.pi * (part.centre + part.strouhal_number * channel.reduced)
+                own[first, first + 1], own[first + 1, first] = -turn, turn
+            noise[places, places] = 2.0 * corner * part.intensity**2
+            first += part.states
     interval = np.array([channel.interval for channel in channels])
     transition, disturbance = discretised(dynamics, drive, interval)
     return transition, disturbance + 1e-18 * np.eye(size)

@@ -24,7 +24,13 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.policy import CHANCE_STDS, FALSE_ALARM_RATE, GREATER_PART, MOST_CAUSES, NEEDLESS_CHI2
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
-from diagnosis.search.process_noise import ProcessNoise, is_steady_noise, random_moments, with_response
+from diagnosis.search.process_noise import (
+    ProcessNoise,
+    is_steady_noise,
+    likeliest,
+    random_moments,
+    with_response,
+)
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 
@@ -37,12 +43,13 @@ class RandomAnswer:
     """A random moment, alone or beside other effects.
 
     Args:
+        kinds: the effects that the parts of its spectrum are.
         beside: the fitted effects beside it with residuals in the sensor's noise alone, or None.
         left: what remains. The share is that of the innovations' and the wind-off runs' excess in the nominal
             one's, and the same in every channel.
     """
 
-    kind: type[Effect]
+    kinds: tuple[type[Effect], ...]
     process: ProcessNoise
     beside: Hypothesis | None
     left: FittedSet
@@ -55,7 +62,8 @@ class RandomAnswer:
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects, sorted; once where an effect acts steadily and at random."""
-        return tuple(sorted({self.kind.name, *(() if self.beside is None else self.beside.effects)}))
+        names = {kind.name for kind in self.kinds}
+        return tuple(sorted(names | set(() if self.beside is None else self.beside.effects)))
 
 
 def weigh_random_moments(
@@ -85,15 +93,16 @@ def weigh_random_moments(
                 break
             top = further[0]
         seen = _seen_in(top, nominal.problem.data)
-        process = _likeliest([one for one in random_moments(seen.fit) if is_steady_noise(one)])
+        process = likeliest([one for one in random_moments(seen.fit) if is_steady_noise(one)])
         if process is not None and not follows_the_motion(seen.fit) and not obeys_a_law(seen.fit):
-            kind = allowed.get("narrow_band" if process.spectrum.strouhal_number > 0.0 else "broad_band")
-            if kind is None:
+            bands = dict.fromkeys(part.band for part in process.spectrum)
+            if not bands.keys() <= allowed.keys():
                 return []
+            kinds = tuple(allowed[band] for band in bands)
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
-            names = tuple(dict.fromkeys((kind.name, *seen.effects)))
+            names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
             left = FittedSet(names, share, share * misfit(nominal).excess, seen.further_numbers)
-            return [RandomAnswer(kind, process, seen if seen.effects else None, left)]
+            return [RandomAnswer(kinds, process, seen if seen.effects else None, left)]
     return []
 
 
@@ -142,7 +151,7 @@ def _may_act(best: Hypothesis, scale: Scale) -> bool:
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
     if log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers) > scale.weight(best):
         return True
-    process = _likeliest(random_moments(best.fit))
+    process = likeliest(random_moments(best.fit))
     return process is not None and is_steady_noise(process)
 
 
@@ -213,12 +222,6 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _likeliest(tried: Sequence[ProcessNoise]) -> ProcessNoise | None:
-    """The random moment that explains residuals best; None where white noise explains them as well."""
-    acting = [one for one in tried if one.drop > NEEDLESS_CHI2]
-    return min(acting, key=lambda p: p.cost + NEEDLESS_CHI2 * (p.spectrum.centre > 0.0), default=None)
-
-
 def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis:
     """The best set of effects on rows in whose noise the response to the random moment is part.
 
@@ -233,12 +236,16 @@ def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> H
     reached: dict[tuple[str, ...], Hypothesis] = {}
 
     def cost(hypothesis: Hypothesis) -> float:
-        process = _likeliest(random_moments(_seen_in(hypothesis, data).fit))
-        return np.inf if process is None else process.cost + NEEDLESS_CHI2 * len(hypothesis.effects)
+        process = likeliest(random_moments(_seen_in(hypothesis, data).fit))
+        return (
+            np.inf
+            if process is None
+            else process.cost + process.price + NEEDLESS_CHI2 * len(hypothesis.effects)
+        )
 
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
-            process = _likeliest(random_moments(known))
+            process = likeliest(random_moments(known))
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break

@@ -11,11 +11,12 @@ from scipy.stats import binom
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.policy import NEEDLESS_CHI2
+from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import (
-    MomentSpectrum,
+    SpectrumPart,
     bursts,
     departure_from_white,
     fit_turbulence,
@@ -95,7 +96,7 @@ def found(windy):
 
 def test_intensity_and_bandwidth_are_recovered(found):
     # at the rig only the level of the spectrum around resonance is seen well: intensity²/bandwidth
-    spectrum = found.spectrum
+    (spectrum,) = found.spectrum
     assert spectrum.intensity**2 / spectrum.bandwidth == pytest.approx(0.01**2 / 4.0, rel=0.5)
     assert spectrum.intensity == pytest.approx(0.01, rel=0.5)
     assert found.drop > 1000.0
@@ -257,7 +258,7 @@ def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy
 
 
 def test_turbulence_that_is_slowly_forgotten_can_be_noise(windy):
-    assert with_response(windy, MomentSpectrum(intensity=1e-3, bandwidth=0.03)) is not None
+    assert with_response(windy, (SpectrumPart(1e-3, 0.03),)) is not None
 
 
 def test_one_gust_is_no_buffeting():
@@ -345,22 +346,87 @@ def with_moment(data, moment):
     return replace(data, runs=tuple(runs))
 
 
-def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
-    rng, strouhal, width = np.random.default_rng(8), 0.15, 0.225
+def wandering_vortices(strouhal, amplitude, seed):
+    """A moment at a frequency that follows the wind, of 0.02 Hz and more, whose phase is a random walk."""
+    rng, width = np.random.default_rng(seed), 0.225
 
     def moment(time, speed):
         walk = 0.5 * np.cumsum(rng.standard_normal(time.size)) * np.sqrt(time[1])
-        return 0.05 * np.sin(2.0 * np.pi * strouhal * speed / width * time + walk)
+        return amplitude * np.sin(2.0 * np.pi * strouhal * speed / width * time + walk)
 
-    fit = nominal(with_moment(campaign(), moment))
+    return moment
+
+
+def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
+    strouhal = 0.15
+    fit = nominal(with_moment(campaign(), wandering_vortices(strouhal, 0.05, seed=8)))
     found = fit_wandering_shedding(fit)
     assert found is not None
-    assert found.spectrum.strouhal_number == pytest.approx(strouhal, rel=0.01)
-    assert np.sqrt(2.0) * found.spectrum.intensity == pytest.approx(0.05, rel=0.4)
+    assert found.spectrum[0].strouhal_number == pytest.approx(strouhal, rel=0.01)
+    assert np.sqrt(2.0) * found.spectrum[0].intensity == pytest.approx(0.05, rel=0.4)
     (answer,) = weigh_random_moments(fit, [], BOTH)
     assert answer.effects == ("vortex_shedding",)
     assert answer.share < 0.1
     assert weigh_random_moments(fit, [], BUFFETING) == []
+
+
+def test_turbulence_and_vortices_at_once_are_one_spectrum_with_two_parts():
+    """The steady filter of both parts whitens what neither of them does alone; a missing kind names neither."""
+    base = nominal(with_moment(buffeted(campaign(), 0.006, 2.0), wandering_vortices(0.15, 0.05, seed=8)))
+    for alone in (fit_turbulence(base), fit_turbulence(base, centred=True), fit_wandering_shedding(base)):
+        assert not is_steady_noise(alone)
+    (answer,) = weigh_random_moments(base, [], BOTH)
+    assert answer.effects == ("buffeting", "vortex_shedding")
+    parts = {part.band: part for part in answer.process.spectrum}
+    assert parts["broad_band"].intensity == pytest.approx(0.006, rel=0.5)
+    assert parts["narrow_band"].strouhal_number == pytest.approx(0.15, rel=0.01)
+    assert np.sqrt(2.0) * parts["narrow_band"].intensity == pytest.approx(0.05, rel=0.4)
+    assert weigh_random_moments(base, [], BUFFETING) == []
+    assert weigh_random_moments(base, [], BOTH[1:]) == []
+
+
+def test_the_covariance_of_two_parts_is_that_of_independent_moments():
+    """From rest both responses add; compared at one spectrum whose parts are equal to twice its power."""
+    fit = nominal(buffeted(campaign(), 0.01, 4.0))
+    one, two = SpectrumPart(0.01 * np.sqrt(2.0), 4.0), SpectrumPart(0.01, 4.0)
+    whole, halves = with_response(fit, (one,)), with_response(fit, (two, two))
+    for run, other in zip(whole.runs, halves.runs, strict=True):
+        assert other.noise_variance == pytest.approx(run.noise_variance, rel=1e-9)
+
+
+def test_vortices_beside_a_slow_error_of_one_run_have_one_part(monkeypatch):
+    """A second part would take the error up, and be named turbulence; it shows in too few runs."""
+    data = with_moment(campaign(), wandering_vortices(0.15, 0.05, seed=8))
+    *others, last = data.runs
+    creeping = 4e-4 * last.record.time_s / last.record.time_s[-1]  # rad
+    last = replace(last, record=Record(last.record.time_s, last.record.yaw_rad + creeping))
+    base = nominal(replace(data, runs=(*others, last)))
+
+    def second_parts():
+        return {part.band for one in pn.random_moments(base) for part in one.spectrum[1:]}
+
+    assert "broad_band" not in second_parts()
+    monkeypatch.setattr(pn, "_pays_in_all_runs", lambda *_: True)
+    assert "broad_band" in second_parts()
+
+
+def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence():
+    """An octave with sharp edges has two parts, both of them turbulence."""
+    rng = np.random.default_rng(3)
+
+    def octave(time, speed):
+        del speed
+        white = np.fft.rfft(rng.standard_normal(time.size))
+        frequency = np.fft.rfftfreq(time.size, time[1])
+        white[(frequency < 4.0) | (frequency > 8.0)] = 0.0
+        found = np.fft.irfft(white, time.size)
+        return 0.03 * found / np.std(found)
+
+    base = nominal(with_moment(campaign(), octave))
+    found = pn.likeliest(pn.random_moments(base))
+    assert [part.band for part in found.spectrum] == ["broad_band", "broad_band"]
+    (answer,) = weigh_random_moments(base, [], BOTH)
+    assert answer.effects == ("buffeting",)
 
 
 def test_turbulence_about_a_frequency_is_recovered():
@@ -377,5 +443,5 @@ def test_turbulence_about_a_frequency_is_recovered():
     broad, centred = fit_turbulence(fit), fit_turbulence(fit, centred=True)
     assert broad is not None
     assert centred is not None
-    assert centred.spectrum.centre == pytest.approx(5.0, rel=0.1)
+    assert centred.spectrum[0].centre == pytest.approx(5.0, rel=0.1)
     assert centred.cost < broad.cost - 100.0

@@ -47,7 +47,7 @@ def study() -> Study:
 def test_a_random_moment_answers_where_it_leaves_less_than_the_steady_one(
     study: Study, share: float, is_random: bool
 ) -> None:
-    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, left(share))  # type: ignore[arg-type]
+    moment = RandomAnswer((effect_class("vortex_shedding"),), None, None, left(share))  # type: ignore[arg-type]
     asked = replace(study, random=(moment,)).random_answer(("vortex_shedding",))
     assert (asked is moment) == is_random
 
@@ -58,7 +58,7 @@ def test_the_answer_is_polished_unless_a_random_moment_gives_it(
 ) -> None:
     polished = replace(study.hypotheses[0], textbook=study.nominal)
     monkeypatch.setattr("diagnosis.search.investigate.polish", lambda _: polished)
-    moment = RandomAnswer(effect_class("vortex_shedding"), None, None, left(0.4))  # type: ignore[arg-type]
+    moment = RandomAnswer((effect_class("vortex_shedding"),), None, None, left(0.4))  # type: ignore[arg-type]
     found = _polished(study.hypotheses, Weighed(("vortex_shedding",), 0.5, 0.9), (moment,) if random else ())
     assert found == (study.hypotheses if random else (polished,))
 

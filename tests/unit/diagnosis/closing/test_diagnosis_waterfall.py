@@ -24,7 +24,7 @@ from diagnosis.likelihood.run_data import FOLDS
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import Candidate
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.process_noise import MomentSpectrum, ProcessNoise
+from diagnosis.search.process_noise import ProcessNoise, SpectrumPart
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.weigh import FittedSet, Weighed
 from tests.unit.gap_campaigns import NOISE, nominal, studied
@@ -152,9 +152,11 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
     """Where the wind is off the runs' own residuals are left, and nothing beside the moment is taken out."""
     kind = effect_class("buffeting")
     best = added(base, IDLE)
-    process = ProcessNoise(MomentSpectrum(0.01, 5.0), 10.0, np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012)
+    process = ProcessNoise(
+        (SpectrumPart(0.01, 5.0),), np.full(4, 2.5), np.ones(4), 5.0, 0.25, [np.ones(9)] * 4, 0.012
+    )
     random = RandomAnswer(
-        kind, process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
+        (kind,), process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
     )
     study = studied(data, base, (kind.name, IDLE, HUM))
     study = replace(study, random=(random,), weighed=(Weighed((kind.name, IDLE), 0.01, 0.9),))
