@@ -281,7 +281,8 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     else:
         last = models.random_excess(random)
         without = {name: last + size for name, size in models.read_off.items()}
-        moment = " + ".join(kind.name for kind in random.kinds)
+        acting = [kind.name for kind in random.kinds]  # one may act steadily, too, and be among the steps
+        moment = " + ".join([name for name in acting if name not in names] or acting)
         without[moment] = steps[-1].excess
         steps.append(Step(moment, last))
     return Waterfall(tuple(steps), without, models.words)

@@ -153,7 +153,11 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
     left = [misfit_shown(document, step["excess"]) for step in steps]
     if steps and _calm(document):
         left[-1] = WITHIN_THE_NOISE
-    closes = {step["effect"]: f"{a} to {b}" for step, (a, b) in zip(steps[1:], pairwise(left), strict=True)}
+    closes: dict[str, str] = {}
+    for step, (before, after) in zip(steps[1:], pairwise(left), strict=True):
+        added = step["effect"].split(" + ")
+        together = ", all together" if len(added) > 1 else ""
+        closes |= dict.fromkeys(added, f"{before} to {after}{together}")
     return [
         {
             "name": plain(name),

@@ -132,6 +132,16 @@ def test_what_a_last_cause_leaves_within_the_noise_is_not_a_number(given: Docume
     assert cause["closes"].endswith("° to within the noise")
 
 
+def test_causes_added_together_close_together(given: Document) -> None:
+    given = copy.deepcopy(given)
+    names = "buffeting + vortex_shedding"
+    given["candidates"][0]["effect"] = given["waterfall"][-1]["effect"] = names
+    given["causes"] = names.split(" + ")
+    first, second = view.causes_found(given)
+    assert first["closes"] == second["closes"]
+    assert first["closes"].endswith(", all together")
+
+
 def test_minus_signs_and_powers_of_ten() -> None:
     assert view.typeset("-0.5 to (1.2 ± 0.3)e-05, 1.910e+06") == "−0.5 to (1.2 ± 0.3) × 10⁻⁵, 1.910 × 10⁶"
     assert view.typeset("wind-on run r-1e5 at 3e") == "wind-on run r-1e5 at 3e"
