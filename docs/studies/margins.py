@@ -1,18 +1,20 @@
 """Which decisions would a constant of half or twice its size change? On campaigns whose truth is open.
 
-    python -m docs.studies.margins FOLDER [FOLDER ...] [--count N]
+    python -m docs.studies.margins FOLDER [FOLDER ...] [--count N] [--kept FILE]
 
 Each folder is a campaign, or a set made by ``tunnel blind make``. Every number of `diagnosis.policy` that is not
 whole is replaced by one that remembers what it would be at half and at twice its size. Each comparison that it
 takes part in is then made three times, so that one diagnosis of each campaign says of all constants how often a
 comparison comes out differently. Where none does, the constant decides nothing in these campaigns. Where some do,
 the answer need not change: `docs.studies.ablation` moves one constant at a time and answers again. A constant
-that becomes part of an array before it is compared is not followed.
+that becomes part of an array before it is compared is not followed. FILE keeps the counts of every campaign; the
+same command goes on where it was interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import operator
 import sys
 from collections import defaultdict
@@ -22,9 +24,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.progress import track
 
 from diagnosis import diagnose, policy
+from tunnel_lab.terminal.outputs import console
 from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 FACTORS = (0.5, 2.0)
@@ -131,18 +136,26 @@ def watched() -> Iterator[Counts]:
             setattr(module, name, value)
 
 
-def table(folders: list[Path], count: int) -> Iterator[str]:
-    """Rows of Markdown, one of every constant that is not whole."""
+def table(folders: list[Path], count: int, kept: Path | None = None) -> Iterator[str]:
+    """Rows of Markdown, one of every constant that is not whole.
+
+    Args:
+        count: of the campaigns of each folder, from the first.
+        kept: the file of counts by campaign.
+    """
     campaigns = [path.parent for folder in folders for path in sorted(folder.rglob("campaign.toml"))[:count]]
-    diagnosed = 0
+    known = json.loads(kept.read_text("utf-8")) if kept is not None and kept.exists() else {}
     total: dict[str, Any] = defaultdict(lambda: np.zeros(5, int))
-    for campaign in campaigns:
-        with suppress(TunnelError), watched() as found:
-            diagnose(read_campaign(campaign))
-        diagnosed += 1
-        for name, numbers in found.items():
+    for campaign in track(campaigns, "diagnosing", console=console(stderr=True)):
+        if str(campaign) not in known:
+            with suppress(TunnelError), watched() as found:
+                diagnose(read_campaign(campaign))
+            known[str(campaign)] = {name: list(numbers) for name, numbers in found.items()}
+            if kept is not None:
+                write_json(kept, known)
+        for name, numbers in known[str(campaign)].items():
             total[name] += np.array([*numbers, *(number > 0 for number in numbers[1:])])
-    yield f"{diagnosed} campaigns"
+    yield f"{len(campaigns)} campaigns"
     yield ""
     yield "| constant | comparisons | otherwise at half | in campaigns | otherwise at twice | in campaigns |"
     yield "|---|---:|---:|---:|---:|---:|"
@@ -157,12 +170,13 @@ def main() -> None:
     reader = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     reader.add_argument("folders", type=Path, nargs="+", help="campaigns, or sets made by tunnel blind make")
     reader.add_argument("--count", type=int, default=1000, help="campaigns of each folder, from the first")
+    reader.add_argument("--kept", type=Path, metavar="FILE", help="keep the counts, and go on from them")
     given = reader.parse_args()
     if empty := [str(folder) for folder in given.folders if not any(folder.rglob("campaign.toml"))]:
         reader.error(
             f"no campaign.toml in {', '.join(empty)}; name a campaign, or a set of tunnel blind make"
         )
-    for line in table(given.folders, given.count):
+    for line in table(given.folders, given.count, given.kept):
         print(line, flush=True)
 
 

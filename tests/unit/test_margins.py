@@ -8,7 +8,8 @@ from scipy.special import chdtri
 
 from diagnosis import policy
 from diagnosis.search import weigh
-from docs.studies.margins import Watched, watched
+from docs.studies.margins import Watched, table, watched
+from tunnel_sim.files.writing import write_json
 
 
 def number(value=4.0, name="C"):
@@ -49,3 +50,12 @@ def test_constants_are_watched_where_they_are_used_and_put_back():
         assert weigh.policy.STEEPNESS.at == {"STEEPNESS": (0.5 * before, 2.0 * before)}
         assert before == weigh.policy.STEEPNESS
     assert type(policy.STEEPNESS) is float
+
+
+def test_campaigns_counted_before_are_not_diagnosed_again(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "campaign.toml").touch()
+    counted = {str(tmp_path / "a"): {"LEAK": [7, 0, 2]}, str(tmp_path / "b"): {"LEAK": [3, 1, 0]}}
+    kept = write_json(tmp_path / "counts.json", counted)
+    assert "| `LEAK` | 10 | 1 | 1 | 2 | 1 |" in table([tmp_path], 10, kept)
