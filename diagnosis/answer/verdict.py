@@ -12,10 +12,11 @@ from diagnosis.closure import Move, Remainder, of_swing, rms_shown
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.policy import FALSE_ALARM_RATE, FEW_RUNS, MATERIAL_SHARE, NOISE_CONTRADICTED
+from diagnosis.policy import FALSE_ALARM_RATE, FEW_RUNS, MATERIAL_SHARE, MOST, NOISE_CONTRADICTED
 from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
 from diagnosis.result import Confirmation, GapSummary, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
+from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN
 from identification.printing import COEFFICIENTS, significant, unit_mark
 from tunnel_sim.effects import effect_class
@@ -187,6 +188,25 @@ def blind_spots(data: Data) -> tuple[str, ...]:
         scale = _OF_GAIN if springs and data.law is not None else scale
         return (*found, BLIND_SPOTS[1], scale, *last)
     return (*found, *BLIND_SPOTS, *last)
+
+
+def spring_words(study: Study) -> tuple[str, ...]:
+    """The likeliest pair of springs that are off, in a sentence; none where none closes most of the gap."""
+    best = min(study.outside, key=lambda pair: pair.fit.total, default=None)
+    if best is None or best.fit.excess > (1.0 - MOST) * study.nominal.excess:
+        return ()
+    chosen, inflate = dict(best.fit.problem.fixed), float(np.sqrt(1.0 + max(best.fit.excess, 0.0)))
+    springs = []
+    for name in (ONE_SPRING.name, AnotherSpring.name):
+        stiffness = study.similarity.own(chosen[f"{name}.{ONE_SPRING.chosen_spring()}"], "N m/rad")
+        error, std = (100.0 * of(f"{name}.error") for of in (best.fit.value, best.fit.std))
+        springs.append(f"{stiffness:.4g} N m/rad by {error:+.2f} ± {inflate * std:.2g} %")
+    beside = [name for name in best.names if name not in (ONE_SPRING.name, AnotherSpring.name)]
+    others = f" beside {plain(*beside)}" if beside else ""
+    return (
+        f"Two springs that are not as stiff as stated would explain the gap{others}, such as "
+        f"{' and '.join(springs)}: measure their stiffness again.",
+    )
 
 
 def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Remainder:

@@ -81,14 +81,14 @@ class Hypothesis:
                 found[CHANNELS.index(channel)] += 0.5 * NEEDLESS_CHI2 * count
         return found
 
-    def fitted_set(self, nominal: Fit) -> FittedSet:
+    def fitted_set(self, nominal: Fit, *, outside: bool = False) -> FittedSet:
         """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves.
 
         What instants and phases of the runs gain by chance counts as left.
         """
         by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
-        return FittedSet(self.effects, share, self.excess, self.further_numbers)
+        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside)
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,6 +31,7 @@ from diagnosis.noise.sensor_noise import (
 )
 from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
+from diagnosis.search.outside import two_springs
 from diagnosis.search.random_moments import RandomAnswer, weigh_random_moments, without_the_random_moment
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 from diagnosis.where.place import Place, locate
@@ -59,6 +60,7 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
+        outside: fitted causes from outside the vocabulary, alone or beside effects.
         by_moment: the sets fitted with a random moment beside them, where sets are weighed by the moment that they
             leave and not by the angle.
         rested: runs that end with a long rest, which the fits of effects leave out.
@@ -80,6 +82,7 @@ class Study:
     nominal: Fit
     test: GapTest
     cut: bool = False
+    outside: tuple[Hypothesis, ...] = ()
     by_moment: tuple[Hypothesis, ...] = ()
     rested: tuple[str, ...] = ()
     place: Place | None = None
@@ -257,7 +260,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         data = found.nominal.problem.data
         with clock.step("effects"):
             grown = grow_in_stretches(data, fit_nominal, fitted, clock.progress)
-        found = _pruned(replace(found, hypotheses=grown.hypotheses), grown.nominal, clock)
+        found = _compared(replace(found, hypotheses=grown.hypotheses), grown.nominal, clock)
         with clock.step("polishing"):
             return _with_whole_runs(found, grown.nominal, lambda h: grown.whole(h, data))
     moving, rested = without_long_rest(found.nominal.problem.data)
@@ -271,7 +274,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         random = weigh_random_moments(found.nominal, found.hypotheses, kinds)
         sets = without_the_random_moment(random, found.hypotheses, misfit(found.nominal))
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
-    found = _pruned(found, found.nominal, clock)
+    found = _compared(found, found.nominal, clock)
     weighed = _weighed(found, found.nominal)
     best = _best(found, weighed) if found.campaign.unrestrained else None
     if best is not None and best.fit.chance < 1.0:
@@ -324,7 +327,7 @@ def _weigh_by_moment(
 
     with clock.step("effects"):
         found = replace(found, hypotheses=tuple(grow(base, kinds, clock.progress)))
-    found = _pruned(found, base, clock)
+    found = _compared(found, base, clock)
     found = replace(found, by_moment=found.hypotheses)
     with clock.step("polishing"):
         return _with_whole_runs(found, base, whole)
@@ -344,6 +347,15 @@ def _with_whole_runs(
             return kept
         left = tuple(h for h in found.hypotheses if h.names != weighed[0].effects)
         found = replace(found, hypotheses=left)
+
+
+def _compared(found: Study, base: Fit, clock: _Clock) -> Study:
+    """The study with the sets that the answer has to be compared with."""
+    found = _pruned(found, base, clock)
+    likely = [w.effects for w in _weighed(found, base) if w.probability > policy.WORTH_NAMING]
+    answers = [hypothesis for names in likely if (hypothesis := found.hypothesis(names)) is not None]
+    with clock.step("pruning"):
+        return replace(found, outside=tuple(two_springs(answers, found.hypotheses, base)))
 
 
 def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
@@ -392,6 +404,7 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
         ]
         own += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
     sets = [h.fitted_set(base) for h in found.hypotheses]
+    sets += [h.fitted_set(base, outside=True) for h in found.outside]
     sets += [answer.left for answer in found.random]
     if found.read_off:  # it may be the only cause, and is part of the gap
         sets.append(FittedSet((), 1.0, nominal.excess))

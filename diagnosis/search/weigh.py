@@ -44,12 +44,14 @@ class FittedSet:
         share: of the gap that it leaves open, a fraction; below 0 by chance.
         excess: χ² beyond that of noise by channel, shape (6,), dimensionless.
         numbers: how many it has beside its own: freed forms and instants, less two where gravity replaces a spring.
+        outside: whether it is from outside the vocabulary: what is probable of it is probable of ``unknown``.
     """
 
     effects: tuple[str, ...]
     share: float
     excess: Array
     numbers: int = 0
+    outside: bool = False
 
 
 def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
@@ -81,12 +83,15 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
         against.append(float(policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - doubt))
     odds = float(weights @ np.exp(against) / weights.sum()) if best else 0.0
     known = (1.0 - policy.EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
-    even = policy.EVEN_SHARE / (len(best) + 1)
+    inside = np.array([not given.outside for given in best.values()], bool)
+    even = policy.EVEN_SHARE / (int(inside.sum()) + 1)
     found = [
         Weighed(key, max(given.share, 0.0), float(probability) + even)
         for (key, given), probability in zip(best.items(), known, strict=True)
+        if not given.outside
     ]
-    unknown = Weighed(UNKNOWN, 1.0, (1.0 - policy.EVEN_SHARE) / (1.0 + odds) + even)
+    beyond = (1.0 - policy.EVEN_SHARE) / (1.0 + odds) + float(known[~inside].sum())
+    unknown = Weighed(UNKNOWN, 1.0, beyond + even)
     if unknown.probability < 0.5:
         first = max(found, key=lambda w: w.probability)
         rest = [unknown, *(w for w in found if w is not first)]

@@ -1,0 +1,63 @@
+"""A cause from outside the vocabulary: two springs that are not as stiff as stated.
+
+Every effect that changes the frequency with the spring has one number for it, and the inertia is another: two such
+effects fit any frequencies of three springs, so that they prove nothing by them. Two springs that are off are as
+simple (paper, Table II: springs 4 and 7), and are no effect of the vocabulary. They are weighed like a set of it;
+what is probable of them is probable of an unknown cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+
+_LEAST_SPRINGS = 3  # with fewer, one effect of the vocabulary fits any frequencies
+
+(ONE_SPRING,) = (kind for kind in ALL_EFFECTS if kind.chosen_spring() is not None)
+
+
+@dataclass(frozen=True)
+class AnotherSpring(ONE_SPRING):  # type: ignore[valid-type, misc]
+    """A second spring that is not as stiff as stated."""
+
+    name = "another_spring"
+
+
+def two_springs(answers: Iterable[Hypothesis], found: Sequence[Hypothesis], nominal: Fit) -> list[Hypothesis]:
+    """Two springs off, in place of the effects of answers that change the frequency with the spring.
+
+    Args:
+        answers: the sets that may be the answer.
+        found: fitted hypotheses; of the effects that stay, alone or with one spring off, at best among them.
+        nominal: the nominal model.
+
+    Returns:
+        Fitted hypotheses that lower χ² by more than needless effects would; none with fewer than three springs.
+    """
+    data = nominal.problem.data
+    if data.normalised or len(data.springs) < _LEAST_SPRINGS:
+        return []
+    known = {hypothesis.names: hypothesis for hypothesis in found} | {(): Hypothesis((), nominal)}
+    pairs: dict[tuple[str, ...], Hypothesis] = {}
+    for answer in answers:
+        kinds = answer.fit.problem.effects
+        others = tuple(sorted(kind.name for kind in kinds if not _differs_by_spring(kind)))
+        if len(others) == len(kinds) or others in pairs or others not in known:
+            continue
+        one = known.get(tuple(sorted((*others, ONE_SPRING.name))))
+        level = [one] if one is not None else sets_with_one_more([known[others]], [ONE_SPRING], None)
+        for pair in sets_with_one_more(level, [AnotherSpring], None):
+            fitted = None if pair.fit.converged else try_fit(pair.fit.problem, pair.fit.point)
+            pairs[others] = pair if fitted is None else replace(pair, fit=fitted)
+    return list(pairs.values())
+
+
+def _differs_by_spring(kind: type[Effect]) -> bool:
+    """Whether an effect changes the frequency of the runs of every spring by another share."""
+    stiffens = kind.channel == "stiffness" and kind.condition == "always" and not kind.on_spring
+    return stiffens or kind.chosen_spring() is not None
