@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.search.grow import sets_with_one_more
-from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.hypothesis import Hypothesis, restricted
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 
 _LEAST_SPRINGS = 3  # with fewer, one effect of the vocabulary fits any frequencies
@@ -47,10 +47,14 @@ def two_springs(answers: Iterable[Hypothesis], found: Sequence[Hypothesis], nomi
     for answer in answers:
         kinds = answer.fit.problem.effects
         others = tuple(sorted(kind.name for kind in kinds if not _differs_by_spring(kind)))
-        if len(others) == len(kinds) or others in pairs or others not in known:
+        if len(others) == len(kinds) or others in pairs:
             continue
-        one = known.get(tuple(sorted((*others, ONE_SPRING.name))))
-        level = [one] if one is not None else sets_with_one_more([known[others]], [ONE_SPRING], None)
+        one, rest = known.get(tuple(sorted((*others, ONE_SPRING.name)))), known.get(others)
+        if one is None and rest is None:
+            start = restricted(answer.fit, others)
+            fitted = try_fit(start.problem, start.point)
+            rest = None if fitted is None else Hypothesis(others, fitted)
+        level = [one] if one is not None else sets_with_one_more([rest] if rest else [], [ONE_SPRING], None)
         for pair in sets_with_one_more(level, [AnotherSpring], None):
             fitted = None if pair.fit.converged else try_fit(pair.fit.problem, pair.fit.point)
             pairs[others] = pair if fitted is None else replace(pair, fit=fitted)
