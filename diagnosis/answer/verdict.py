@@ -18,7 +18,7 @@ from diagnosis.result import Confirmation, GapSummary, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
 from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN
-from identification.printing import COEFFICIENTS, significant, unit_mark
+from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -200,7 +200,8 @@ def spring_words(study: Study) -> tuple[str, ...]:
     for name in (ONE_SPRING.name, AnotherSpring.name):
         stiffness = study.similarity.own(chosen[f"{name}.{ONE_SPRING.chosen_spring()}"], "N m/rad")
         error, std = (100.0 * of(f"{name}.error") for of in (best.fit.value, best.fit.std))
-        springs.append(f"{stiffness:.4g} N m/rad by {error:+.2f} ± {inflate * std:.2g} %")
+        sign = "+" if error > 0.0 else ""
+        springs.append(f"{stiffness:.4g} N m/rad by {sign}{with_std(error, inflate * std)} %")
     beside = [name for name in best.names if name not in (ONE_SPRING.name, AnotherSpring.name)]
     others = f" beside {plain(*beside)}" if beside else ""
     return (

@@ -307,9 +307,8 @@ def _weigh_by_moment(
         None where no set explains the angle, and none leaves a small moment.
     """
     data = found.nominal.problem.data
-    bases: list[
-        Fit
-    ] = []  # the nominal model in the noise that the likeliest set leaves, and others worth naming
+    # the nominal model in the noise that the likeliest set leaves, and that others worth naming leave
+    bases: list[Fit] = []
     for answer in weighed:
         left = found.hypothesis(answer.effects)
         if left is None or (bases and answer.probability < policy.WORTH_NAMING):

@@ -33,7 +33,7 @@ def two_springs(answers: Iterable[Hypothesis], found: Sequence[Hypothesis], nomi
 
     Args:
         answers: the sets that may be the answer.
-        found: fitted hypotheses; of the effects that stay, alone or with one spring off, at best among them.
+        found: fitted hypotheses, at which the fits start where they have the effects that stay.
         nominal: the nominal model.
 
     Returns:

@@ -155,24 +155,6 @@ def _wandering(data: Data) -> _Form | None:
     )
 
 
-def fit_turbulence(fit: Fit, *, centred: bool = False) -> ProcessNoise | None:
-    """Explain the residuals of the wind-on runs by turbulence of common coefficient.
-
-    Args:
-        centred: whether its spectrum has a centre of its own.
-
-    Returns:
-        The fit; None without wind-on runs or where the model is not stable.
-    """
-    return _fit(_channels(fit), (_CENTRED if centred else _BROAD,))
-
-
-def fit_wandering_shedding(fit: Fit) -> ProcessNoise | None:
-    """As `fit_turbulence`, by vortex shedding with a wandering phase; None without wind or body width too."""
-    form = _wandering(fit.problem.data)
-    return None if form is None else _fit(_channels(fit), (form,))
-
-
 def random_moments(fit: Fit) -> list[ProcessNoise]:
     """The random moments that may explain the residuals of a fit.
 

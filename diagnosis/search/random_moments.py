@@ -237,11 +237,9 @@ def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> H
 
     def cost(hypothesis: Hypothesis) -> float:
         process = likeliest(random_moments(_seen_in(hypothesis, data).fit))
-        return (
-            np.inf
-            if process is None
-            else process.cost + process.price + NEEDLESS_CHI2 * len(hypothesis.effects)
-        )
+        if process is None:
+            return np.inf
+        return process.cost + process.price + NEEDLESS_CHI2 * len(hypothesis.effects)
 
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):

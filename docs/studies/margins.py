@@ -8,7 +8,7 @@ takes part in is then made three times, so that one diagnosis of each campaign s
 comparison comes out differently. Where none does, the constant decides nothing in these campaigns. Where some do,
 the answer need not change: `docs.studies.ablation` moves one constant at a time and answers again. A constant
 that becomes part of an array before it is compared is not followed. FILE keeps the counts of every campaign; the
-same command goes on where it was interrupted.
+same command goes on where it was interrupted. They are those of one state of the code.
 """
 
 from __future__ import annotations
@@ -136,15 +136,15 @@ def watched() -> Iterator[Counts]:
             setattr(module, name, value)
 
 
-def table(folders: list[Path], count: int, kept: Path | None = None) -> Iterator[str]:
+def table(folders: list[Path], count: int, known: dict[str, Any], kept: Path | None = None) -> Iterator[str]:
     """Rows of Markdown, one of every constant that is not whole.
 
     Args:
         count: of the campaigns of each folder, from the first.
-        kept: the file of counts by campaign.
+        known: counts by campaign from before; those of further campaigns are added.
+        kept: the file that keeps them.
     """
     campaigns = [path.parent for folder in folders for path in sorted(folder.rglob("campaign.toml"))[:count]]
-    known = json.loads(kept.read_text("utf-8")) if kept is not None and kept.exists() else {}
     total: dict[str, Any] = defaultdict(lambda: np.zeros(5, int))
     for campaign in track(campaigns, "diagnosing", console=console(stderr=True)):
         if str(campaign) not in known:
@@ -176,7 +176,11 @@ def main() -> None:
         reader.error(
             f"no campaign.toml in {', '.join(empty)}; name a campaign, or a set of tunnel blind make"
         )
-    for line in table(given.folders, given.count, given.kept):
+    try:
+        known = json.loads(given.kept.read_text("utf-8")) if given.kept and given.kept.exists() else {}
+    except (OSError, ValueError) as error:
+        reader.error(f"cannot read the counts in {given.kept} ({error}); name another file")
+    for line in table(given.folders, given.count, known, given.kept):
         print(line, flush=True)
 
 

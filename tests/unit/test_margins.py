@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.special import chdtri
 
 from diagnosis import policy
 from diagnosis.search import weigh
-from docs.studies.margins import Watched, table, watched
-from tunnel_sim.files.writing import write_json
+from docs.studies.margins import Watched, main, table, watched
 
 
 def number(value=4.0, name="C"):
@@ -57,5 +58,13 @@ def test_campaigns_counted_before_are_not_diagnosed_again(tmp_path):
         (tmp_path / name).mkdir()
         (tmp_path / name / "campaign.toml").touch()
     counted = {str(tmp_path / "a"): {"LEAK": [7, 0, 2]}, str(tmp_path / "b"): {"LEAK": [3, 1, 0]}}
-    kept = write_json(tmp_path / "counts.json", counted)
-    assert "| `LEAK` | 10 | 1 | 1 | 2 | 1 |" in table([tmp_path], 10, kept)
+    assert "| `LEAK` | 10 | 1 | 1 | 2 | 1 |" in table([tmp_path], 10, counted)
+
+
+def test_counts_that_cannot_be_read_are_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    (tmp_path / "campaign.toml").touch()
+    (tmp_path / "counts.json").write_text("{", "utf-8")
+    monkeypatch.setattr(sys, "argv", ["margins", str(tmp_path), "--kept", str(tmp_path / "counts.json")])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "cannot read the counts in" in capsys.readouterr().err

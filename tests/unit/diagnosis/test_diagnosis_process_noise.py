@@ -19,8 +19,6 @@ from diagnosis.search.process_noise import (
     SpectrumPart,
     bursts,
     departure_from_white,
-    fit_turbulence,
-    fit_wandering_shedding,
     is_steady_noise,
     of_all_runs,
     with_response,
@@ -79,6 +77,14 @@ def random_response(rng, spring, speed, intensity, bandwidth):
         angles[k] = state[0]
         state = step @ state + root @ rng.standard_normal(3)
     return angles
+
+
+def fit_turbulence(base, *, centred=False):
+    return pn._fit(pn._channels(base), (pn._CENTRED if centred else pn._BROAD,))
+
+
+def fit_wandering_shedding(base):
+    return pn._fit(pn._channels(base), (pn._wandering(base.problem.data),))
 
 
 @pytest.fixture(scope="module")
