@@ -112,8 +112,8 @@ SET_PRICE, FORM_PRICE = 3.0, 1.0
 #: prefer the lower end, and the measured records do not say. The upper end was taken after a measured pendulum had
 #: been given a false sensor nonlinearity at 7e-4.
 MODEL_ERROR = 1e-3
-#: Share of what is left in the other channels that counts in a channel: an error of the phase, squared, is one of
-#: the amplitude. Tuned, together with the number of the odds below, with all open records in sight (0007).
+#: Share of the misfit in other channels that counts in a channel: an error of the phase, squared, is one of the
+#: amplitude. Tuned, together with the number of the odds below, with all open records in sight (0007).
 LEAK = 0.02
 #: χ² of a channel by which a set with a needless effect may be better than one without. By chance alone two
 #: numbers lower it by more than 20 once in 22,000 effects tried, so that of 25 effects one does in one campaign of

@@ -24,7 +24,7 @@ from diagnosis.search.hypothesis import (
     turned_back,
     with_forms,
 )
-from diagnosis.search.weigh import log_misfit, misfit_scale
+from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
 from tunnel_sim.effects import Effect
 
 _ITERATIONS = 12  # of a fit on the way; the answer's own is polished
@@ -206,7 +206,7 @@ def _worth_fitting(
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
     scale = misfit_scale(misfit(parent.fit))
-    scored.sort(key=lambda item: min(log_misfit(start.predicted, scale) for start in item[1]))
+    scored.sort(key=lambda item: min(log_misfit(start.predicted, scale, OF_MOTION) for start in item[1]))
     if parent.effects:
         needed, own = [], own_gain(parent.fit.problem, parent.fit.point)
         for kind, starts in scored[: policy.GROWN_BY]:

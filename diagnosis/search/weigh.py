@@ -13,10 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis import policy
-from diagnosis.likelihood.residuals import ChannelMisfit
+from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
 from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN = ("unknown",)
+#: The channels between which a misfit leaks where sets are compared, 1 or 0, shape (6,): an error of the phase,
+#: squared, is one of the amplitude. A misfit of the zero or of the harmonics is no error of the phase.
+OF_MOTION = np.array([0.0 if name in ("zero", "harmonics") else 1.0 for name in CHANNELS])
+#: The same for the odds against ``unknown``, which were fitted with a leak between all channels.
+ALL_CHANNELS = np.ones(len(CHANNELS))
 _LEAST_CLOSED = 0.02  # a share: keeps its logarithm finite
 
 
@@ -75,9 +80,9 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
     weights = np.exp(logs - logs.max(initial=-np.inf))
     # odds of each set against an unknown cause
     by_chance = misfit_scale(nominal, policy.CHANCE_STDS * np.sqrt(2.0 * nominal.count))
-    gap, against = log_misfit(nominal.excess, by_chance), []
+    gap, against = log_misfit(nominal.excess, by_chance, ALL_CHANNELS), []
     for given in best.values():
-        left = log_misfit(given.excess, by_chance)
+        left = log_misfit(given.excess, by_chance, ALL_CHANNELS)
         closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
         doubt = policy.UNKNOWN_LEFT * (np.log1p(left) - np.log(closed + _LEAST_CLOSED))
         against.append(float(policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - doubt))
@@ -132,18 +137,20 @@ def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
         numbers: how many it has beside their own.
     """
     price = policy.SET_PRICE * effects + policy.FORM_PRICE * numbers
-    return -policy.STEEPNESS * log_misfit(left, scale) - price
+    return -policy.STEEPNESS * log_misfit(left, scale, OF_MOTION) - price
 
 
-def log_misfit(left: Array, scale: Array) -> float:
-    """Sum over the channels of the logarithm of what is left, 0 where nothing is.
+def log_misfit(left: Array, scale: Array, leaking: Array) -> float:
+    """Sum over the channels of the logarithm of the misfit, 0 where there is none.
 
     Args:
         left: χ² by channel, shape (6,), dimensionless.
         scale: from `misfit_scale`, shape (6,).
+        leaking: the channels between which `LEAK` of a misfit counts: `OF_MOTION` or `ALL_CHANNELS`.
     """
     above = np.maximum(left, 0.0)
-    return float(np.sum(np.log1p((above + policy.LEAK * (above.sum() - above)) / scale)))
+    shared = leaking * above
+    return float(np.sum(np.log1p((above + policy.LEAK * leaking * (shared.sum() - shared)) / scale)))
 
 
 def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:

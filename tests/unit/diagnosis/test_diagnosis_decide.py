@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
-from diagnosis.policy import LEAK, MODEL_ERROR, SET_PRICE, STEEPNESS, WORTH_NAMING
-from diagnosis.search.weigh import UNKNOWN, FittedSet, main_effect, misfit_scale, weigh
+from diagnosis.policy import MODEL_ERROR, SET_PRICE, STEEPNESS, WORTH_NAMING
+from diagnosis.search.weigh import UNKNOWN, FittedSet, log_weight, main_effect, misfit_scale, weigh
 
 NAMES = ("a", "b", "c", "d", "e")
 COUNT = np.array([200.0, 200.0, 24.0, 24.0, 210.0, 29_000.0])
@@ -76,13 +76,23 @@ def test_an_error_of_the_frequency_does_not_hide_a_cause_in_the_damping():
     assert odds[0] > 3.0 * odds[1]
 
 
+@pytest.mark.parametrize("channel", ["zero", "harmonics"])
+def test_a_misfit_of_the_zero_or_the_harmonics_does_not_hide_a_cause_in_the_damping(channel):
+    """A quadratic damping closes all of its channel beside lost encoder counts that no set explains."""
+    scale = misfit_scale(nominal(channels(damping=3e4, **{channel: 3e6})))
+    dry = log_weight(channels(damping=3e3, **{channel: 3e6}), scale, 1, 0)
+    both = log_weight(channels(**{channel: 3e6}), scale, 2, 0)
+    assert both > dry
+
+
 @pytest.mark.parametrize("margin", [0.9, 1.1])
 def test_a_further_effect_must_close_its_price(margin):
-    """In all channels alike, so that the leak changes nothing."""
+    """In the two channels that exchange nothing, alike."""
     gap, single = np.full(6, 1e6), 1e4
-    scale = misfit_scale(nominal(gap))[0] / (1.0 + 5.0 * LEAK)
-    pair = (single + scale) * np.exp(-margin * SET_PRICE / STEEPNESS / len(CHANNELS)) - scale
-    found = probabilities({("a",): np.full(6, single), ("a", "b"): np.full(6, pair)}, gap)
+    scale = misfit_scale(nominal(gap))[0]
+    pair = (single + scale) * np.exp(-margin * SET_PRICE / STEEPNESS / 2.0) - scale
+    left = {key: channels(zero=x, harmonics=x) for key, x in ((("a",), single), (("a", "b"), pair))}
+    found = probabilities(left, gap)
     assert (found[("a", "b")] > found[("a",)]) == (margin > 1.0)
 
 

@@ -19,11 +19,12 @@ SETS = {
 }
 
 
-def misfit(left, scales):
-    """Sum of logarithms over the channels, with the leak from the others."""
+def misfit(left, scales, leaking=6):
+    """Sum of logarithms over the channels, with the leak between the first few of them."""
     above = [max(x, 0.0) for x in left]
+    leaked = [sum(above[:leaking]) - x for x in above[:leaking]] + [0.0] * (6 - leaking)
     return sum(
-        log(1.0 + (x + policy.LEAK * (sum(above) - x)) / s) for x, s in zip(above, scales, strict=True)
+        log(1.0 + (x + policy.LEAK * y) / s) for x, y, s in zip(above, leaked, scales, strict=True)
     )
 
 
@@ -32,7 +33,7 @@ def test_the_probabilities_are_those_of_the_decision():
     scale = [policy.NEEDLESS_CHI2 + policy.MODEL_ERROR**2 * MOTION] * 6
     weights = {
         key: exp(
-            -policy.STEEPNESS * misfit(left - least, scale)
+            -policy.STEEPNESS * misfit(left - least, scale, leaking=4)  # damping and frequency, and of runs
             - policy.SET_PRICE * len(key)
             - policy.FORM_PRICE * numbers
         )
