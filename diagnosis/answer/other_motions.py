@@ -21,6 +21,7 @@ from tunnel_sim.vocabulary.record import Array, evenly_spaced
 _MOST = 1024  # thinned readings used: fifty cycles
 _LEAST = 64
 _PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a mode that decays sooner is lost in the whole
+_LEAST_CYCLES = 0.5  # in its lifetime 1/rate: judgement; what dies out sooner never swings to the other side
 _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
 
 
@@ -40,7 +41,7 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
     Returns:
         A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
         the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
-        its first quarter. Driven runs are left out.
+        its first quarter. A mode that dies out before it swings to the other side is none. Driven runs are left out.
     """
     found = []
     for run in campaign.runs:
@@ -58,6 +59,8 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
                 continue
             order = np.argsort(np.abs(two.frequency - one.frequency[0]))
             resolution = float(two.rate.sum()) / np.pi
+            if np.any(two.frequency < _LEAST_CYCLES * two.rate):
+                continue  # an impulse or a drift, and no oscillation
             turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
             if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
                 continue  # not resolved, or a harmonic of the motion

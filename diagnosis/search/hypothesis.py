@@ -140,12 +140,16 @@ def is_plausible(fitted: Fit) -> bool:
     """Whether every effect of a fit is still what its name means, in at least half of the runs.
 
     Gravity that cancels most of an unstated spring is not: what both leave is called a spring that is not linear.
+    Neither is a power law whose free exponent ends at a bound: the readings ask for another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
     if problem.data.normalised and problem.data.law is None:
         spring, gravity = fitted.value("stiffness"), sum(effect.stiffness_at_rest for effect in effects)
         if -gravity > MOST * spring:
             return False
+    exponents = [f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent]
+    if any(name in problem.names and fitted.bound(name) for name in exponents):
+        return False
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
     return all(np.mean([effect.plausible(omega) for omega in motions]) >= IN_RUNS for effect in effects)
 

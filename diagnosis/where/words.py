@@ -112,7 +112,7 @@ def agreement(where: Where, kinds: Sequence[type[Effect]]) -> str:
     if not kinds or where.channel is None:
         return ""
     names = plain(*(kind.name for kind in kinds))
-    if where.channel in {kind.channel for kind in kinds}:
+    if any(where.channel in (kind.channel, *kind.resembles) for kind in kinds):
         return f"That agrees with {names}."
     acts = " and ".join(dict.fromkeys(_CHANNEL_WORDS[kind.channel] for kind in kinds))
     return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."

@@ -73,6 +73,7 @@ class Effect:
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
+    - ``resembles``: channels that its residual may point to beside its own.
     - ``tries``: how many starting points of a fit are worth trying.
     - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own.
     - ``caveat``: how to read the coefficients that are reported with it.
@@ -99,6 +100,7 @@ class Effect:
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""
+    resembles: ClassVar[tuple[Channel, ...]] = ()
     tries: ClassVar[int] = 1
     advice: ClassVar[str] = ""
     caveat: ClassVar[str] = ""

@@ -40,6 +40,10 @@ def test_one_mode_its_harmonic_and_a_mode_that_is_not_resolved_are_not_named(oth
     assert second_modes(campaign(MOTION, *others)) == ()
 
 
+def test_what_dies_out_within_a_tenth_of_a_cycle_is_no_mode():
+    assert second_modes(campaign(MOTION, (0.1, 0.5, 5.0))) == ()
+
+
 def two_modes(derivative, share):
     """Two runs of two uncoupled modes in closed form, with noise of a thousandth."""
     rng, time, runs = np.random.default_rng(1), np.arange(1500) / 100.0, []
