@@ -76,7 +76,8 @@ HUM_CONTRAST = 4.0
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
-#: Share of the readings' power in the residual beyond which a fit misses the motion itself. Judgement.
+#: Share of the readings' power in the residual, both about their means in every cycle, beyond which a fit misses the
+#: motion itself. Judgement.
 GROSS_MISFIT = 0.01
 
 # ---- Which effects are fitted ---------------------------------------------------------------------------------

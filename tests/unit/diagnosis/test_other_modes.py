@@ -76,3 +76,20 @@ def test_a_second_mode_is_an_answer_however_large_and_whatever_the_sensor_measur
     assert found.value("second_mode.amplitude") == pytest.approx(0.2 * share, rel=2e-3)
     frequency = study.similarity.own(found.value("second_mode.frequency"), "rad/s")
     assert frequency == pytest.approx(2.0 * np.pi * 1.75, rel=1e-3)
+
+
+@pytest.mark.parametrize("form", ["drift", "step"])
+def test_a_wandering_zero_is_not_a_missed_motion(form):
+    """It holds far more than a hundredth of the power."""
+    time, rng = np.arange(1500) / 100.0, np.random.default_rng(1)
+    wander = time / time[-1] if form == "drift" else np.where(time > 5.0, 1.0, 0.0)
+    size = 0.1 if form == "drift" else 0.05
+    yaw = 0.2 * np.exp(-0.1 * time) * np.cos(7.0 * time) + size * wander + rng.normal(0.0, 2e-4, time.size)
+    runs = (Run("r0", Record(time, yaw), 0.0),)
+    kinds = [effect_class(name) for name in ("sensor_drift", "cubic_stiffness", "coulomb_friction")]
+    study = investigate(Campaign("wander", RigProperties(), SensorProperties(100.0), runs), kinds)
+    assert not misses_motion(study.nominal)
+    assert not study.cut
+    if form == "drift":
+        assert study.fitted == ("sensor_drift",)
+        assert study.weighed[0].probability > 0.9
