@@ -163,6 +163,9 @@ LINE_CONTRAST = 8.0
 #: Probability from which the answer is decided; below, the diagnosis is undecided. Convention:
 #: more probable than all others together.
 DECIDED_FROM = 0.5
+#: Share of the gap on readings held out of the fit that an answer must close to be decided. Judgement: an answer that
+#: predicts less than a tenth of it has followed the readings that it was fitted to.
+PREDICTED_FROM = 0.1
 #: Probability of the smallest set of answers that is stated, and of what the likely answers have in common.
 #: Convention.
 CREDIBLE = 0.9

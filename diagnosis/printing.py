@@ -16,7 +16,7 @@ from diagnosis.closure import (
     patch_table,
     rms_shown,
 )
-from diagnosis.policy import CREDIBLE, DECIDED_FROM
+from diagnosis.policy import CREDIBLE, DECIDED_FROM, PREDICTED_FROM
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 from identification.status import Remark
 from tunnel_sim.effects import known_effects
@@ -46,16 +46,19 @@ class Decision:
     """What the probabilities of the answers allow to be said.
 
     Args:
-        decided: whether the answer has at least one half of the probability.
+        decided: whether the answer has at least one half of the probability, and predicts the readings held out of
+            the fit.
         credible: the fewest answers that together have nine tenths, with their probabilities, most probable first.
         effects: effects that nine tenths of the probability have among the causes, with their probabilities.
         channels: channels on which nine tenths of the probability act, likewise.
+        unpredictive: the answer, where it has one half of the probability and does not predict them; else empty.
     """
 
     decided: bool
     credible: tuple[tuple[str, float], ...]
     effects: Mapping[str, float]
     channels: Mapping[str, float]
+    unpredictive: str = ""
 
     def to_json_dict(self) -> dict[str, Any]:
         """The fields ``decided``, ``credible`` and ``common`` of a document."""
@@ -66,12 +69,13 @@ class Decision:
         }
 
 
-def decision(answers: Sequence[tuple[str, float]]) -> Decision:
-    """Judge the answers by their probabilities.
+def decision(answers: Sequence[tuple[str, float]], closed: float | None = None) -> Decision:
+    """Judge the answers by their probabilities, and the first of them by what it predicts.
 
     Args:
         answers: names joined by plus signs, ``none`` or ``unknown``, and probabilities, which sum to 1; the answer
             first.
+        closed: share of the gap that the answer closes on readings held out of the fit; None: not known.
     """
     credible, together = [], 0.0
     for answer in sorted(answers, key=lambda given: -given[1]):
@@ -81,8 +85,12 @@ def decision(answers: Sequence[tuple[str, float]]) -> Decision:
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
+    first, probable = answers[0][0], answers[0][1] >= DECIDED_FROM
+    names_effects = first not in ("none", "unknown")
+    predicts = not names_effects or closed is None or closed >= PREDICTED_FROM
     return Decision(
-        decided=answers[0][1] >= DECIDED_FROM,
+        decided=probable and predicts,
+        unpredictive=first if probable and not predicts else "",
         credible=tuple(credible),
         effects=_common(causes),
         channels=_common([({channel_of[name] for name in names}, value) for names, value in causes]),
@@ -116,6 +124,9 @@ def undecided_words(found: Decision) -> str:
         answers.append(f"{len(found.credible) - _SHOWN} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
     together = probability(sum(value for _, value in found.credible))
+    if found.unpredictive:
+        best = plain(*found.unpredictive.split(" + ")).capitalize()
+        common += f" {best} fits best, but does not predict readings held out of the fit."
     return f"{common} The answer is one of these, with probability {together} together: {most}."
 
 

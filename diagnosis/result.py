@@ -300,7 +300,7 @@ class Diagnosis:
     @property
     def decision(self) -> Decision:
         """Whether the answer is decided, and what the likely answers have in common."""
-        return decision([(candidate.effect, candidate.probability) for candidate in self.candidates])
+        return decision([(c.effect, c.probability) for c in self.candidates], self.gap.closed)
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""

@@ -139,7 +139,7 @@ def assemble(
         causes=study.causes,
         verdict=verdict(
             study.causes,
-            decision([(candidate.effect, candidate.probability) for candidate in weighed]),
+            decision([(candidate.effect, candidate.probability) for candidate in weighed], gap.closed),
             gap,
             rest=left,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),

@@ -164,7 +164,8 @@ class Case:
     def decision(self) -> Decision | None:
         """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
         answers = [(c["effect"], float(c["probability"])) for c in self.answer.get("candidates", ())]
-        return decision(answers) if answers else None
+        closed = (self.answer.get("gap") or {}).get("closed")
+        return decision(answers, closed) if answers else None
 
     @property
     def stated_wrongly(self) -> bool:

@@ -147,7 +147,9 @@ def is_plausible(fitted: Fit) -> bool:
         spring, gravity = fitted.value("stiffness"), sum(effect.stiffness_at_rest for effect in effects)
         if -gravity > MOST * spring:
             return False
-    exponents = [f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent]
+    exponents = [
+        f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent
+    ]
     if any(name in problem.names and fitted.bound(name) for name in exponents):
         return False
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]

@@ -333,7 +333,11 @@ class SecondMode(Effect):
     example = (0.005, 60.0, 0.01)
     autonomous = False
     line = "ringing"
-    resembles = ("stiffness", "damping", "forcing")  # it beats with the motion, whose phase and amplitude change
+    resembles = (
+        "stiffness",
+        "damping",
+        "forcing",
+    )  # it beats with the motion, whose phase and amplitude change
     tries = 2
     ahead_of_sensor = True
 

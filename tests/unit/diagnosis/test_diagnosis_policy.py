@@ -23,9 +23,7 @@ def misfit(left, scales, leaking=6):
     """Sum of logarithms over the channels, with the leak between the first few of them."""
     above = [max(x, 0.0) for x in left]
     leaked = [sum(above[:leaking]) - x for x in above[:leaking]] + [0.0] * (6 - leaking)
-    return sum(
-        log(1.0 + (x + policy.LEAK * y) / s) for x, y, s in zip(above, leaked, scales, strict=True)
-    )
+    return sum(log(1.0 + (x + policy.LEAK * y) / s) for x, y, s in zip(above, leaked, scales, strict=True))
 
 
 def test_the_probabilities_are_those_of_the_decision():

@@ -9,7 +9,7 @@ import pytest
 from diagnosis.answer.reported import held_out_totals
 from diagnosis.answer.verdict import verdict
 from diagnosis.closure import Misfit, Remainder, Step, Waterfall
-from diagnosis.printing import decision, gap_table, parameters_table
+from diagnosis.printing import decision, gap_table, parameters_table, undecided_words
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
 from tests.unit.diagnosis_document import campaign, document
 from tunnel_lab.report import view
@@ -186,6 +186,18 @@ def test_where_no_effect_is_common_the_channel_may_be():
 def test_the_credible_set_is_the_smallest_with_nine_tenths():
     assert [name for name, _ in decision(UNDECIDED).credible] == [name for name, _ in UNDECIDED[:3]]
     assert decision((("none", 0.999), ("unknown", 0.001))).credible == (("none", 0.999),)
+
+
+@pytest.mark.parametrize(("closed", "decided"), [(0.0, False), (0.09, False), (0.2, True), (None, True)])
+def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
+    answers = (("free_play", 0.61), ("coulomb_friction", 0.35), ("unknown", 0.04))
+    found = decision(answers, closed)
+    assert found.decided is decided
+    said_so = "Free play fits best, but does not predict readings held out of the fit." in undecided_words(
+        found
+    )
+    assert said_so is not decided
+    assert decision((("unknown", 0.9), ("free_play", 0.1)), 0.0).decided
 
 
 def test_an_undecided_answer_is_undecided_on_every_page():
