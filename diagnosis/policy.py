@@ -76,8 +76,8 @@ HUM_CONTRAST = 4.0
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1
-#: Share of the readings' power in the residual, both about their means in every cycle, beyond which a fit misses the
-#: motion itself. Judgement.
+#: Share of the readings' power in the residual, both about their means in every cycle, beyond which a fit misses
+#: the motion itself. Judgement.
 GROSS_MISFIT = 0.01
 
 # ---- Which effects are fitted ---------------------------------------------------------------------------------
@@ -163,8 +163,8 @@ LINE_CONTRAST = 8.0
 #: Probability from which the answer is decided; below, the diagnosis is undecided. Convention:
 #: more probable than all others together.
 DECIDED_FROM = 0.5
-#: Share of the gap on readings held out of the fit that an answer must close to be decided. Judgement: an answer that
-#: predicts less than a tenth of it has followed the readings that it was fitted to.
+#: Share of the gap on readings held out of the fit that an answer must close to be decided. Judgement: an answer
+#: that predicts less than a tenth of it has followed the readings that it was fitted to.
 PREDICTED_FROM = 0.1
 #: Probability of the smallest set of answers that is stated, and of what the likely answers have in common.
 #: Convention.

@@ -41,7 +41,8 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
     Returns:
         A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
         the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
-        its first quarter. A mode that dies out before it swings to the other side is none. Driven runs are left out.
+        its first quarter. What dies out before it swings to the other side is not a mode. Driven runs are left
+        out.
     """
     found = []
     for run in campaign.runs:
