@@ -19,7 +19,7 @@ from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
 from diagnosis.closure import PatchedModel
 from diagnosis.policy import MOST, WORTH_NAMING
-from diagnosis.printing import decision
+from diagnosis.printing import decision, plain
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
 from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, main_effect
@@ -72,6 +72,10 @@ _RESTED = (
 _AS_IDENTIFIED = (
     "With no cause these agree with the values of identify, whose standard deviations allow neither for the "
     "rounding of the stated air density nor for the spectrum of the noise."
+)
+_UNRESOLVED = (
+    "{} was fitted to the whole records and left out of the answer: neither the early nor the late half of them, "
+    "fitted by itself, shows it."
 )
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
@@ -165,6 +169,10 @@ def assemble(
             *left_out,
             *cautions(study.campaign, noise, gap.runs, shown.confirmation, named=study.named),
             *((_CUT_RECORDS,) if study.cut else ()),
+            *(
+                _UNRESOLVED.format(plain(*names).capitalize())
+                for names in dict.fromkeys(study.unresolved.values())
+            ),
             *((_RESTED.format(", ".join(study.rested)),) if study.rested else ()),
         ),
         inclusion=inclusion(weighed, study.read_off),

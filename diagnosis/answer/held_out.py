@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.closure import Step, Waterfall
-from diagnosis.likelihood.least_squares import Fit, FitError, clip, damped_step, scaled_residuals, try_fit
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
+from diagnosis.likelihood.partial import fit_seen, refit_releases
+from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import FOLDS, folds
 from diagnosis.likelihood.starting_points import starting_points
@@ -19,12 +20,6 @@ from diagnosis.search.investigate import COARSE_STEP, HUM, Study
 from diagnosis.search.random_moments import RandomAnswer
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
-
-_STEPS = 6  # Gauss–Newton steps without a group
-_TRIES = 4  # dampings tried in a step
-_GAIN = 1e-4  # share of χ² that a step must save
-_RELEASE_STEPS = 4  # two are enough where the slopes are those of nearly the same parameters
-_RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,67 +58,6 @@ def predict_held_out(whole: Fit) -> HeldOut:
             residuals[ids[i]] = left[k]
             points[ids[i]] = (released.common, released.release[k])
     return HeldOut(residuals, points)
-
-
-def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
-    """Fit only each run's own parameters: release and phases.
-
-    Args:
-        start: common parameters, which are held, and releases to start from.
-        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
-            about the same parameters.
-
-    Returns:
-        The point found, each run at its own best, and the scaled residuals there by run.
-    """
-    best, residuals = start, scaled_residuals(problem, start)
-    for _ in range(_RELEASE_STEPS):
-        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, residuals, strict=True)]
-        trial = Point(best.common, best.release + np.stack(steps))
-        moved = scaled_residuals(problem, trial)
-        with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
-            gains = [float(r @ r - m @ m) for r, m in zip(residuals, moved, strict=True)]
-        better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
-        if not any(better):
-            break
-        best = Point(best.common, np.where(np.array(better)[:, None], trial.release, best.release))
-        residuals = [m if keep else r for m, r, keep in zip(moved, residuals, better, strict=True)]
-    return best, residuals
-
-
-def fit_seen(whole: Fit, seen: Sequence[NDArray[np.bool_]]) -> tuple[Point, list[Array]]:
-    """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
-
-    Args:
-        seen: by run the blocks to fit, shape (n,).
-
-    Returns:
-        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own parameters
-        of a run that is not seen, stay as they were.
-    """
-    free = np.array([whole.bound(name) is None for name in whole.problem.names], np.float64)
-    slopes = [(c[s] * free, r[s]) for (c, r), s in zip(whole.jacobian, seen, strict=True)]
-
-    def look(point: Point) -> tuple[Point, list[Array], list[Array], float]:
-        residuals = scaled_residuals(whole.problem, point)
-        visible = [r[s] for r, s in zip(residuals, seen, strict=True)]
-        cost = sum(float(r @ r) for r in visible)
-        return point, residuals, visible, cost if np.isfinite(cost) else np.inf
-
-    damping = 1e-6
-    point, residuals, visible, cost = look(whole.point)
-    for _ in range(_STEPS):
-        before = cost
-        for _ in range(_TRIES):
-            there = look(clip(whole.problem, damped_step(whole.problem, point, visible, slopes, damping)))
-            if there[-1] < cost:
-                point, residuals, visible, cost = there
-                damping *= 0.2
-                break
-            damping = max(damping * 10.0, 1e-4)
-        if before - cost < _GAIN * before:
-            break
-    return point, residuals
 
 
 _STRETCHES = 9  # in a run: each a ninth of it, or a cycle where the run is short

@@ -11,10 +11,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.answer.held_out import HeldOut, fit_seen, predict_held_out, predict_stretches, turns_of
+from diagnosis.answer.held_out import HeldOut, predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import NativeClosure, PatchedModel
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
+from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.run_data import FOLDS
 from diagnosis.own_joint import reach

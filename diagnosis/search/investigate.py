@@ -33,6 +33,7 @@ from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, seco
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.search.outside import two_springs
 from diagnosis.search.random_moments import RandomAnswer, weigh_random_moments, without_the_random_moment
+from diagnosis.search.resolved import unresolved
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 from diagnosis.where.place import Place, locate
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
@@ -60,6 +61,7 @@ class Study:
         test: whether there is a gap, after the hum is removed.
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
+        unresolved: effects of refused answers that no half of the records shows, by the names of the answer.
         outside: fitted causes from outside the vocabulary, alone or beside effects.
         by_moment: the sets fitted with a random moment beside them, where sets are weighed by the moment that they
             leave and not by the angle.
@@ -82,6 +84,7 @@ class Study:
     nominal: Fit
     test: GapTest
     cut: bool = False
+    unresolved: Mapping[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
     outside: tuple[Hypothesis, ...] = ()
     by_moment: tuple[Hypothesis, ...] = ()
     rested: tuple[str, ...] = ()
@@ -275,7 +278,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
         sets = without_the_random_moment(random, found.hypotheses, misfit(found.nominal))
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _compared(found, found.nominal, clock)
-    weighed = _weighed(found, found.nominal)
+    found, weighed = _resolved(found, found.nominal)
     best = _best(found, weighed) if found.campaign.unrestrained else None
     if best is not None and best.fit.chance < 1.0:
         again = _weigh_by_moment(found, weighed, fitted, clock)
@@ -342,10 +345,29 @@ def _with_whole_runs(
         polished = _polished(found.hypotheses, weighed[0], ())
         whole = [whole_runs(h) if answer.issuperset(h.names) else h for h in polished]
         kept = replace(found, hypotheses=tuple(h for h in whole if h is not None), weighed=tuple(weighed))
-        if weighed[0].effects == UNKNOWN or kept.hypothesis(weighed[0].effects) is not None:
+        fitted = kept.hypothesis(weighed[0].effects)
+        lost = () if fitted is None else unresolved(fitted.fit)
+        if weighed[0].effects == UNKNOWN or (fitted is not None and not lost):
             return kept
-        left = tuple(h for h in found.hypotheses if h.names != weighed[0].effects)
-        found = replace(found, hypotheses=left)
+        found = _without(found, weighed[0].effects, lost)
+
+
+def _resolved(found: Study, base: Fit) -> tuple[Study, list[Weighed]]:
+    """The study without the answers of which a half of the records must show an effect and none does."""
+    while True:
+        weighed = _weighed(found, base)
+        names = weighed[0].effects
+        fitted = found.hypothesis(names) if found.random_answer(names) is None else None
+        lost = () if fitted is None else unresolved(fitted.fit)
+        if not lost:
+            return found, weighed
+        found = _without(found, names, lost)
+
+
+def _without(found: Study, names: tuple[str, ...], lost: tuple[str, ...]) -> Study:
+    """The study without a set of effects, some of which no half of the records shows."""
+    kept = tuple(h for h in found.hypotheses if h.names != names)
+    return replace(found, hypotheses=kept, unresolved={**found.unresolved, **({names: lost} if lost else {})})
 
 
 def _compared(found: Study, base: Fit, clock: _Clock) -> Study:

@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from diagnosis import diagnose, vocabulary
-from diagnosis.answer.held_out import fit_seen
 from diagnosis.diagnosable import choose
 from diagnosis.likelihood.least_squares import Fit, fit
+from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Point
 from diagnosis.search.investigate import nominal_study
 from identification import identify

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from diagnosis.answer import reported as module
-from diagnosis.answer.held_out import predict_held_out, refit_releases
+from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
 from diagnosis.answer.verdict import blind_spots, cautions
 from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
+from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import starting_points

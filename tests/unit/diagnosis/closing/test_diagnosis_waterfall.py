@@ -12,13 +12,13 @@ from diagnosis.answer.candidates import inclusion
 from diagnosis.answer.held_out import (
     Base,
     Subsets,
-    fit_seen,
     predict_held_out,
     predict_stretches,
     turns_of,
     waterfall,
 )
 from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import FOLDS
 from diagnosis.likelihood.starting_points import starting_points

@@ -1,0 +1,84 @@
+"""Fits of some of the readings, or of some of the parameters, from the fit of all."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.likelihood.least_squares import Fit, clip, damped_step, scaled_residuals
+from diagnosis.likelihood.problem import Point, Problem
+from tunnel_sim.vocabulary.record import Array
+
+_STEPS = 6  # Gauss–Newton steps without a group
+_TRIES = 4  # dampings tried in a step
+_GAIN = 1e-4  # share of χ² that a step must save
+_RELEASE_STEPS = 4  # two are enough where the slopes are those of nearly the same parameters
+_RELEASE_GAIN = 1e-6  # of a run's χ² that a step must save
+
+
+def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple[Point, list[Array]]:
+    """Fit only each run's own parameters: release and phases.
+
+    Args:
+        start: common parameters, which are held, and releases to start from.
+        slopes: derivatives of the scaled prediction to each run's own parameters, shape (n, own), from a fit of
+            about the same parameters.
+
+    Returns:
+        The point found, each run at its own best, and the scaled residuals there by run.
+    """
+    best, residuals = start, scaled_residuals(problem, start)
+    for _ in range(_RELEASE_STEPS):
+        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, residuals, strict=True)]
+        trial = Point(best.common, best.release + np.stack(steps))
+        moved = scaled_residuals(problem, trial)
+        with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
+            gains = [float(r @ r - m @ m) for r, m in zip(residuals, moved, strict=True)]
+        better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
+        if not any(better):
+            break
+        best = Point(best.common, np.where(np.array(better)[:, None], trial.release, best.release))
+        residuals = [m if keep else r for m, r, keep in zip(moved, residuals, better, strict=True)]
+    return best, residuals
+
+
+def fit_seen(
+    whole: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str] = ()
+) -> tuple[Point, list[Array]]:
+    """Fit some of the blocks, with the sensitivities of the fit of all blocks, which is close.
+
+    Args:
+        seen: by run the blocks to fit, shape (n,).
+        held: names of common parameters that stay as they are.
+
+    Returns:
+        The point found, and the scaled residuals of all blocks there. Parameters at a bound, and the own parameters
+        of a run that is not seen, stay as they were.
+    """
+    free = np.array(
+        [whole.bound(name) is None and name not in held for name in whole.problem.names], np.float64
+    )
+    slopes = [(c[s] * free, r[s]) for (c, r), s in zip(whole.jacobian, seen, strict=True)]
+
+    def look(point: Point) -> tuple[Point, list[Array], list[Array], float]:
+        residuals = scaled_residuals(whole.problem, point)
+        visible = [r[s] for r, s in zip(residuals, seen, strict=True)]
+        cost = sum(float(r @ r) for r in visible)
+        return point, residuals, visible, cost if np.isfinite(cost) else np.inf
+
+    damping = 1e-6
+    point, residuals, visible, cost = look(whole.point)
+    for _ in range(_STEPS):
+        before = cost
+        for _ in range(_TRIES):
+            there = look(clip(whole.problem, damped_step(whole.problem, point, visible, slopes, damping)))
+            if there[-1] < cost:
+                point, residuals, visible, cost = there
+                damping *= 0.2
+                break
+            damping = max(damping * 10.0, 1e-4)
+        if before - cost < _GAIN * before:
+            break
+    return point, residuals

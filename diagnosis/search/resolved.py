@@ -1,0 +1,79 @@
+"""Whether the halves of the records show every effect of a set, each by itself.
+
+Readings left out of a fit in stretches share the amplitudes of the others, and test interpolation only. An effect
+that is there shows at large amplitudes alone, or at small ones alone; one that only joins the two halves does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.likelihood.least_squares import Fit, fit_at, normal_equations
+from diagnosis.likelihood.partial import fit_seen
+from diagnosis.policy import CHANCE_STDS
+from tunnel_sim.vocabulary.record import Array
+
+_ROUNDS = 4  # of the fit of a half
+_SETTLED = 0.5  # standard deviations by which a round may still move a parameter
+_RIDGE = 1e-12  # of the scaled normal matrix: what a half does not determine has a huge variance
+
+
+def unresolved(whole: Fit) -> tuple[str, ...]:
+    """The effects that neither the early nor the late half of the records resolves with the sign of the whole.
+
+    Free decays swing far in their early halves and little in their late ones. Each half is fitted by itself, with
+    the forms of the effects as the whole gives them. An effect is resolved where its severity lies two standard
+    deviations from zero, which allow for the misfit of the half.
+
+    Args:
+        whole: fit of a set of effects to whole runs.
+
+    Returns:
+        Names, in the order of the fit. Empty where a run is driven: its amplitudes have no order in time.
+    """
+    problem = whole.problem
+    if problem.data.driven:
+        return ()
+    severities = {kind.name: f"{kind.name}.{kind.parameters()[0].name}" for kind in problem.effects}
+    left = {name: full for name, full in severities.items() if full in problem.names}
+    for values, stds in _halves(whole):
+        for name, full in list(left.items()):
+            place = problem.names.index(full)
+            same_sign = values[place] * whole.value(full) > 0.0
+            if same_sign and abs(values[place]) > CHANCE_STDS * stds[place]:
+                del left[name]
+    return tuple(left)
+
+
+def _halves(whole: Fit) -> Iterator[tuple[Array, Array]]:
+    """Common parameters of the early and of the late half and their standard deviations, shape (common,)."""
+    problem = whole.problem
+    forms = [f"{kind.name}.{i.name}" for kind in problem.effects for i in kind.parameters() if i.form]
+    for early in (True, False):
+        seen = [(np.arange(r.size) < r.size // 2) == early for r in whole.residuals]
+        fitted = whole
+        for _ in range(_ROUNDS):  # the sensitivities of the whole may be far from those of the half
+            before = fitted.point.common
+            fitted = fit_at(problem, fit_seen(fitted, seen, held=forms)[0])
+            stds = _stds(fitted, seen, forms)
+            if np.all(np.abs(fitted.point.common - before) < _SETTLED * stds):
+                break
+        yield fitted.point.common, stds
+
+
+def _stds(fitted: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str]) -> Array:
+    """Standard deviations by some blocks, with their misfit as noise, shape (common,); infinite where not shown."""
+    names = fitted.problem.names
+    free = np.array([name not in held and fitted.bound(name) is None for name in names])
+    rows = [(c[s] * free, r[s]) for (c, r), s in zip(fitted.jacobian, seen, strict=True)]
+    left = [r[s] for r, s in zip(fitted.residuals, seen, strict=True)]
+    matrix, _, _ = normal_equations(rows, left)
+    shown = np.diag(matrix) > 0.0
+    scale = np.sqrt(np.where(shown, np.diag(matrix), 1.0))
+    inverse = np.linalg.inv(matrix / np.outer(scale, scale) + _RIDGE * np.eye(scale.size))
+    misfit = sum(float(r @ r) for r in left) / max(sum(r.size for r in left), 1)
+    stds = np.sqrt(np.maximum(np.diag(inverse), 0.0) * max(misfit, 1.0)) / scale
+    return np.where(shown, stds, np.inf)
