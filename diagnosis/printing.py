@@ -17,7 +17,14 @@ from diagnosis.closure import (
     rms_shown,
 )
 from diagnosis.policy import CREDIBLE, DECIDED_FROM, PREDICTED_FROM
-from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
+from identification.printing import (
+    COEFFICIENTS,
+    TextTable,
+    coefficient_label,
+    estimated,
+    significant,
+    unit_mark,
+)
 from identification.status import Remark
 from tunnel_sim.effects import known_effects
 
@@ -326,6 +333,8 @@ def closing_lines(document: Document) -> list[str]:
     if checked["agrees"]:
         apart = f"{checked['largest_difference_rad']:.1e} rad"
         lines.append(f"Excesses are computed by the MuJoCo model, which agrees with the fits within {apart}")
+    if hidden := hidden_line(document):
+        lines.append(hidden)
     if note:
         lines.append(f"Note: {note}")
     remarks = [str(Remark.from_json_dict(remark)) for remark in document.get("remarks", ())]
@@ -336,6 +345,38 @@ def closing_lines(document: Document) -> list[str]:
         lines.append("These runs cannot show:")
         lines += [f"- {text}" for text in document["blind_spots"]]
     return lines
+
+
+def hidden_table(document: Document) -> TextTable:
+    """The effects that could hide: the largest size that the runs do not exclude, and the moves it makes."""
+    hidden, rows = document.get("hidden", ()), []
+    names = [name for name in document["coefficients"]["after"] if hidden and name in hidden[0]["moves"]]
+    for one in hidden:
+        size = f"{significant(one['size']['value'], 2)} {unit_mark(one['size']['unit'])}"
+        moves = [significant(one["moves"][name]["value"], 2) for name in names]
+        rows.append((plain(one["effect"]), size, *moves))
+    heads = [f"moves {coefficient_label(name, hidden[0]['moves'][name]['unit'])} by" for name in names]
+    return TextTable("What could hide", ("effect", "up to", *heads), tuple(rows), ("up to", *heads))
+
+
+def hidden_line(document: Document) -> str:
+    """The effect that could hide and moves a coefficient most, in a sentence; empty where none moves it."""
+    hidden, after = document.get("hidden", ()), document["coefficients"]["after"]
+    if not hidden:
+        return ""
+    first, moved = hidden[0], []
+    for name, given in after.items():
+        move = first["moves"].get(name)
+        if move is not None and given.get("std") and move["value"] > given["std"]:
+            by = f"{significant(move['value'], 2)} {unit_mark(given['unit'])}"
+            moved.append(f"{COEFFICIENTS.get(name, name)} by {by}")
+    if not moved:
+        return ""
+    size = f"{significant(first['size']['value'], 2)} {unit_mark(first['size']['unit'])}"
+    return (
+        f"What could hide: {plain(first['effect'])} of up to {size.strip()}, which these runs do not exclude, "
+        f"would move {' and '.join(moved)}. The intervals allow for it."
+    )
 
 
 def noise_powers(excess: float) -> str:

@@ -28,7 +28,7 @@ HELD_OUT = "on runs held out of the fit"
 FITTED = "in the fitted runs (none could be held out)"
 _LAST = (
     "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "blind_spots", "cautions", "remarks", "seconds", "maps", "provenance",
+    "hidden", "blind_spots", "cautions", "remarks", "seconds", "maps", "provenance",
 )  # fmt: skip
 
 
@@ -192,6 +192,23 @@ class CauseSize:
 
 
 @dataclass(frozen=True)
+class Hidden:
+    """An effect that is not named, at the largest size that the runs do not exclude.
+
+    Args:
+        effect: its name.
+        parameter: name of its severity.
+        size: that parameter, of the sign that allows more, with its unit.
+        moves: by coefficient, the size of the change that the effect makes to it, with its unit.
+    """
+
+    effect: str
+    parameter: str
+    size: ParameterEstimate
+    moves: Mapping[str, ParameterEstimate]
+
+
+@dataclass(frozen=True)
 class Coefficients:
     """Coefficients of the nominal model before and after the causes are added.
 
@@ -260,6 +277,8 @@ class Diagnosis:
         ambiguous_with: effects that these runs cannot distinguish from the causes.
         next_run: the run expected to distinguish them; None where not needed.
         confirmation: whether the fits' integrator agrees with the MuJoCo model, from which the gap is.
+        hidden: the effects that could hide, the one that moves a coefficient most against its standard deviation
+            first.
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
         maps: data of the figures, in JSON's types.
@@ -283,6 +302,7 @@ class Diagnosis:
     coefficients: Coefficients
     confirmation: Confirmation
     noise: NoiseSummary
+    hidden: tuple[Hidden, ...] = ()
     blind_spots: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     cautions: tuple[str, ...] = ()

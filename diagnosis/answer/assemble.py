@@ -15,7 +15,7 @@ from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.linear_theory import coefficient_move, coefficient_names
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
-from diagnosis.answer.units import own_estimate, size_note, sized_coefficients
+from diagnosis.answer.units import own_estimate, own_hidden, size_note, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
 from diagnosis.closure import PatchedModel
 from diagnosis.policy import MOST, WORTH_NAMING
@@ -70,8 +70,8 @@ _RESTED = (
     "says little about its motion."
 )
 _AS_IDENTIFIED = (
-    "With no cause these agree with the values of identify, whose standard deviations allow neither for the "
-    "rounding of the stated air density nor for the spectrum of the noise."
+    "With no cause these agree with the values of identify, whose standard deviations allow neither for effects "
+    "that could hide, nor for the rounding of the stated air density or the spectrum of the noise."
 )
 _UNRESOLVED = (
     "{} was fitted to the whole records and left out of the answer: neither the early nor the late half of them, "
@@ -114,7 +114,8 @@ def assemble(
     seconds["waterfall"] = time.perf_counter() - begun
     begun = time.perf_counter()
     rig = study.campaign.rig
-    after = coefficients(possible_answers(study, kinds), study.campaign)
+    answers = possible_answers(study, kinds)
+    after = coefficients(answers, study.campaign)
     before = before_the_causes(study.nominal, after) if study.causes else after
     caveats = [effect_class(name).caveat for name in study.causes if name != "unknown"]
     identified = _AS_IDENTIFIED if "cn_beta" in before and not study.causes else ""
@@ -162,6 +163,7 @@ def assemble(
             noise.source,
             noise.reason,
         ),
+        hidden=own_hidden(answers.hidden, after, study.campaign, similarity),
         blind_spots=blind_spots(data),
         seconds=seconds,
         provenance={"versions": {name: version(name) for name in _PACKAGES}},

@@ -11,20 +11,22 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from diagnosis.answer.candidates import meant_coefficient
+from diagnosis.answer.hidden import hidden_effects
 from diagnosis.answer.linear_theory import (
-    JOINT_UNITS,
+    COEFFICIENT_UNITS,
     Beside,
     alone,
     beside,
     coefficient_move,
     coefficient_names,
     coefficient_value,
+    starts_beside,
     stiffness_names,
     wind_on_runs,
 )
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD, WORTH_NAMING
-from diagnosis.result import ParameterEstimate
+from diagnosis.policy import CHANCE_STDS, EVEN_SHARE, FORM_CHANGE_STD, WORTH_NAMING
+from diagnosis.result import Hidden, ParameterEstimate
 from diagnosis.search.investigate import Study
 from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect
@@ -80,8 +82,9 @@ class Mixture:
         return 0.5 * (low + high)
 
 
-_UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1", **JOINT_UNITS}
-_SOURCES = ("noise", "misfit", "small causes", "air density", "unseen form", "freed form", "rivals")
+_SOURCES = (
+    "noise", "misfit", "small causes", "hidden effects", "air density", "unseen form", "freed form", "rivals",
+)  # fmt: skip
 _INTERVAL = 0.95
 _SKEWED = 0.1  # standard deviations by which an end of the interval differs from value ± 1.96 std
 
@@ -108,11 +111,13 @@ class Answers:
 
     Args:
         unknown: probability (a fraction) of ``unknown`` where an answer with names is the chosen one.
+        hidden: the effects that could hide beside the chosen answer.
     """
 
     possible: tuple[Possible, ...]
     unknown: float
     nominal: Fit
+    hidden: tuple[Hidden, ...] = ()
 
 
 def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
@@ -141,11 +146,12 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
         elif answer.effects == UNKNOWN:
             unknown = probability
         elif fit is not None and probability > 0.0:
-            small = beside(fit, kinds) if probability >= WORTH_NAMING else None
+            small = beside(fit, starts_beside(fit, kinds)) if probability >= WORTH_NAMING else None
             others.append(Possible(probability, fit, textbook.get(id(fit)), small))
-    small = beside(chosen, kinds) if study.causes else None
+    starts = starts_beside(chosen, kinds)
+    small = beside(chosen, starts) if study.causes else None
     first = Possible(own, chosen, textbook.get(id(chosen)), small)
-    return Answers((first, *others), unknown, study.nominal)
+    return Answers((first, *others), unknown, study.nominal, hidden_effects(chosen, starts))
 
 
 def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEstimate]:
@@ -162,14 +168,21 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         between two halves of the data, `coefficient_move`, if that is greater), the rounding of air density, the
         part of the causes' forms that no free decay shows, and half the change made by freeing the forms: another
         family of forms may change as much. By the same rule ``unknown`` adds half the change from the nominal
-        model. The central interval of 0.95 is given where it is not that of a normal distribution. No standard
-        deviation is given at a bound and where the runs do not determine the coefficient.
+        model. The effect that could hide and would move the coefficient most (`diagnosis.answer.hidden`) adds the
+        square of half that move, since its largest size is two standard deviations. The central interval of 0.95
+        is given where it is not that of a normal distribution. No standard deviation is given at a bound and where
+        the runs do not determine the coefficient.
     """
     fit, found = answers.possible[0].fit, {}
     for name in coefficient_names(fit.problem):
         if _value(fit, name) is None:
             continue  # held
-        each = [of for one in answers.possible if (of := _of_answer(one, campaign, name)) is not None]
+        move = max((hidden.moves[name].value for hidden in answers.hidden), default=0.0)
+        each = [
+            of
+            for one in answers.possible
+            if (of := _of_answer(one, campaign, name, move / CHANCE_STDS)) is not None
+        ]
         _, first, parts = each[0]
         change = FORM_CHANGE_STD * (first.mean - (_value(answers.nominal, name) or first.mean))
         if answers.unknown > 0.0:
@@ -220,9 +233,12 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
 
 
 def _of_answer(
-    answer: Possible, campaign: Campaign, name: str
+    answer: Possible, campaign: Campaign, name: str, hidden: float
 ) -> tuple[float, Mixture, dict[str, float]] | None:
-    """Probability, distribution and variances by source of a coefficient, if an answer is right."""
+    """Probability, distribution and variances by source of a coefficient, if an answer is right.
+
+    ``hidden`` is its standard deviation due to effects that could hide.
+    """
     fit, value = answer.fit, _value(answer.fit, name)
     if value is None:
         return None
@@ -245,6 +261,7 @@ def _of_answer(
     unfreed = None if answer.textbook is None else _value(answer.textbook, name)
     common = {
         "misfit": left**2,
+        "hidden effects": hidden**2,
         "air density": (value * rounding) ** 2,
         "unseen form": unseen**2,
         "freed form": 0.0 if unfreed is None else (FORM_CHANGE_STD * (value - unfreed)) ** 2,
@@ -265,7 +282,7 @@ def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str,
     bound = fit.bound("mechanical_damping") if name in ("zeta", "mechanical_damping") else None
     if name == "omega_n" and len(stiffness_names(fit.problem.names)) == 1:  # no gravity instead of the spring
         bound = fit.bound("stiffness")
-    found = ParameterEstimate(value, None if bound else std, _UNITS[name], bound, shares=shares)
+    found = ParameterEstimate(value, None if bound else std, COEFFICIENT_UNITS[name], bound, shares=shares)
     return meant_coefficient(found, fit, name)
 
 

@@ -20,7 +20,7 @@ from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.vocabulary.record import Array
 
-_DEGREES = 6.0  # effective degrees of freedom of a real model's error
+DEGREES = 6.0  # effective degrees of freedom of a real model's error
 _MOST = 3  # small causes at once
 _TRIED = 8  # effects that sets are made of: those that alone lower χ² most
 _DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
@@ -53,6 +53,9 @@ JOINT_UNITS = {
     "added_stiffness": "N m/rad",
     "moment_offset": "N m",
 }
+
+#: Units of the coefficients that a diagnosis states, by name.
+COEFFICIENT_UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1", **JOINT_UNITS}
 
 #: Parameters that add to the spring's stiffness at small amplitudes, as gravity does.
 _STIFFNESSES = tuple(
@@ -219,13 +222,29 @@ class _Step:
 
 def alone(fit: Fit) -> Beside:
     """A fit with no set of small causes added."""
-    formal = _formal(fit, _gradients(fit))[None, :]
+    formal = _formal(fit, coefficient_gradients(fit))[None, :]
     return Beside(
         np.ones(1), np.zeros_like(formal), formal, np.zeros_like(formal), fit.residuals, 0.0 * formal[0]
     )
 
 
-def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
+Starts = Sequence[tuple[type[Effect], Sequence[StartingPoint]]]
+"""Effects that may act beside those of a fit, each with its starting points."""
+
+
+def starts_beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Starts:
+    """The starting points of the effects that a fit does not have; none where the fit misses the motion."""
+    if misses_motion(fit):
+        return ()
+    present, found = {kind.name for kind in fit.problem.effects}, []
+    for kind in kinds:
+        if kind.fitted and kind.name not in present:
+            with suppress(np.linalg.LinAlgError):
+                found.append((kind, starting_points(fit, kind)))
+    return found
+
+
+def beside(fit: Fit, starts: Starts) -> Beside:
     """Add sets of effects that a fit does not have, up to three at a time, by one Gauss–Newton step.
 
     An effect that acts but is not named changes the coefficients, because the fit absorbs a part of it. The other
@@ -236,21 +255,14 @@ def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
 
     Args:
         fit: with or without effects.
-        kinds: the effects that may act beside those of the fit; none are tried where the fit misses the motion.
+        starts: the effects that may act beside those of the fit.
     """
-    gradients = _gradients(fit)
-    present = {kind.name for kind in fit.problem.effects}
-    others = [kind for kind in kinds if kind.fitted and kind.name not in present]
-    _, _, solutions = normal_equations(fit.jacobian, fit.residuals)
-    directions = fit.covariance @ gradients.T
-    influence = [  # what a unit of every scaled residual adds to the coefficients, by run
-        (common - release @ solution[:, :-1]) @ directions
-        for (common, release), solution in zip(fit.jacobian, solutions, strict=True)
-    ]
+    gradients = coefficient_gradients(fit)
+    influence = influences(fit)
     causes, residuals = [], np.concatenate(fit.residuals)
-    for kind in () if misses_motion(fit) else others:
+    for _, points in starts:
         with suppress(np.linalg.LinAlgError):
-            start = next(iter(starting_points(fit, kind)), None)  # the most promising one
+            start = next(iter(points), None)  # the most promising one
             cause = None if start is None else _cause(fit, start, influence)
             # not every effect is linear in its size, so each is taken at about the size that its own step gives
             for _ in range(_SECANTS):
@@ -278,7 +290,7 @@ def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
     price = NEEDLESS_CHI2 * np.array([np.count_nonzero(step.sizes) for step in found])
     best = float(excess[np.argmin(excess + price)])
     beyond = max(best - CHANCE_STDS * math.sqrt(2.0 * fit.count), 0.0)
-    odds = -0.5 * (excess / (1.0 + beyond / _DEGREES) + price)
+    odds = -0.5 * (excess / (1.0 + beyond / DEGREES) + price)
     weights = np.exp(odds - odds.max())
     weights /= weights.sum()
     taken = np.split(
@@ -296,7 +308,25 @@ def beside(fit: Fit, kinds: Sequence[type[Effect]]) -> Beside:
     )
 
 
-def _gradients(fit: Fit) -> Array:
+def influences(fit: Fit) -> list[Array]:
+    """What a unit of every scaled residual adds to the coefficients, by run, shape (n, coefficients)."""
+    _, _, solutions = normal_equations(fit.jacobian, fit.residuals)
+    directions = fit.covariance @ coefficient_gradients(fit).T
+    return [
+        (common - release @ solution[:, :-1]) @ directions
+        for (common, release), solution in zip(fit.jacobian, solutions, strict=True)
+    ]
+
+
+def size_range(start: StartingPoint) -> tuple[float, float]:
+    """Least and greatest multiple of the size at which an effect starts that its parameter allows."""
+    assert start.scaled is not None
+    value = start.point.common[start.scaled]
+    least, greatest = sorted(bound[start.scaled] / value for bound in start.problem.bounds)
+    return float(least), float(greatest)
+
+
+def coefficient_gradients(fit: Fit) -> Array:
     """Derivatives of the coefficients with respect to the common parameters, shape (coefficients, common).
 
     Zero for a coefficient that a model of one's own holds.
@@ -375,8 +405,7 @@ def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | N
     if own:
         least, greatest = 1.0 / _OWN_SIZE, _OWN_SIZE
     elif start.scaled is not None:  # its parameter's range
-        value = start.point.common[start.scaled]
-        least, greatest = sorted(bound[start.scaled] / value for bound in start.problem.bounds)
+        least, greatest = size_range(start)
     unseen = np.zeros(moves.size)
     if "cn_beta" in fit.problem.names:  # Cnβ and Cnr come last
         effect = start.problem.effects_at(start.point.common)[-1]

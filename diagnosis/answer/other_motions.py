@@ -108,6 +108,7 @@ def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnos
         candidates=(Candidate("unknown", 1.0, excess, 0.0),),
         coefficients=Coefficients({}, {}, _NOTE),
         inclusion={},
+        hidden=(),
         blind_spots=(),
         rest=None,
     )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.result import Diagnosis, ParameterEstimate
+from diagnosis.result import Diagnosis, Hidden, ParameterEstimate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
@@ -164,6 +164,32 @@ def own_parameters(
         unit = parameter_unit(name, campaign)
         found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
     return found
+
+
+def own_hidden(
+    given: Sequence[Hidden],
+    coefficients: Mapping[str, ParameterEstimate],
+    campaign: Campaign,
+    similarity: Similarity,
+) -> tuple[Hidden, ...]:
+    """The effects that could hide in the measured campaign's units, the one that moves a coefficient most first.
+
+    Args:
+        coefficients: the estimates with whose standard deviations the moves are compared, of the similar campaign.
+    """
+
+    def greatest(one: Hidden) -> float:
+        stds = {name: known.std for name, known in coefficients.items() if known.std}
+        return max((move.value / stds[name] for name, move in one.moves.items() if name in stds), default=0.0)
+
+    found = []
+    for one in sorted(given, key=lambda one: -greatest(one)):
+        name = f"{one.effect}.{one.parameter}"
+        size = own_parameters({name: one.size}, campaign, similarity)[name]
+        moves = sized_coefficients(one.moves, campaign.rig)
+        own = {coefficient: own_estimate(move, similarity) for coefficient, move in moves.items()}
+        found.append(replace(one, size=size, moves=own))
+    return tuple(found)
 
 
 def own_estimate(estimate: ParameterEstimate, similarity: Similarity) -> ParameterEstimate:

@@ -179,6 +179,7 @@ class StartingPoint:
         predicted_drop: of χ² by linear theory, dimensionless.
         predicted: χ² beyond noise that linear theory leaves by channel, shape (6,), dimensionless.
         scaled: place of the common parameter that linear theory has scaled; None where it scaled none.
+        second_order: whether the other parameters absorb the first order of the effect.
     """
 
     problem: Problem
@@ -186,6 +187,7 @@ class StartingPoint:
     predicted_drop: float
     predicted: Array
     scaled: int | None
+    second_order: bool = False
 
     def nearer(self) -> StartingPoint | None:
         """The point with much less of the effect; None where linear theory did not say how much.
@@ -254,8 +256,8 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
             continue
         moved = None
         if trial.second_order:
-            moved = damped_step(base.problem, base.point, [-c for c in change], base.jacobian, 0.0)
-            change = _change(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
+            moved = absorbed(base, change)
+            change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
         left = project_out(base, change)
         power = sum(float(c @ c) for c in left)
         if not 0.0 < power < np.inf:
@@ -280,8 +282,28 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
             point = clip(problem, Point(point.common, release))
         place = None if scaled is None else base.point.common.size + scaled
         after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
-        found.append(StartingPoint(problem, point, drop, misfit(base, after).excess, place))
+        predicted = misfit(base, after).excess
+        found.append(StartingPoint(problem, point, drop, predicted, place, trial.second_order))
     return sorted(found, key=lambda start: -start.predicted_drop)
+
+
+def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
+    """An effect whose first order is absorbed at the sizes of its trials, whether or not the readings ask for it.
+
+    Empty for other effects, and where the runs cannot show it.
+    """
+    data, found = base.problem.data, []
+    if kind.condition == "wind_on" and not data.wind_on:
+        return []
+    for trial in kind.trials(_circumstances(data)):
+        if trial.second_order and trial.scaled is not None:
+            problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind))
+            own = _own_parameters(problem, kind)
+            sizes = np.array([trial.values.get(info.name, info.default) for info in own])
+            point = Point(np.concatenate([base.point.common, sizes]), base.point.release)
+            place = base.point.common.size + [info.name for info in own].index(trial.scaled)
+            found.append(StartingPoint(problem, point, 0.0, np.zeros(len(CHANNELS)), place, True))
+    return found
 
 
 def misses_motion(fit: Fit) -> bool:
@@ -314,7 +336,12 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
     return np.concatenate([common, values])
 
 
-def _change(base: Fit, problem: Problem, point: Point) -> list[Array]:
+def absorbed(base: Fit, change: Sequence[Array]) -> Point:
+    """Where the parameters of a fit go to absorb a change of the scaled prediction, by one Gauss–Newton step."""
+    return damped_step(base.problem, base.point, [-c for c in change], base.jacobian, 0.0)
+
+
+def change_to(base: Fit, problem: Problem, point: Point) -> list[Array]:
     """Change of the scaled prediction from a fit to a point of a problem with further parameters."""
     moved, runs = problem.predict([point])[0], base.problem.data.runs
     return [run.scaled(m - run.reading) + r for m, run, r in zip(moved, runs, base.residuals, strict=True)]
@@ -330,7 +357,7 @@ def _moderate_change(
     """
     limit = 3.0 * np.sqrt(base.total)
     for _ in range(12):
-        change = _change(
+        change = change_to(
             base, problem, Point(_with_effect(base, values, scaled, replaced), base.point.release)
         )
         size = float(np.sqrt(sum(float(c @ c) for c in change)))

@@ -114,6 +114,9 @@ class DiagnosisDocument(Document):
     next_run: Table | None = Field(description="the run that would distinguish the causes from their rivals")
     confirmation: Table = Field(description="how far MuJoCo and the fits' integrator agree")
     noise: Table = Field(description="std and stated_std in rad, source, reason")
+    hidden: list[Table] = Field(
+        description="effects that could hide: the largest size that the runs do not exclude, and the moves it makes"
+    )
     blind_spots: list[str] = Field(description="what these runs cannot show")
     cautions: list[str] = Field(description="caveats")
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from diagnosis.closure import closable_table, closable_words, patch_lines, patch_table
-from diagnosis.printing import inclusion_line, plain
+from diagnosis.printing import hidden_table, inclusion_line, plain
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
@@ -63,6 +63,8 @@ TESTS = {
 SOURCES = {
     "noise": "noise of the readings",
     "misfit": "what the model leaves unexplained",
+    "small causes": "small causes that are not named",
+    "hidden effects": "the effect that could hide and moves it most",
     "air density": "rounding of the stated air density",
     "unseen form": "form of the cause that no free decay shows",
     "freed form": "freedom of the causes' forms",
@@ -145,6 +147,7 @@ def render_report(
         "runs": view.run_rows(document, campaign),
         "windy": any(run.wind_on for run in campaign.runs),
         "budget": budget(document),
+        "hidden": hidden_table(document),
         "tests": test_rows(document),
         "false_alarms": f"{alarms} of the campaigns without a gap",
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],

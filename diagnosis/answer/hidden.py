@@ -1,0 +1,175 @@
+"""What could hide: how large every effect may be that the runs do not exclude, and what it does to coefficients.
+
+An effect that is too small to be named still moves the coefficients, since the fit absorbs a part of it. Most moves
+are small against the noise. A lag of the aerodynamic moment is not: to first order it is a change of Cnr, so that
+only its second order, or the comparison of springs and speeds, limits it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.answer.linear_theory import (
+    COEFFICIENT_UNITS,
+    DEGREES,
+    Starts,
+    coefficient_gradients,
+    coefficient_names,
+    influences,
+    size_range,
+)
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.problem import Point
+from diagnosis.likelihood.starting_points import (
+    StartingPoint,
+    absorbed,
+    change_to,
+    project_out,
+    second_order_starts,
+)
+from diagnosis.policy import CHANCE_STDS
+from diagnosis.result import Hidden, ParameterEstimate
+from tunnel_sim.vocabulary.record import Array
+
+
+def hidden_effects(fit: Fit, starts: Starts) -> tuple[Hidden, ...]:
+    """The largest sizes of effects beside those of a fit, two standard deviations from the likeliest size.
+
+    The change of the readings that the other parameters cannot absorb is a polynomial of second order in the size
+    where the effect says that its first order is absorbed, and of first order else. χ² at every size follows from
+    that, and so does the range of sizes within four units of the least χ². A unit is the dispersion of the misfit
+    (`diagnosis.answer.linear_theory.beside`), 1 where the fit leaves noise.
+
+    Args:
+        fit: with or without effects.
+        starts: the effects that may act beside those of the fit.
+
+    Returns:
+        In the order given, without those that the runs cannot show at all.
+    """
+    beyond = max(fit.total - fit.count - CHANCE_STDS * np.sqrt(2.0 * fit.count), 0.0)
+    reach = CHANCE_STDS**2 * (1.0 + beyond / DEGREES)
+    names, influence = coefficient_names(fit.problem), influences(fit)
+    found = []
+    for kind, points in starts:
+        largest: tuple[float, Array] | None = None
+        with suppress(np.linalg.LinAlgError):
+            for start in second_order_starts(fit, kind) or points[: kind.tries]:
+                one = _largest(fit, start, influence, reach)
+                if one is not None and (
+                    largest is None or np.max(np.abs(one[1])) > np.max(np.abs(largest[1]))
+                ):
+                    largest = one
+        if largest is not None:
+            severity = kind.parameters()[0]
+            size = ParameterEstimate(largest[0], None, severity.unit)
+            moves = {
+                name: ParameterEstimate(float(abs(move)), None, COEFFICIENT_UNITS[name])
+                for name, move in zip(names, largest[1], strict=True)
+            }
+            found.append(Hidden(kind.name, severity.name, size, moves))
+    return tuple(found)
+
+
+def _largest(
+    fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float
+) -> tuple[float, Array] | None:
+    """The largest size of an effect within ``reach`` of the least χ², and the moves of the coefficients there.
+
+    Of a polynomial in the size that is fitted far from that size, higher orders spoil the first one. So where the
+    first order is absorbed, it is fitted again at the size found.
+    """
+    if start.scaled is None:
+        return None
+    found = None
+    for number in range(_ROUNDS if start.second_order else 1):
+        size = float(start.point.common[start.scaled])
+        # at the size of a trial a small share tells that the runs cannot show the effect; later the size is small
+        found = _within(fit, start, influence, reach, _ABSORBED if number == 0 else 0.0)
+        if found is None or found[0] == 0.0 or 1.0 / _SETTLED < found[0] / size < _SETTLED:
+            break
+        common = start.point.common.copy()
+        common[start.scaled] = found[0]
+        start = replace(start, point=replace(start.point, common=common))
+    return found
+
+
+def _within(
+    fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float, least_share: float
+) -> tuple[float, Array] | None:
+    """As `_largest`, by a polynomial fitted at the size of the starting point and at half of it."""
+    assert start.scaled is not None
+    size = float(start.point.common[start.scaled])
+    least, greatest = size_range(start)
+    if start.second_order:  # of the other sign the effect has another law
+        least = 0.0
+    parts = [1.0, 0.5] if start.second_order else [1.0]
+    seen = [_profiled(fit, start, part, influence, least_share) for part in parts]
+    if any(one is None for one in seen):
+        return None
+    lefts, moves = zip(*(one for one in seen if one is not None), strict=True)
+    # left(k) = k u + k² w in multiples k of the size, and the moves alike
+    powers = np.array([[part, part**2][: len(parts)] for part in parts])
+    terms = np.linalg.solve(powers, np.array(lefts))
+    slopes = np.linalg.solve(powers, np.array(moves))
+    along, gram = terms @ np.concatenate(fit.residuals), terms @ terms.T
+    rise = np.zeros(5)  # χ²(k) − χ²(0), from the fourth power of k down
+    for i in range(len(terms)):
+        rise[3 - i] -= 2.0 * along[i]
+        for j in range(len(terms)):
+            rise[2 - i - j] += gram[i, j]
+    turns = [k for k in _real_roots(np.polyder(rise)) if least <= k <= greatest]
+    lowest = min(np.polyval(rise, [0.0, *turns]))
+    ends = _real_roots(rise - np.array([0.0, 0.0, 0.0, 0.0, lowest + reach]))
+    if not ends:
+        return None
+    outermost = max((float(np.clip(k, least, greatest)) for k in ends), key=abs)
+    return outermost * size, np.array([outermost, outermost**2][: len(parts)]) @ slopes
+
+
+def _real_roots(polynomial: Array) -> list[float]:
+    return [float(k.real) for k in np.roots(polynomial) if abs(k.imag) <= _REAL * abs(k)]
+
+
+_ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
+_ABSORBED = (
+    1e-4  # share of a change beyond what is absorbed that counts as none: the accuracy of linear theory
+)
+_REAL = 1e-6  # share of a root that its imaginary part may be
+
+
+def _profiled(
+    fit: Fit, start: StartingPoint, part: float, influence: Sequence[Array], least_share: float
+) -> tuple[Array, Array] | None:
+    """The change of all readings at a part of an effect's size that the fit cannot absorb, and its moves.
+
+    The other parameters are moved first, and the change is that from there: what they absorb exactly, as Cnβ and
+    Cnr absorb an offset of the only wind speed, linear theory alone would absorb to first order.
+
+    Returns:
+        The change, scaled, shape (n,), and the moves of the coefficients, shape (coefficients,); None where the
+        share of the change that the fit cannot absorb is no more than ``least_share``.
+    """
+    assert start.scaled is not None
+    common = start.point.common.copy()
+    common[: fit.point.common.size] = fit.point.common
+    common[start.scaled] = part * start.point.common[start.scaled]
+    effect, release = common[fit.point.common.size :], start.point.release.copy()
+    release[:, : fit.point.release.shape[1]] = fit.point.release
+    change = change_to(fit, start.problem, Point(common, release))
+    whole = float(np.linalg.norm(np.concatenate(change)))
+    if not np.isfinite(whole):
+        return None
+    there = absorbed(fit, change)
+    moved = coefficient_gradients(fit) @ (there.common - fit.point.common)
+    own = np.column_stack([there.release, release[:, there.release.shape[1] :]])
+    change = change_to(fit, start.problem, Point(np.concatenate([there.common, effect]), own))
+    if not all(np.all(np.isfinite(one)) for one in change):
+        return None
+    moved = moved - sum((c @ i for c, i in zip(change, influence, strict=True)), np.zeros_like(moved))
+    left = np.concatenate(project_out(fit, change))
+    return None if float(np.linalg.norm(left)) <= least_share * whole else (left, moved)
