@@ -74,12 +74,13 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
         key = tuple(sorted(given.effects))
         if key not in best or given.share < best[key].share:
             best[key] = given
-    least = least_excess([given.excess for given in best.values()])
-    scale = misfit_scale(nominal)
+    excesses = [given.excess for given in best.values()]
+    least, common = least_excess(excesses), common_misfit(excesses)
+    scale = misfit_scale(nominal, common)
     logs = np.array([log_weight(s.excess - least, scale, len(key), s.numbers) for key, s in best.items()])
     weights = np.exp(logs - logs.max(initial=-np.inf))
     # odds of each set against an unknown cause
-    by_chance = misfit_scale(nominal, policy.CHANCE_STDS * np.sqrt(2.0 * nominal.count))
+    by_chance = misfit_scale(nominal, common, policy.CHANCE_STDS * np.sqrt(2.0 * nominal.count))
     gap, against = log_misfit(nominal.excess, by_chance, ALL_CHANNELS), []
     for given in best.values():
         left = log_misfit(given.excess, by_chance, ALL_CHANNELS)
@@ -116,15 +117,30 @@ def least_excess(excesses: Sequence[Array]) -> Array:
     return np.asarray(np.min([np.zeros(6), *excesses], axis=0), np.float64)
 
 
-def misfit_scale(nominal: ChannelMisfit, chance: float | Array | None = None) -> Array:
-    """χ² by channel that needs no cause, shape (6,).
+def common_misfit(excesses: Sequence[Array]) -> float:
+    """The largest χ² of a channel that all sets leave beyond noise: an error of the model that none of them is.
 
     Args:
-        nominal: gives the motion.
+        excesses: χ² beyond noise, each of shape (6,).
+    """
+    return max(0.0, float(np.max(np.min(excesses, axis=0)))) if excesses else 0.0
+
+
+def misfit_scale(nominal: ChannelMisfit, common: float = 0.0, chance: float | Array | None = None) -> Array:
+    """χ² by channel that needs no cause, shape (6,).
+
+    Beside chance it is that of an error of the model: a tenth of the amplitude of the gap, since no real effect has
+    its textbook form, or what all sets leave if that is more, and a thousandth of the motion at most.
+
+    Args:
+        nominal: what the nominal model leaves, and the motion.
+        common: χ² of a channel that all sets leave (`common_misfit`).
         chance: χ² that chance explains, by channel or common to all; None: `NEEDLESS_CHI2`.
     """
     by_chance = policy.NEEDLESS_CHI2 if chance is None else chance
-    return np.asarray(np.broadcast_to(by_chance, 6) + policy.MODEL_ERROR**2 * nominal.motion, np.float64)
+    by_form = policy.FORM_ERROR**2 * float(np.sum(np.maximum(nominal.excess, 0.0)))
+    error = min(max(by_form, common), policy.MODEL_ERROR**2 * nominal.motion)
+    return np.asarray(np.broadcast_to(by_chance, 6) + error, np.float64)
 
 
 def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:

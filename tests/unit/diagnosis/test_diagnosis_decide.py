@@ -105,6 +105,23 @@ def test_what_a_thousandth_of_the_motion_leaves_needs_no_cause(part):
     assert found[("a",)] > found[("a", "b")]
 
 
+def test_a_small_cause_is_named_where_it_leaves_noise():
+    """A gap of 0.4 thousandths of the motion, of which another effect leaves a quarter of the amplitude."""
+    motion = 1e11
+    gap = channels(frequency=1.6e4)
+    left = {("a",): channels(), ("b",): channels(frequency=1e3), ("a", "b"): channels()}
+    found = probabilities(left, gap, motion=motion)
+    assert found[("a",)] > 0.75
+
+
+def test_what_all_sets_leave_needs_no_cause():
+    """No set closes the harmonics, so that a second effect that closes as little elsewhere is needless."""
+    gap = channels(frequency=3e4, harmonics=3e3)
+    left = {("a",): channels(zero=1e3, harmonics=3e3), ("a", "b"): channels(harmonics=3e3)}
+    found = probabilities(left, gap, motion=1e11)
+    assert found[("a",)] > found[("a", "b")]
+
+
 def test_what_chance_adds_is_common_to_all_sets():
     """Chance left less than nothing; only the differences between the sets count."""
     gap = channels(damping=1e4)

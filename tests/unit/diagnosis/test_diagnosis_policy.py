@@ -10,7 +10,6 @@ from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.search.weigh import FittedSet, weigh
 
 COUNT = np.array([100.0, 100.0, 10.0, 10.0, 110.0, 10_000.0])
-MOTION = 4e7
 GAP = np.array([3e5, 1e3, 2e3, 50.0, 4e4, 1e4])
 SETS = {
     ("a",): (np.array([2e3, 100.0, 40.0, -5.0, 4e4, 200.0]), 0),
@@ -26,9 +25,12 @@ def misfit(left, scales, leaking=6):
     return sum(log(1.0 + (x + policy.LEAK * y) / s) for x, y, s in zip(above, leaked, scales, strict=True))
 
 
-def test_the_probabilities_are_those_of_the_decision():
+@pytest.mark.parametrize("motion", [4e7, 4e10])
+def test_the_probabilities_are_those_of_the_decision(motion):
     least = [min(0.0, *(left[c] for left, _ in SETS.values())) for c in range(6)]
-    scale = [policy.NEEDLESS_CHI2 + policy.MODEL_ERROR**2 * MOTION] * 6
+    common = max(min(left[c] for left, _ in SETS.values()) for c in range(6))
+    error = min(max(policy.FORM_ERROR**2 * sum(GAP), common), policy.MODEL_ERROR**2 * motion)
+    scale = [policy.NEEDLESS_CHI2 + error] * 6
     weights = {
         key: exp(
             -policy.STEEPNESS * misfit(left - least, scale, leaking=4)  # damping and frequency, and of runs
@@ -37,7 +39,7 @@ def test_the_probabilities_are_those_of_the_decision():
         )
         for key, (left, numbers) in SETS.items()
     }
-    by_chance = [policy.CHANCE_STDS * (2.0 * n) ** 0.5 + policy.MODEL_ERROR**2 * MOTION for n in COUNT]
+    by_chance = [policy.CHANCE_STDS * (2.0 * n) ** 0.5 + error for n in COUNT]
     gap = misfit(GAP, by_chance)
     odds = {}
     for key, (left, _) in SETS.items():
@@ -54,5 +56,5 @@ def test_the_probabilities_are_those_of_the_decision():
     }
     expected[("unknown",)] = own / (1.0 + against) + even
     sets = [FittedSet(key, 0.1, left, numbers) for key, (left, numbers) in SETS.items()]
-    found = weigh(sets, ChannelMisfit(COUNT + GAP, COUNT, MOTION))
+    found = weigh(sets, ChannelMisfit(COUNT + GAP, COUNT, motion))
     assert {answer.effects: answer.probability for answer in found} == pytest.approx(expected)
