@@ -16,7 +16,14 @@ from diagnosis.answer.linear_theory import coefficient_move, coefficient_names
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, size_note, sized_coefficients
-from diagnosis.answer.verdict import blind_spots, cautions, remainder, verdict
+from diagnosis.answer.verdict import (
+    blind_spots,
+    cautions,
+    immaterial_words,
+    nearly_words,
+    remainder,
+    verdict,
+)
 from diagnosis.closure import PatchedModel
 from diagnosis.policy import MOST, WORTH_NAMING
 from diagnosis.printing import decision, plain
@@ -148,6 +155,7 @@ def assemble(
             gap,
             rest=left,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
+            beside=immaterial_words(before, after) if study.named else nearly_words(study),
         ),
         gap=gap,
         where=where,

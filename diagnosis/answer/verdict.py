@@ -9,10 +9,20 @@ import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.closure import Move, Remainder, of_swing, rms_shown
+from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.policy import FALSE_ALARM_RATE, FEW_RUNS, MATERIAL_SHARE, MOST, NOISE_CONTRADICTED
+from diagnosis.policy import (
+    AS_MUCH,
+    CHANCE_STDS,
+    FALSE_ALARM_RATE,
+    FEW_RUNS,
+    GREATER_PART,
+    MATERIAL_SHARE,
+    MOST,
+    NOISE_CONTRADICTED,
+)
 from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
 from diagnosis.result import Confirmation, GapSummary, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
@@ -108,12 +118,20 @@ _CHANNEL_WORDS = {
 
 
 def verdict(
-    causes: Sequence[str], found: Decision, gap: GapSummary, *, rest: Remainder, both_winds: bool
+    causes: Sequence[str],
+    found: Decision,
+    gap: GapSummary,
+    *,
+    rest: Remainder,
+    both_winds: bool,
+    beside: str = "",
 ) -> str:
     """The answer in one paragraph.
 
     Args:
         both_winds: whether the campaign has runs with the wind off and runs with the wind on.
+        beside: a sentence on what nearly explains the gap (`nearly_words`), or on what it matters
+            (`immaterial_words`); empty: none.
     """
     if not causes:
         return (
@@ -129,7 +147,8 @@ def verdict(
         with_first = f"With the first of them added, {share(gap.closed)} of the gap closes {gap.closed_on}."
         return " ".join((said, undecided_words(found), *(() if tuple(causes) == UNKNOWN else (with_first,))))
     if tuple(causes) == UNKNOWN:
-        return f"There is a gap ({size}), and no effect of the vocabulary explains it. {rest.words}"
+        said = "no effect is named as its cause" if beside else "no effect of the vocabulary explains it"
+        return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", beside, rest.words)))
     several, sources = len(causes) > 1, []
     for name in causes:  # what each acts on and, where the campaign can show it, whether it needs the wind
         kind = effect_class(name)
@@ -141,8 +160,58 @@ def verdict(
         f"The gap ({size}) comes {'only in part ' if rest.material else ''}"
         f"from {plain(*causes)} (probability {probability(found.credible[0][1])}): "
         f"{'; '.join(sources)}. With {'them' if several else 'it'} added, {share(gap.closed)} of the gap "
-        f"closes {gap.closed_on}. {rest.words}"
+        f"closes {gap.closed_on}. {' '.join(filter(None, (rest.words, beside)))}"
     )
+
+
+_IN_CHANNEL = {
+    "damping": "the damping along the runs",
+    "frequency": "the frequency along the runs",
+    "damping of runs": "the damping of single runs",
+    "frequency of runs": "the frequency of single runs",
+    "zero": "the zero",
+    "harmonics": "the harmonics",
+}
+
+
+def nearly_words(study: Study) -> str:
+    """The effects that explain most of a gap without being named, and why they are not; empty where none do."""
+    sets = [answer for answer in study.weighed if answer.effects != UNKNOWN]
+    first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
+    if study.causes != UNKNOWN or first is None or first.share > 1.0 - MOST:
+        return ""
+    names = plain(*first.effects).capitalize()
+    said = f"{names} would explain {share(1.0 - first.share)} of it"
+    if study.test.noisy and first.probability == 0.0:
+        return f"{said}, but the noise misbehaves and may be all of a gap as small as this."
+    said = f"{said} (probability {probability(first.probability)})"
+    alike = [a for a in sets if a is not first and a.share <= first.share + AS_MUCH]
+    rival = max(alike, key=lambda answer: answer.probability, default=None)
+    if rival is not None and rival.probability >= GREATER_PART * first.probability:
+        return f"{said}, and {plain(*rival.effects)} as much ({probability(rival.probability)})."
+    fitted = study.hypothesis(first.effects)
+    if fitted is not None:
+        chance = CHANCE_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
+        left = [
+            _IN_CHANNEL[name] for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c
+        ]
+        if left:
+            return f"{said}, but leaves a significant misfit of {' and '.join(left)}."
+    return f"{said}: too little to name it."
+
+
+def immaterial_words(before: Estimates, after: Estimates) -> str:
+    """That the causes change no coefficient materially, in a sentence; empty where they do."""
+    known = {name: given for name, given in after.items() if given.std and given.value and name in before}
+    moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
+    limits = {name: min(MATERIAL_SHARE * abs(given.value), given.std or 0.0) for name, given in known.items()}
+    if not known or any(moves[name] > limit for name, limit in limits.items()):
+        return ""
+
+    def size(name: str) -> str:
+        return f"less than {_rounded_up(100.0 * moves[name] / abs(known[name].value))} %"
+
+    return f"The gap is immaterial: its causes change {_each(list(known), size)}."
 
 
 BLIND_SPOTS = (

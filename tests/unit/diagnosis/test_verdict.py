@@ -7,13 +7,19 @@ from dataclasses import replace
 import pytest
 
 from diagnosis.answer.reported import held_out_totals
-from diagnosis.answer.verdict import verdict
+from diagnosis.answer.verdict import immaterial_words, nearly_words, verdict
 from diagnosis.closure import Misfit, Remainder, Step, Waterfall
+from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.printing import decision, gap_table, parameters_table, undecided_words
-from diagnosis.result import FITTED, HELD_OUT, GapSummary, RunGap
+from diagnosis.result import FITTED, HELD_OUT, GapSummary, ParameterEstimate, RunGap
+from diagnosis.search.weigh import Weighed
 from tests.unit.diagnosis_document import campaign, document
+from tests.unit.gap_campaigns import campaign as campaign_with
+from tests.unit.gap_campaigns import nominal, studied
 from tunnel_lab.report import view
 from tunnel_lab.report.page import render_report
+from tunnel_sim.effects import effect_class, effect_from
 
 
 def gap(*held_out: bool) -> GapSummary:
@@ -215,3 +221,56 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     assert "Probability of the most probable answer" in labels
     assert any("Do not repair" in step for step in view.next_steps(given))
     assert parameters_table(given).title.startswith("Parameters of the most probable answer")
+
+
+def estimates(**values):
+    return {name: ParameterEstimate(value, 0.01, "1/rad") for name, value in values.items()}
+
+
+def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
+    before, after = estimates(cn_beta=0.5, cn_r=-0.1), estimates(cn_beta=0.5004, cn_r=-0.1003)
+    words = immaterial_words(before, after)
+    assert (
+        words
+        == "The gap is immaterial: its causes change Cnβ by less than 0.08 % and Cnr by less than 0.3 %."
+    )
+    assert immaterial_words(before, after | estimates(cn_r=-0.102)) == ""  # 2 %
+    assert words in verdict(
+        ("coulomb_friction",),
+        decision((("coulomb_friction", 0.9), ("unknown", 0.1))),
+        gap(True),
+        rest=Remainder(False, 0.0, 1.0, False, {}, "Explained."),
+        both_winds=False,
+        beside=words,
+    )
+
+
+def nearly(*weighed, noisy=False):
+    """The sentence on what nearly explains a gap of quadratic damping, `unknown` being the answer."""
+    data = campaign_with(effect_from("quadratic_damping", {"coefficient": 2e-4}))
+    base = nominal(data)
+    lead = starting_points(base, effect_class("quadratic_damping"))[0]
+    study = studied(data, base, ("quadratic_damping",), fit(lead.problem, lead.point, base=base))
+    answers = (Weighed(("unknown",), 1.0, 0.6), *weighed)
+    return nearly_words(replace(study, weighed=answers, test=replace(study.test, noisy=noisy)))
+
+
+def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named():
+    first = Weighed(("quadratic_damping",), 0.004, 0.3)
+    assert nearly(first) == (
+        "Quadratic damping would explain 99.6 % of it (probability 0.30): too little to name it."
+    )
+    rival = Weighed(("coulomb_friction",), 0.01, 0.2)
+    assert "(probability 0.30), and coulomb friction as much (0.20)." in nearly(first, rival)
+    assert "the noise misbehaves" in nearly(replace(first, probability=0.0), noisy=True)
+    assert nearly(replace(first, share=0.4)) == ""
+    text = verdict(
+        ("unknown",),
+        decision((("unknown", 0.6), ("quadratic_damping", 0.3), ("none", 0.1))),
+        gap(True),
+        rest=Remainder(False, 0.0, 1.0, False, {}, "It hardly matters."),
+        both_winds=False,
+        beside=nearly(first),
+    )
+    assert "no effect is named as its cause. Quadratic damping would explain" in text
+    assert "no effect of the vocabulary explains it" not in text
