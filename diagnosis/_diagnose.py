@@ -13,7 +13,7 @@ from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
-from diagnosis.answer.verdict import spring_words
+from diagnosis.answer.verdict import choice_words, spring_words
 from diagnosis.closure import UNPATCHED, PatchedModel
 from diagnosis.diagnosable import (
     BY_MOMENT,
@@ -117,7 +117,7 @@ def diagnose(
         likeliest = max(odds, key=odds.__getitem__, default="")
         modes = second_modes(chosen.campaign) if likeliest in UNKNOWN else ()
         springs = () if answer.decision.decided and likeliest not in UNKNOWN else spring_words(study)
-        return replace(answer, verdict=" ".join((*modes, answer.verdict, *springs)))
+        return replace(answer, verdict=" ".join((*modes, answer.verdict, *choice_words(study), *springs)))
 
 
 def read_model(

@@ -147,11 +147,27 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
             unknown = probability
         elif fit is not None and probability > 0.0:
             small = beside(fit, starts_beside(fit, kinds)) if probability >= WORTH_NAMING else None
-            others.append(Possible(probability, fit, textbook.get(id(fit)), small))
+            share, alternatives = _by_choice(study, answer.effects, fit, probability, kinds)
+            others += [Possible(probability * share, fit, textbook.get(id(fit)), small), *alternatives]
+    share, alternatives = _by_choice(study, study.fitted, chosen, own, kinds)
     starts = starts_beside(chosen, kinds)
     small = beside(chosen, starts) if study.causes else None
-    first = Possible(own, chosen, textbook.get(id(chosen)), small)
-    return Answers((first, *others), unknown, study.nominal, hidden_effects(chosen, starts))
+    first = Possible(own * share, chosen, textbook.get(id(chosen)), small)
+    return Answers((first, *alternatives, *others), unknown, study.nominal, hidden_effects(chosen, starts))
+
+
+def _by_choice(
+    study: Study, names: tuple[str, ...], fit: Fit, probability: float, kinds: Sequence[type[Effect]]
+) -> tuple[float, list[Possible]]:
+    """The share of the fit among the choices of an answer that the runs cannot exclude, and the other choices."""
+    share, others = 1.0, []
+    for choice in study.choices.get(names, ()):
+        if choice.hypothesis.fit is fit:
+            share = choice.probability
+        else:
+            small = beside(choice.hypothesis.fit, starts_beside(choice.hypothesis.fit, kinds))
+            others.append(Possible(probability * choice.probability, choice.hypothesis.fit, None, small))
+    return share, others
 
 
 def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEstimate]:

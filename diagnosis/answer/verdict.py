@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.closure import Move, Remainder, of_swing, rms_shown
+from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test, rounding_errors
@@ -267,16 +268,38 @@ def spring_words(study: Study) -> tuple[str, ...]:
     chosen, inflate = dict(best.fit.problem.fixed), float(np.sqrt(1.0 + max(best.fit.excess, 0.0)))
     springs = []
     for name in (ONE_SPRING.name, AnotherSpring.name):
-        stiffness = study.similarity.own(chosen[f"{name}.{ONE_SPRING.chosen_spring()}"], "N m/rad")
-        error, std = (100.0 * of(f"{name}.error") for of in (best.fit.value, best.fit.std))
-        sign = "+" if error > 0.0 else ""
-        springs.append(f"{stiffness:.4g} N m/rad by {sign}{with_std(error, inflate * std)} %")
+        stated = chosen[f"{name}.{ONE_SPRING.chosen_spring()}"]
+        springs.append(_spring_error(study, best.fit, name, stated, inflate))
     beside = [name for name in best.names if name not in (ONE_SPRING.name, AnotherSpring.name)]
     others = f" beside {plain(*beside)}" if beside else ""
     return (
         f"Two springs that are not as stiff as stated would explain the gap{others}, such as "
         f"{' and '.join(springs)}: measure their stiffness again.",
     )
+
+
+def choice_words(study: Study) -> tuple[str, ...]:
+    """Which of the springs may be off, in a sentence, where the runs cannot tell; else none."""
+    found = []
+    for choice in study.choices.get(study.fitted, ()):
+        fit = choice.hypothesis.fit
+        inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
+        stated = dict(fit.problem.fixed)[f"{ONE_SPRING.name}.{ONE_SPRING.chosen_spring()}"]
+        off = _spring_error(study, fit, ONE_SPRING.name, stated, inflate)
+        found.append(f"{off} ({probability(choice.probability)})")
+    if not found:
+        return ()
+    return (
+        f"These runs cannot tell which spring is off: {' or '.join(found)}. The coefficients are averaged over "
+        "these choices: add runs with a third spring, or measure the stiffness of the springs again.",
+    )
+
+
+def _spring_error(study: Study, fit: Fit, name: str, stated: float, inflate: float) -> str:
+    """A spring and its error, such as ``16.12 N m/rad by −1.96 ± 0.01 %``."""
+    stiffness = study.similarity.own(stated, "N m/rad")
+    error, std = (100.0 * of(f"{name}.error") for of in (fit.value, fit.std))
+    return f"{stiffness:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, inflate * std)} %"
 
 
 def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Remainder:

@@ -29,6 +29,7 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
+from diagnosis.search.choices import Choice, choices
 from diagnosis.search.grow import exchange, grow, grow_in_stretches, prune, second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis, polish, with_forms
 from diagnosis.search.outside import two_springs
@@ -62,6 +63,7 @@ class Study:
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
         unresolved: effects of refused answers that no half of the records shows, by the names of the answer.
+        choices: by names of a likely answer, the choices of it that the runs cannot exclude.
         outside: fitted causes from outside the vocabulary, alone or beside effects.
         by_moment: the sets fitted with a random moment beside them, where sets are weighed by the moment that they
             leave and not by the angle.
@@ -85,6 +87,7 @@ class Study:
     test: GapTest
     cut: bool = False
     unresolved: Mapping[tuple[str, ...], tuple[str, ...]] = field(default_factory=dict)
+    choices: Mapping[tuple[str, ...], tuple[Choice, ...]] = field(default_factory=dict)
     outside: tuple[Hypothesis, ...] = ()
     by_moment: tuple[Hypothesis, ...] = ()
     rested: tuple[str, ...] = ()
@@ -184,6 +187,8 @@ def investigate(
         with clock.step("where"):
             found = replace(found, place=located(found))
         found = _weigh_effects(found, kinds, clock)
+        with clock.step("choices"):
+            found = replace(found, choices=_choices(found))
     return replace(found, seconds=clock.seconds)
 
 
@@ -368,6 +373,16 @@ def _without(found: Study, names: tuple[str, ...], lost: tuple[str, ...]) -> Stu
     """The study without a set of effects, some of which no half of the records shows."""
     kept = tuple(h for h in found.hypotheses if h.names != names)
     return replace(found, hypotheses=kept, unresolved={**found.unresolved, **({names: lost} if lost else {})})
+
+
+def _choices(found: Study) -> dict[tuple[str, ...], tuple[Choice, ...]]:
+    """By names of the answers worth naming, the choices that whole runs cannot exclude."""
+    nominal, chosen = misfit(found.nominal), {}
+    for answer in found.weighed:
+        hypothesis = found.stated(answer.effects) if answer.probability >= policy.WORTH_NAMING else None
+        if hypothesis is not None and hypothesis.fit.problem.data is found.nominal.problem.data:
+            chosen[answer.effects] = choices(hypothesis, nominal)
+    return {names: several for names, several in chosen.items() if several}
 
 
 def _compared(found: Study, base: Fit, clock: _Clock) -> Study:

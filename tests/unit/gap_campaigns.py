@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -36,6 +37,7 @@ def campaign(
     duration: float = DURATION,
     quantity: Quantity | None = None,
     damping: float = DAMPING,
+    conditions: Sequence[tuple[float, float]] = CONDITIONS,
 ) -> Campaign:
     """Six runs of two springs and three speeds, with effects, and something added to every reading."""
     count = round(duration / INTERVAL)
@@ -56,7 +58,7 @@ def campaign(
             duration,
             derivative=sensor.derivative,
         )
-        for i, (spring, speed) in enumerate(CONDITIONS)
+        for i, (spring, speed) in enumerate(conditions)
     )
     effects = tuple(effect for effect in effects if effect is not None)
     kinds = tuple(type(effect) for effect in effects)

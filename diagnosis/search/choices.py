@@ -1,0 +1,88 @@
+"""Discrete choices that the runs cannot make: which of the springs is not as stiff as stated.
+
+The inertia is fitted, so that a spring which is too stiff and the other one too soft change the frequencies alike.
+The coefficients differ by far more than their standard deviations, and an answer with one choice is one of several.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.problem import Point
+from diagnosis.likelihood.residuals import ChannelMisfit
+from diagnosis.policy import WORTH_NAMING
+from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, restricted
+from tunnel_sim.effects import Effect
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """One choice of a set of effects.
+
+    Args:
+        hypothesis: the set with this choice, fitted.
+        probability: among the choices of the set, a fraction.
+    """
+
+    hypothesis: Hypothesis
+    probability: float
+
+
+def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
+    """The choices of a set of effects that the runs cannot exclude, the likeliest first.
+
+    Args:
+        chosen: a fitted set, with the choice that fits best.
+        gap: what the nominal model leaves.
+
+    Returns:
+        Those of `WORTH_NAMING`, weighed like sets of effects; empty where there is nothing to choose, or one choice
+        only is worth naming.
+    """
+    others = [
+        other
+        for kind in chosen.fit.problem.effects
+        if (parameter := kind.chosen_spring()) is not None
+        for other in _other_springs(chosen, kind, f"{kind.name}.{parameter}")
+    ]
+    if not others:
+        return ()
+    sets = [chosen, *others]
+    scale = Scale.of(sets, gap)
+    logs = np.array([scale.weight(one) for one in sets])
+    weights = np.exp(logs - logs.max())
+    kept = weights / weights.sum() >= WORTH_NAMING
+    if kept.sum() < 2:
+        return ()
+    shares = weights * kept / (weights @ kept)
+    found = [Choice(one, float(share)) for one, share in zip(sets, shares, strict=True) if share > 0.0]
+    return tuple(sorted(found, key=lambda one: -one.probability))
+
+
+def _other_springs(chosen: Hypothesis, kind: type[Effect], name: str) -> Sequence[Hypothesis]:
+    """The set with another spring in place of the one chosen, fitted; a set whose fit fails is left out."""
+    whole, found = chosen.fit, []
+    problem, severity = whole.problem, f"{kind.name}.{kind.parameters()[0].name}"
+    stated = dict(problem.fixed)[name]
+    rest = restricted(whole, {other.name for other in problem.effects} - {kind.name})
+    known = dict(zip(rest.problem.names, rest.point.common.tolist(), strict=True))
+    for spring in problem.data.springs:
+        if spring == stated:
+            continue
+        fixed = tuple((key, spring if key == name else value) for key, value in problem.fixed)
+        other = replace(problem, fixed=fixed)
+        # with two springs the error of the other is the opposite one, and the inertia makes up for it
+        start = dict(known) | {severity: -whole.value(severity)}
+        if "yaw_inertia" in start:
+            start["yaw_inertia"] *= 1.0 - whole.value(severity)
+        point = Point(
+            np.array([start.get(key, whole.value(key)) for key in other.names]), whole.point.release
+        )
+        fitted: Fit | None = try_fit(other, point)
+        if fitted is not None and np.isfinite(fitted.total) and is_plausible(fitted):
+            found.append(Hypothesis(chosen.effects, fitted))
+    return found
