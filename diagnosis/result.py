@@ -200,12 +200,14 @@ class Hidden:
         parameter: name of its severity.
         size: that parameter, of the sign that allows more, with its unit.
         moves: by coefficient, the size of the change that the effect makes to it, with its unit.
+        significance: standard deviations by which its likeliest size differs from zero, a ratio.
     """
 
     effect: str
     parameter: str
     size: ParameterEstimate
     moves: Mapping[str, ParameterEstimate]
+    significance: float = 0.0
 
 
 @dataclass(frozen=True)

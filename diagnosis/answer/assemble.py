@@ -135,7 +135,7 @@ def assemble(
         name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
         for (name, given), coefficient in zip(found.after.items(), names, strict=False)
     }
-    left = remainder(study, stated, moved, steps.steps[-1].excess)
+    left = remainder(study, stated, moved, steps.steps[-1].excess, answers.hidden)
     rivals = [
         answer.effects
         for answer in study.weighed[1:]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from diagnosis.likelihood.starting_points import (
 )
 from diagnosis.policy import CHANCE_STDS
 from diagnosis.result import Hidden, ParameterEstimate
+from diagnosis.search.hypothesis import own_gain
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -56,28 +57,34 @@ def hidden_effects(fit: Fit, starts: Starts) -> tuple[Hidden, ...]:
     names, influence = coefficient_names(fit.problem), influences(fit)
     found = []
     for kind, points in starts:
-        largest: tuple[float, Array] | None = None
+        sizes: list[_Size] = []
         with suppress(np.linalg.LinAlgError):
             for start in second_order_starts(fit, kind) or points[: kind.tries]:
                 one = _largest(fit, start, influence, reach)
-                if one is not None and (
-                    largest is None or np.max(np.abs(one[1])) > np.max(np.abs(largest[1]))
-                ):
-                    largest = one
-        if largest is not None:
+                sizes += [] if one is None else [one]
+        if sizes:
             severity = kind.parameters()[0]
-            size = ParameterEstimate(largest[0], None, severity.unit)
+            largest = max(sizes, key=lambda one: float(np.max(np.abs(one.moves))))
+            size = ParameterEstimate(largest.size, None, severity.unit)
             moves = {
                 name: ParameterEstimate(float(abs(move)), None, COEFFICIENT_UNITS[name])
-                for name, move in zip(names, largest[1], strict=True)
+                for name, move in zip(names, largest.moves, strict=True)
             }
-            found.append(Hidden(kind.name, severity.name, size, moves))
+            stds = CHANCE_STDS * float(np.sqrt(max(one.drop for one in sizes) / reach))
+            found.append(Hidden(kind.name, severity.name, size, moves, stds))
     return tuple(found)
 
 
-def _largest(
-    fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float
-) -> tuple[float, Array] | None:
+@dataclass(frozen=True, eq=False)
+class _Size:
+    """The largest size of an effect that is not excluded."""
+
+    size: float
+    moves: Array  # of the coefficients there, shape (coefficients,)
+    drop: float  # of χ² at the likeliest size, less what the runs' own numbers gain by chance
+
+
+def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float) -> _Size | None:
     """The largest size of an effect within ``reach`` of the least χ², and the moves of the coefficients there.
 
     Of a polynomial in the size that is fitted far from that size, higher orders spoil the first one. So where the
@@ -90,17 +97,17 @@ def _largest(
         size = float(start.point.common[start.scaled])
         # at the size of a trial a small share tells that the runs cannot show the effect; later the size is small
         found = _within(fit, start, influence, reach, _ABSORBED if number == 0 else 0.0)
-        if found is None or found[0] == 0.0 or 1.0 / _SETTLED < found[0] / size < _SETTLED:
+        if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
             break
         common = start.point.common.copy()
-        common[start.scaled] = found[0]
+        common[start.scaled] = found.size
         start = replace(start, point=replace(start.point, common=common))
     return found
 
 
 def _within(
     fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: float, least_share: float
-) -> tuple[float, Array] | None:
+) -> _Size | None:
     """As `_largest`, by a polynomial fitted at the size of the starting point and at half of it."""
     assert start.scaled is not None
     size = float(start.point.common[start.scaled])
@@ -128,7 +135,9 @@ def _within(
     if not ends:
         return None
     outermost = max((float(np.clip(k, least, greatest)) for k in ends), key=abs)
-    return outermost * size, np.array([outermost, outermost**2][: len(parts)]) @ slopes
+    moved = np.array([outermost, outermost**2][: len(parts)]) @ slopes
+    by_chance = own_gain(start.problem, start.point) - own_gain(fit.problem, fit.point)
+    return _Size(outermost * size, moved, max(-lowest - by_chance, 0.0))
 
 
 def _real_roots(polynomial: Array) -> list[float]:

@@ -25,7 +25,7 @@ from diagnosis.policy import (
     NOISE_CONTRADICTED,
 )
 from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
-from diagnosis.result import Confirmation, GapSummary, ParameterEstimate, RunGap
+from diagnosis.result import Confirmation, GapSummary, Hidden, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
 from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN
@@ -302,13 +302,18 @@ def _spring_error(study: Study, fit: Fit, name: str, stated: float, inflate: flo
     return f"{stiffness:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, inflate * std)} %"
 
 
-def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], excess: float) -> Remainder:
+def remainder(
+    study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
+) -> Remainder:
     """Judge what the answer leaves of the gap; what chance explains is never material.
+
+    The tests of bands do not see what coloured noise takes up. A further effect that is significant shows it.
 
     Args:
         stated: the coefficients of the answer's fit with their standard deviations.
         moved: by the same names, how far what remains moves them (`coefficient_move`), in their units.
         excess: left on readings held out of the fit, in noise variances of a sample.
+        hidden: the effects that could hide beside the answer.
     """
     random = study.random_answer(study.fitted)
     if random is not None:  # in its wind it leaves innovations
@@ -321,6 +326,10 @@ def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], exces
     else:  # no cause changes the tests of the noise itself: those of the residuals count
         errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
         p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
+    further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
+    by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
+    shown = further is not None and by_effect < FALSE_ALARM_RATE <= p_value
+    p_value = min(p_value, by_effect)
     beyond_chance = p_value < FALSE_ALARM_RATE
     moves, material = {}, []
     for name, given in stated.items():
@@ -350,6 +359,8 @@ def remainder(study: Study, stated: Estimates, moved: Mapping[str, float], exces
         words = (
             f"Explained; {left} moves {bounds}." if study.named else f"It hardly matters: it moves {bounds}."
         )
+    if shown and further is not None:
+        words += f" {plain(further.effect).capitalize()} is significant beside it and too small to be named."
     return Remainder(beyond_chance, excess, p_value, bool(material), moves, words)
 
 

@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis import diagnose
 from diagnosis.answer.coefficients import Answers, Possible, coefficients, possible_answers
 from diagnosis.answer.hidden import hidden_effects
 from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Point, Problem
 from diagnosis.printing import diagnosis_parts, hidden_line, hidden_table
+from tests.unit.diagnosis.test_diagnosis_noise_colour import colour, with_zero
 from tests.unit.diagnosis_document import document
-from tests.unit.gap_campaigns import CN_R, campaign, nominal, precise, studied
+from tests.unit.gap_campaigns import CN_R, NOISE, campaign, nominal, precise, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
 
@@ -91,3 +93,20 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
     assert "0.0061" in row[-1]
     assert any(line in str(part) for part in diagnosis_parts(given))
     assert hidden_line(given | {"hidden": []}) == ""
+
+
+def test_a_further_effect_that_coloured_noise_takes_up_is_said_to_be_significant():
+    """A drift of 1.5 mrad in every run, beside vortices in coloured noise that is twice as large as the white."""
+    shedding = effect_from("vortex_shedding", {"amplitude": 0.1, "strouhal_number": 0.12})
+
+    def zero(count, rng):
+        return 2.0 * NOISE * colour("ar2", count, rng) + 1.5e-3 * np.arange(count) / count
+
+    kinds = [effect_class(name) for name in ("vortex_shedding", "sensor_drift", "coulomb_friction")]
+    found = diagnose(with_zero(campaign(shedding), zero), kinds=kinds)
+    assert found.causes == ("vortex_shedding",)
+    assert found.rest.significant
+    assert "Sensor drift is significant beside it and too small to be named." in found.verdict
+    (drift,) = (one for one in found.hidden if one.effect == "sensor_drift")
+    assert drift.significance > 5.0
+    assert abs(drift.size.value) > 1.5e-3
