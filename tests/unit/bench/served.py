@@ -18,6 +18,16 @@ from tests.unit.browser import screenshot
 
 ROOT = Path(__file__).parents[3]
 _MOST_PICTURES = 60  # of a film
+CONNECTED = "() => window.socket?.connected"
+"""Whether the page has its websocket: leaving earlier is a message on the console."""
+SETTLED = """() => {
+  const count = document.querySelectorAll("*").length, before = window.countBefore;
+  window.countBefore = count;
+  const moving = document.getAnimations().filter((one) => one.playState === "running"
+    && one.effect.getComputedTiming().iterations !== Infinity);
+  return count === before && moving.length === 0 && document.fonts.status === "loaded";
+}"""
+"""Whether nothing has been added to the page since the last question, and no colour is on its way to another."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +93,20 @@ class Tab:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self._base = served.base
-        self.page.goto(served.address)
-        self.page.wait_for_selector("h1")
+        self._go(served.address)
 
     def open(self, path: str) -> None:
-        self.page.goto(self._base + path)
+        self._go(self._base + path)
+
+    def _go(self, address: str) -> None:
+        self.page.goto(address)
         self.page.wait_for_selector("h1")
+        self.page.wait_for_function(CONNECTED)
+
+    def settle(self, selector: str) -> None:
+        """Wait until the last part of the page is there, and nothing of it changes any more."""
+        self.page.wait_for_selector(selector)
+        self.page.wait_for_function(SETTLED, polling=300)
 
     def click(self, words: str) -> None:
         """Click on a button or a link, count it, and keep a picture of it."""
