@@ -26,7 +26,6 @@ from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
-pytest.importorskip("nicegui")
 pytestmark = IN_A_BROWSER
 TWO_CHANNELS = Path(__file__).parents[3] / "docs" / "how-to" / "data" / "Measured_data2.mat"
 

@@ -64,7 +64,6 @@ def test_an_estimate_that_failed_does_not_open_the_diagnosis(tmp_path: Path) -> 
 def test_an_answer_is_shown_unless_the_campaign_has_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: bool
 ) -> None:
-    pytest.importorskip("nicegui")
     from nicegui import Client, ui
     from starlette.requests import Request
 
@@ -88,7 +87,6 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
 def test_as_many_estimators_run_at_a_time_as_there_are_processors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, processors: int
 ) -> None:
-    pytest.importorskip("nicegui")
     from tunnel_lab.bench import identify
 
     looks: Counter[Path] = Counter()
