@@ -88,10 +88,14 @@ class Session:
         return self.folder / f"{self.name}.{ending}"
 
 
+class UnknownCampaign(TunnelError):
+    """An address names a campaign that the workspace does not have."""
+
+
 def sessions(folder: Path) -> list[Session]:
     """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet."""
     names = set()
-    for path in folder.iterdir():
+    for path in _entries(folder):
         if (path / CAMPAIGN_FILE).is_file():
             names.add(path.name)
         elif path.name.endswith(".uploads") and path.is_dir():
@@ -104,16 +108,24 @@ def open_session(folder: Path, name: str) -> Session:
     by_name = {session.name: session for session in sessions(folder)}
     if name not in by_name:
         what, remedy = f"there is no campaign '{one_line(name, 60)}'", "choose one on the first page"
-        raise TunnelError(what, where=str(folder), remedy=remedy)
+        raise UnknownCampaign(what, where=str(folder), remedy=remedy)
     return by_name[name]
 
 
 def new_session(folder: Path, file_name: str) -> Session:
     """A session for dropped files, named after the first, with a name that nothing in the workspace has."""
     stem = safe_name(Path(safe_name(file_name)).stem)
-    taken = {path.name.split(".")[0].lower() for path in folder.iterdir()}
+    taken = {path.name.split(".")[0].lower() for path in _entries(folder)}
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
     return Session(folder, next(name for name in names if name.lower() not in taken))
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        what = f"the folder cannot be read ({(error.strerror or str(error)).lower()})"
+        raise TunnelError(what, where=str(folder), remedy="start tunnel bench again") from error
 
 
 def safe_name(text: str) -> str:
