@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
+import logging
+from collections.abc import Mapping
 from html import escape
 from http import HTTPStatus
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from fastapi.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.exceptions import HTTPException
 
 from tunnel_lab.bench.parts import page_words
 from tunnel_lab.bench.workspace import UnknownCampaign
+from tunnel_lab.terminal.outputs import say
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 if TYPE_CHECKING:
@@ -69,3 +74,35 @@ def status_of(error: BaseException) -> HTTPStatus:
         if isinstance(one, OSError) and one.errno in _FULL:
             return HTTPStatus.INSUFFICIENT_STORAGE
     return HTTPStatus.CONFLICT
+
+
+def say_odd_messages() -> None:
+    """Say in one line that a page's websocket has sent what is not a message of a page."""
+    for name in ("engineio.server", "socketio.server"):
+        logging.getLogger(name).addFilter(_in_one_line)
+    asyncio.get_running_loop().set_exception_handler(_say_odd_message)
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    if record.exc_info and record.exc_info[0] is not None:
+        record.msg, record.args = _odd(record.exc_info[0]), ()
+        record.exc_info = record.exc_text = None
+    return True
+
+
+def _say_odd_message(loop: asyncio.AbstractEventLoop, context: Mapping[str, Any]) -> None:
+    """Say an error of a task of the websocket's library in one line; any other is a fault of the bench."""
+    task, error = context.get("future"), context.get("exception")
+    code = getattr(task.get_coro(), "cr_code", None) if isinstance(task, asyncio.Task) else None
+    if (
+        error is not None
+        and code is not None
+        and {"socketio", "engineio"} & set(Path(code.co_filename).parts)
+    ):
+        say(_odd(type(error)), stderr=True)
+    else:
+        loop.default_exception_handler(dict(context))
+
+
+def _odd(kind: type[BaseException]) -> str:
+    return f"A message to the bench is not one of its pages' and was not read ({kind.__name__})."

@@ -21,9 +21,9 @@ from starlette.requests import Request
 
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Fault, Frame, address
-from tunnel_lab.bench.refusals import add_refusals, refusal
+from tunnel_lab.bench.refusals import add_refusals, refusal, say_odd_messages
 from tunnel_lab.bench.uploads import NEW, add_uploads, drop_zone, too_large
-from tunnel_lab.bench.workspace import STAGES, closed, open_session, read_result, sessions
+from tunnel_lab.bench.workspace import STAGES, closed, open_session, read_diagnosis, sessions
 from tunnel_lab.terminal.outputs import say
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
@@ -68,6 +68,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     add_pages(folder)
     words = f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."
     app.on_startup(lambda: background_tasks.create(_say_when_open(port, words)))
+    app.on_startup(say_odd_messages)
     app.on_shutdown(_end)
     with suppress(KeyboardInterrupt):  # the usual end
         icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
@@ -194,7 +195,7 @@ def add_pages(folder: Path) -> None:
     def fit(name: str) -> HTMLResponse:
         from tunnel_lab.report import render_fit
 
-        document = read_result(open_session(folder, name).diagnosis)
+        document = read_diagnosis(open_session(folder, name))
         if document is None:
             raise HTTPException(_CONFLICT, "Diagnose the campaign first.")
         return HTMLResponse(render_fit(document), headers={"cache-control": "no-store"})

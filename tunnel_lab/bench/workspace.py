@@ -184,7 +184,8 @@ def is_current(session: Session, result: Path) -> bool:
     document = read_result(result)
     if document is None:
         return False
-    stated = document.get("provenance", {}).get("sha256")
+    provenance = document.get("provenance")
+    stated = provenance.get("sha256") if isinstance(provenance, dict) else None
     if stated is not None:  # a copied folder has new times but the same content
         return bool(stated == _hashes(session, session.state()))
     return max(changed for _, changed, _ in session.state()) <= result.stat().st_mtime_ns
@@ -205,3 +206,14 @@ def read_result(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     return read_json(path, remedy="delete it, and let the bench write it again")
+
+
+def read_diagnosis(session: Session) -> dict[str, Any] | None:
+    """The diagnosis as it is shown; None where there is none.
+
+    Raises:
+        TunnelError: when the file is not one that this version's ``tunnel diagnose --json`` writes.
+    """
+    from tunnel_lab.report.diagnosis_file import read_whole
+
+    return read_whole(session.diagnosis) if session.diagnosis.is_file() else None

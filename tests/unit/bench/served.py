@@ -50,9 +50,13 @@ class Bench:
 
 
 @contextmanager
-def bench(folder: Path, *, crash: bool = False) -> Iterator[Bench]:
-    """Serve a workspace; Ctrl-C must end it with status 0. With ``crash`` it is killed in the end."""
-    words = [sys.executable, "-m", "tunnel_lab.cli", "bench", folder.name, "--no-browser"]
+def bench(folder: Path, *, crash: bool = False, prelude: str = "") -> Iterator[Bench]:
+    """Serve a workspace; Ctrl-C must end it with status 0, without a word on standard error.
+
+    With ``crash`` it is killed in the end. The server runs the Python code of ``prelude`` first.
+    """
+    start = f"{prelude}\nfrom tunnel_lab.cli import main\nraise SystemExit(main())"
+    words = [sys.executable, "-c", start, "bench", folder.name, "--no-browser"]
     # NiceGUI takes a server under pytest for one of its own tests.
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), environment.get("PYTHONPATH")]))

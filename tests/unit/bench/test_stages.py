@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import work
 from tunnel_lab.bench.workspace import STAGES, Session, closed
@@ -74,7 +75,9 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     run = Run("a", Record(*decay()), 0.0)
     write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
     hashes = {} if changed else file_hashes(session.campaign)
-    session.diagnosis.write_text(json.dumps({"verdict": "A gap.", "provenance": {"sha256": hashes}}))
+    session.diagnosis.write_text(
+        json.dumps(document() | {"verdict": "A gap.", "provenance": {"sha256": hashes}})
+    )
     monkeypatch.setattr(diagnosis, "Answer", lambda _, document: ui.label(document["verdict"]))
     with Client(ui.page("/"), request=Request({"type": "http", "path": "/", "headers": []})) as client:
         diagnosis.DiagnosePage(session, Frame("Diagnose", session, "diagnose"))
