@@ -1,4 +1,4 @@
-"""The report in a real browser: charts, themes and widths. Skipped where Playwright or a Chromium is missing.
+"""The report in a real browser: charts, themes and widths. Skipped where there is no Chromium.
 
 Truth: a document written by hand, and what the style sheet and WCAG 2 ask for.
 """
