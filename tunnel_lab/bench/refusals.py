@@ -32,7 +32,8 @@ _WORDS = {
 _PAGE = """<!doctype html>
 <html lang="en-GB" style="color-scheme: light dark">
 <head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title><link rel="stylesheet" href="/static/bench/bench.css"></head>
+<title>{title}</title><link rel="stylesheet" href="/static/bench/bench.css">
+<style>* {{ box-sizing: border-box; }} body {{ margin: 0; }}</style></head>
 <body><div class="nicegui-content">
 <header class="top"><a class="brand" href="/">Bench</a></header>
 <main id="main"><h1>{title}</h1><p class="fault" role="alert">{words}</p>
