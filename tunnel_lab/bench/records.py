@@ -46,7 +46,8 @@ class RecordsPage:
             ui.label(f"The campaign in {session.campaign}, as it is.").classes("soft")
             self._fault, self._drawn = Fault(), ui.element("div")
             ui.timer(0.0, self._draw_runs, once=True)
-            frame.way_on()
+            with ui.element("p").classes("buttons"):
+                frame.way_on()
             return
         self._files = ui.element("div")
         self._fault = Fault()
