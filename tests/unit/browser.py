@@ -1,21 +1,29 @@
-"""A real browser: the system's Chromium by Playwright, where there are both."""
+"""A real browser: the system's Chromium by Playwright. Tests in it are skipped where there is no Chromium."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+from tunnel_lab.report.page import find_browser
+from tunnel_sim.vocabulary.errors import TunnelError
+
+
+def _chromium() -> str | None:
+    try:
+        return find_browser()
+    except TunnelError:
+        return None
+
+
+CHROMIUM = _chromium()
 IN_A_BROWSER = [
-    pytest.mark.skipif(find_spec("playwright") is None, reason="there is no Playwright"),
     pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),  # of Playwright's own pipes
 ]

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.reference.free_decays import Setting, campaign
+from tests.skips import PLATFORM
 from tests.unit.killed import names_of_the_dead
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.writing import clear_leftovers, temporary_names, whole_folder, write_whole
@@ -65,7 +66,7 @@ def test_what_runs_or_runs_elsewhere_or_is_the_users_stays(tmp_path: Path) -> No
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(kept)
 
 
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason=f"{PLATFORM}: there is no /proc")
 def test_a_number_that_another_process_has_by_now_does_not_protect(tmp_path: Path) -> None:
     own, _ = temporary_names(tmp_path / "a")
     head, start, tail = own.name.rsplit("-", 2)

@@ -123,7 +123,6 @@ def test_figures_and_the_report_are_those_of_the_command(
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_pandas_is_given_tables_without_pyarrow(data: Campaign, found: Diagnosis) -> None:
-    pytest.importorskip("pandas")
     made: tuple[Diagnosis | Estimate, ...] = (found, identify(data))
     for one in made:
         table = one.to_pandas()
@@ -133,7 +132,6 @@ def test_pandas_is_given_tables_without_pyarrow(data: Campaign, found: Diagnosis
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_run_is_a_dataset(data: Campaign) -> None:
-    pytest.importorskip("xarray")
     run = data.runs[0]
     dataset = run.to_xarray()
     np.testing.assert_array_equal(dataset["yaw_rad"].to_numpy(), run.record.yaw_rad)
@@ -143,7 +141,6 @@ def test_a_run_is_a_dataset(data: Campaign) -> None:
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")  # of ArviZ 0.23, on its own future
 def test_draws_have_the_moments_of_the_estimate(data: Campaign) -> None:
-    pytest.importorskip("arviz")
     found = identify(data)
     posterior = found.to_arviz(np.random.default_rng(1), draws=20_000).posterior
     assert found.cn_beta is not None

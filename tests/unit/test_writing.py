@@ -16,6 +16,7 @@ from typing import BinaryIO
 import polars as pl
 import pytest
 
+from tests.skips import FILE_SYSTEM, PLATFORM, USER
 from tunnel_sim.files import writing
 from tunnel_sim.files.writing import (
     output_folder,
@@ -197,11 +198,11 @@ def test_a_device_node_of_root_stays_a_device_node(tmp_path: Path) -> None:
     try:
         os.mknod(node, 0o666 | stat.S_IFCHR, os.makedev(1, 3))
     except PermissionError:
-        pytest.skip("only root makes device nodes")
+        pytest.skip(f"{USER}: only root makes device nodes")
     try:
         write_whole(node, b"content")
     except TunnelError:
-        pytest.skip("devices are not opened on this file system")
+        pytest.skip(f"{FILE_SYSTEM}: devices are not opened here")
     assert node.is_char_device()
     assert list(tmp_path.iterdir()) == [node]
 
@@ -228,7 +229,7 @@ def test_standard_output_by_name_into_a_pipe_and_into_a_file(tmp_path: Path) -> 
     assert len(list(tmp_path.iterdir())) == 1
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason=f"{PLATFORM}: there is no /dev/full")
 def test_a_full_disk_is_one_line() -> None:
     with pytest.raises(TunnelError, match="/dev/full: cannot be written \\(no space left on device\\)"):
         write_whole(Path("/dev/full"), b"content")

@@ -28,7 +28,7 @@ from tunnel_lab.bench.parts import (
     show_items,
     show_parts,
 )
-from tunnel_lab.bench.workspace import Session, is_current, read_result
+from tunnel_lab.bench.workspace import Session, is_current, read_diagnosis
 from tunnel_lab.terminal.outputs import STEPS
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.reading import read_json
@@ -120,13 +120,19 @@ class DiagnosePage:
         if state.running:
             return
         with self._result:
-            document = read_result(result)
-            if document is not None and is_current(self._session, result):
+            self._show_answer()
+        self._frame.refresh(self._on)
+
+    def _show_answer(self) -> None:
+        try:
+            document = read_diagnosis(self._session)
+            if document is not None and is_current(self._session, self._session.diagnosis):
                 Answer(self._session, document)
             elif document is not None:
                 words = "The campaign has changed since it was diagnosed; diagnose it again."
                 ui.label(words).classes("fault")
-        self._frame.refresh(self._on)
+        except TunnelError as error:
+            self._fault.show(error)
 
     async def _start(self) -> None:
         with self._fault.around():
@@ -299,7 +305,7 @@ def build_next_run(session: Session, frame: Frame) -> None:
     from diagnosis.printing import rival_lines
     from tunnel_lab.report.view import next_steps, run_to_make, unplannable
 
-    document = read_result(session.diagnosis)
+    document = read_diagnosis(session)
     assert document is not None  # else the stage is closed
     heading("What to do next")
     with ui.element("ol"):
@@ -457,7 +463,7 @@ def write_session_report(session: Session, author: str, notes: str) -> None:
     from tunnel_lab.report import Byline, write_report
     from tunnel_sim.files.campaign_folder import read_campaign
 
-    document = read_result(session.diagnosis)
+    document = read_diagnosis(session)
     assert document is not None  # else the stage is closed
     made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
     campaign = diagnosable(read_campaign(session.campaign)).campaign

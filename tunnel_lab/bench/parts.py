@@ -1,4 +1,4 @@
-"""Parts that several pages share: the frame with the stages, errors, tables, links, charts and the drop zone.
+"""Parts that several pages share: the frame with the stages, errors, tables, links and charts.
 
 What a command says is shown in the words of the page: fields instead of options.
 """
@@ -13,13 +13,11 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from nicegui import events, ui
+from nicegui import ui
 
 from identification.printing import TextTable, as_html
-from tunnel_lab.bench.workspace import STAGES, Session, closed, safe_name
-from tunnel_sim.files.writing import output_folder, write_whole
+from tunnel_lab.bench.workspace import STAGES, Session, closed
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
 FIELDS = {
     "angle": "Column of the angle",
@@ -236,38 +234,3 @@ class Chart(ui.element, component="static/chart.js"):
         """
         self._props.update(marks=[dict(mark) for mark in marks])
         self.update()
-
-
-def too_large(size: int) -> str:
-    """Why an upload of a size in bytes is refused."""
-    most = f"{UPLOAD_BYTES / 1e6:.0f} MB of an upload"
-    return f"{size / 1e6:.0f} MB are more than the {most}; use tunnel import, or drop fewer files at a time"
-
-
-def drop_zone(dropped: events.Handler[events.MultiUploadEventArguments], fault: Fault) -> None:
-    """A place to drop files on, or to choose them with; a refusal is shown as a fault."""
-    limit = f"at most {UPLOAD_BYTES / 1e6:.0f} MB"
-    zone = ui.upload(
-        label=f"Drop files here, or press + to choose ({limit})",
-        multiple=True,
-        auto_upload=True,
-        max_total_size=UPLOAD_BYTES - 1_000_000,  # less the frame of the request
-        on_multi_upload=dropped,
-    )
-    zone.classes("drop").props('flat bordered aria-label="Files of a data logger"')
-    # The browser knows the size before it sends anything.
-    zone.on(
-        "rejected",
-        lambda event: fault.show(too_large(int(event.args))),
-        js_handler="(found) => emit(found.reduce((sum, one) => sum + one.file.size, 0))",
-    )
-
-
-async def keep(session: Session, given: events.MultiUploadEventArguments) -> None:
-    """Keep dropped files under safe names; a file of the same name is replaced."""
-    target = output_folder(session.uploads)
-    names = [safe_name(file.name) for file in given.files]
-    if len(set(names)) < len(names):
-        raise TunnelError("two files of one name were dropped", remedy="rename one, or drop them separately")
-    for name, file in zip(names, given.files, strict=True):
-        write_whole(target / name, await file.read())

@@ -82,7 +82,7 @@ class Drawn:
 
 def files_of(session: Session) -> list[Path]:
     """The dropped files, by name."""
-    return sorted(path for path in session.uploads.glob("*") if path.is_file())
+    return sorted(path for path in session.uploads.glob("[!.]*") if path.is_file())  # not those being written
 
 
 def choices_of(session: Session) -> ImportChoices:

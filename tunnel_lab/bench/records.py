@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from nicegui import events, ui
+from nicegui import ui
 
 from tunnel_lab.bench import preview
 from tunnel_lab.bench.parts import (
@@ -16,11 +16,10 @@ from tunnel_lab.bench.parts import (
     Frame,
     address,
     button,
-    drop_zone,
-    keep,
     show_items,
     show_parts,
 )
+from tunnel_lab.bench.uploads import drop_zone, more
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -47,7 +46,8 @@ class RecordsPage:
             ui.label(f"The campaign in {session.campaign}, as it is.").classes("soft")
             self._fault, self._drawn = Fault(), ui.element("div")
             ui.timer(0.0, self._draw_runs, once=True)
-            frame.way_on()
+            with ui.element("p").classes("buttons"):
+                frame.way_on()
             return
         self._files = ui.element("div")
         self._fault = Fault()
@@ -183,15 +183,12 @@ class RecordsPage:
             names = ", ".join(path.name for path in preview.files_of(self._session))
             ui.label(f"{names}; kept in {self._session.uploads}").classes("soft")
             with ui.expansion("Add files"):
-                fault = Fault()
 
-                async def dropped(given: events.MultiUploadEventArguments) -> None:
-                    with fault.around():
-                        await keep(self._session, given)
-                        self._show_files()
-                        await self._read()
+                async def kept(_: str) -> None:
+                    self._show_files()
+                    await self._read()
 
-                drop_zone(dropped, fault)
+                drop_zone(more(self._session), kept, Fault())
 
     def _draw(self, imported: Imported) -> None:
         """Draw the records, or only their marks where they are drawn already."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import os
 import re
 import secrets
 import socket
@@ -13,19 +14,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, quote, urlencode
 
-from fastapi.responses import FileResponse, HTMLResponse
-from nicegui import app, background_tasks, core, events, ui
+from fastapi.responses import HTMLResponse, Response
+from nicegui import app, background_tasks, core, ui
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
 
 from tunnel_lab.bench import work
-from tunnel_lab.bench.parts import Fault, Frame, address, drop_zone, keep, page_words, too_large
-from tunnel_lab.bench.workspace import (
-    STAGES,
-    closed,
-    new_session,
-    open_session,
-    read_result,
-    sessions,
-)
+from tunnel_lab.bench.parts import Fault, Frame, address
+from tunnel_lab.bench.refusals import add_refusals, refusal, say_odd_messages
+from tunnel_lab.bench.uploads import NEW, add_uploads, drop_zone, too_large
+from tunnel_lab.bench.workspace import STAGES, closed, open_session, read_diagnosis, sessions
 from tunnel_lab.terminal.outputs import say
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
@@ -37,6 +35,9 @@ if TYPE_CHECKING:
 
 
 HOST = "127.0.0.1"
+_OTHERS_MASK = 0o077
+"""Permissions that files and folders written by the bench and its commands do not have: any of other users."""
+_CONFLICT = 409  # status of HTTP for what the files do not allow now
 _LENGTH = re.compile(r"[0-9]{1,20}")
 
 
@@ -57,6 +58,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
                 remedy="name another one, or leave it out",
             ) from error
         port = int(trial.getsockname()[1])
+    os.umask(_OTHERS_MASK)
     token = secrets.token_urlsafe(24)
     address = f"{first}?token={token}"
     core.app.add_middleware(Guard, port=port, token=token)
@@ -66,6 +68,7 @@ def serve(folder: Path, *, port: int, browser: bool, first: str) -> None:
     add_pages(folder)
     words = f"The bench: http://{HOST}:{port}{address}\nCampaigns: {folder.resolve()}\nCtrl-C ends it."
     app.on_startup(lambda: background_tasks.create(_say_when_open(port, words)))
+    app.on_startup(say_odd_messages)
     app.on_shutdown(_end)
     with suppress(KeyboardInterrupt):  # the usual end
         icon = resources.files("tunnel_lab").joinpath("bench/static/favicon.svg")
@@ -160,13 +163,19 @@ async def _answer(send: Send, status: int, *headers: tuple[bytes, bytes], body: 
 
 
 def add_pages(folder: Path) -> None:
-    """Add the pages of a workspace."""
+    """Add the pages of a workspace, and the addresses beside them."""
+    add_refusals(app)
+    add_uploads(app, folder)
 
     @ui.page("/")
-    def first() -> None:
-        frame = Frame("From a logger's files to a report")
-        with frame.main:
-            build_start(folder)
+    def first(request: Request) -> Response | None:
+        try:
+            frame = Frame("From a logger's files to a report")
+            with frame.main:
+                build_start(folder)
+        except TunnelError as error:
+            return refusal(request, error)
+        return None
 
     @ui.page("/try")
     def rig() -> None:
@@ -175,51 +184,50 @@ def add_pages(folder: Path) -> None:
             import_module("tunnel_lab.bench.try_it").TryItPage(folder)
 
     @app.get("/{name}/report.html")
-    def report(name: str) -> FileResponse:
+    def report(name: str) -> Response:
         session = open_session(folder, name)
-        return FileResponse(session.report, headers={"cache-control": "no-store"})
+        if not session.report.is_file():
+            why = closed(session, "report") or "Open the page Report first: it writes the report."
+            raise HTTPException(_CONFLICT, why)
+        return HTMLResponse(session.report.read_bytes(), headers={"cache-control": "no-store"})
 
     @app.get("/{name}/fit.html")
     def fit(name: str) -> HTMLResponse:
         from tunnel_lab.report import render_fit
 
-        document = read_result(open_session(folder, name).diagnosis)
-        text = "" if document is None else render_fit(document)
-        return HTMLResponse(text, headers={"cache-control": "no-store"})
+        document = read_diagnosis(open_session(folder, name))
+        if document is None:
+            raise HTTPException(_CONFLICT, "Diagnose the campaign first.")
+        return HTMLResponse(render_fit(document), headers={"cache-control": "no-store"})
 
     @ui.page("/{name}/{stage}")
-    def stage(name: str, stage: str) -> None:
+    def stage(name: str, stage: str, request: Request) -> Response | None:
         try:
             session = open_session(folder, name)
-            opened = {each.key: each for each in STAGES}.get(stage, STAGES[0])
+            opened = {each.key: each for each in STAGES}.get(stage)
+            if opened is None:
+                raise HTTPException(404)
             frame = Frame(opened.title, session, opened.key)
             with frame.main:
                 why = closed(session, opened.key)
                 if why:
+                    ui.context.client.status_code = _CONFLICT
                     ui.label(why).classes("fault")
                     ui.link("Back to the records", address(session, "records")).classes("button")
                 else:
                     # Only here: the first page need not wait for what the stages load.
                     module, _, build = opened.builder.partition(".")
                     getattr(import_module(f"tunnel_lab.bench.{module}"), build)(session, frame)
-        except TunnelError as error:
-            ui.label(page_words(str(error))).classes("fault")
-            ui.link("All campaigns", "/")
+        except (TunnelError, HTTPException) as error:
+            return refusal(request, error)
+        return None
 
 
 def build_start(folder: Path) -> None:
     """The first page: a place to drop files on, and the campaigns."""
     words = "Drop the files of a data logger. Every step writes the files that the commands write."
     ui.label(words).classes("lede")
-    fault = Fault()
-
-    async def dropped(given: events.MultiUploadEventArguments) -> None:
-        with fault.around():
-            session = new_session(folder, given.files[0].name)
-            await keep(session, given)
-            ui.navigate.to(address(session, "records"))
-
-    drop_zone(dropped, fault)
+    drop_zone(NEW, ui.navigate.to, Fault())
     place = folder if folder.name else folder.resolve()
     words = f"Dropped files are kept in {place}, in a folder of their own beside the campaign."
     ui.label(words).classes("soft")

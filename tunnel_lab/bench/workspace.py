@@ -88,10 +88,14 @@ class Session:
         return self.folder / f"{self.name}.{ending}"
 
 
+class UnknownCampaign(TunnelError):
+    """An address names a campaign that the workspace does not have."""
+
+
 def sessions(folder: Path) -> list[Session]:
     """The sessions of a workspace, by name: campaigns, and dropped files that are not one yet."""
     names = set()
-    for path in folder.iterdir():
+    for path in _entries(folder):
         if (path / CAMPAIGN_FILE).is_file():
             names.add(path.name)
         elif path.name.endswith(".uploads") and path.is_dir():
@@ -104,16 +108,24 @@ def open_session(folder: Path, name: str) -> Session:
     by_name = {session.name: session for session in sessions(folder)}
     if name not in by_name:
         what, remedy = f"there is no campaign '{one_line(name, 60)}'", "choose one on the first page"
-        raise TunnelError(what, where=str(folder), remedy=remedy)
+        raise UnknownCampaign(what, where=str(folder), remedy=remedy)
     return by_name[name]
 
 
 def new_session(folder: Path, file_name: str) -> Session:
     """A session for dropped files, named after the first, with a name that nothing in the workspace has."""
     stem = safe_name(Path(safe_name(file_name)).stem)
-    taken = {path.name.split(".")[0].lower() for path in folder.iterdir()}
+    taken = {path.name.split(".")[0].lower() for path in _entries(folder)}
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
     return Session(folder, next(name for name in names if name.lower() not in taken))
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        what = f"the folder cannot be read ({(error.strerror or str(error)).lower()})"
+        raise TunnelError(what, where=str(folder), remedy="start tunnel bench again") from error
 
 
 def safe_name(text: str) -> str:
@@ -172,7 +184,8 @@ def is_current(session: Session, result: Path) -> bool:
     document = read_result(result)
     if document is None:
         return False
-    stated = document.get("provenance", {}).get("sha256")
+    provenance = document.get("provenance")
+    stated = provenance.get("sha256") if isinstance(provenance, dict) else None
     if stated is not None:  # a copied folder has new times but the same content
         return bool(stated == _hashes(session, session.state()))
     return max(changed for _, changed, _ in session.state()) <= result.stat().st_mtime_ns
@@ -193,3 +206,14 @@ def read_result(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     return read_json(path, remedy="delete it, and let the bench write it again")
+
+
+def read_diagnosis(session: Session) -> dict[str, Any] | None:
+    """The diagnosis as it is shown; None where there is none.
+
+    Raises:
+        TunnelError: when the file is not one that this version's ``tunnel diagnose --json`` writes.
+    """
+    from tunnel_lab.report.diagnosis_file import read_whole
+
+    return read_whole(session.diagnosis) if session.diagnosis.is_file() else None

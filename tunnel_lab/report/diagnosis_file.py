@@ -122,3 +122,10 @@ class DiagnosisDocument(Document):
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")
     provenance: Table = Field(description="versions, and SHA-256 of the records")
+
+
+def read_whole(path: Path) -> dict[str, Any]:
+    """The whole document of a diagnosis, of which all fields are checked."""
+    document = read_document(path)
+    validate(DiagnosisDocument, document, path)
+    return document

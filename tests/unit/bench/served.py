@@ -18,6 +18,16 @@ from tests.unit.browser import screenshot
 
 ROOT = Path(__file__).parents[3]
 _MOST_PICTURES = 60  # of a film
+CONNECTED = "() => window.socket?.connected"
+"""Whether the page has its websocket: leaving earlier is a message on the console."""
+SETTLED = """() => {
+  const count = document.querySelectorAll("*").length, before = window.countBefore;
+  window.countBefore = count;
+  const moving = document.getAnimations().filter((one) => one.playState === "running"
+    && one.effect.getComputedTiming().iterations !== Infinity);
+  return count === before && moving.length === 0 && document.fonts.status === "loaded";
+}"""
+"""Whether nothing has been added to the page since the last question, and no colour is on its way to another."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +50,13 @@ class Bench:
 
 
 @contextmanager
-def bench(folder: Path, *, crash: bool = False) -> Iterator[Bench]:
-    """Serve a workspace; Ctrl-C must end it with status 0. With ``crash`` it is killed in the end."""
-    words = [sys.executable, "-m", "tunnel_lab.cli", "bench", folder.name, "--no-browser"]
+def bench(folder: Path, *, crash: bool = False, prelude: str = "") -> Iterator[Bench]:
+    """Serve a workspace; Ctrl-C must end it with status 0, without a word on standard error.
+
+    With ``crash`` it is killed in the end. The server runs the Python code of ``prelude`` first.
+    """
+    start = f"{prelude}\nfrom tunnel_lab.cli import main\nraise SystemExit(main())"
+    words = [sys.executable, "-c", start, "bench", folder.name, "--no-browser"]
     # NiceGUI takes a server under pytest for one of its own tests.
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), environment.get("PYTHONPATH")]))
@@ -83,12 +97,20 @@ class Tab:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self._base = served.base
-        self.page.goto(served.address)
-        self.page.wait_for_selector("h1")
+        self._go(served.address)
 
     def open(self, path: str) -> None:
-        self.page.goto(self._base + path)
+        self._go(self._base + path)
+
+    def _go(self, address: str) -> None:
+        self.page.goto(address)
         self.page.wait_for_selector("h1")
+        self.page.wait_for_function(CONNECTED)
+
+    def settle(self, selector: str) -> None:
+        """Wait until the last part of the page is there, and nothing of it changes any more."""
+        self.page.wait_for_selector(selector)
+        self.page.wait_for_function(SETTLED, polling=300)
 
     def click(self, words: str) -> None:
         """Click on a button or a link, count it, and keep a picture of it."""

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from tests.unit.bench.served import Bench, bench, tab
+from tests.unit.bench.test_refusals import FULL_DISK
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.importing.import_files import decay
@@ -26,7 +27,6 @@ from tunnel_sim.files.reading import read_json
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.limits import UPLOAD_BYTES
 
-pytest.importorskip("nicegui")
 pytestmark = IN_A_BROWSER
 TWO_CHANNELS = Path(__file__).parents[3] / "docs" / "how-to" / "data" / "Measured_data2.mat"
 
@@ -217,17 +217,45 @@ def test_a_large_upload_is_refused_before_it_is_stored(browser: Any, served: Ben
         one.page.set_input_files("input[type=file]", [str(large)])
         one.page.wait_for_selector("text=200 MB are more than the 134 MB of an upload")
         cookies = "; ".join(f"{c['name']}={c['value']}" for c in one.context.cookies())
-        uploads = [url for url in one.requests if "/upload/" in url]
+        uploads = [url for url in one.requests if url.endswith("/upload")]
     assert uploads == []
     # A browser that does not check: the server refuses by the length, and reads nothing.
     connection = http.client.HTTPConnection(served.base.removeprefix("http://"), timeout=30)
-    connection.putrequest("POST", "/_nicegui/client/x/upload/1")
+    connection.putrequest("POST", "/upload")
     connection.putheader("Cookie", cookies)
     connection.putheader("Content-Length", str(UPLOAD_BYTES + 1))
     connection.endheaders()
     answer = connection.getresponse()
     assert (answer.status, answer.read().count(b"\n")) == (413, 1)
     assert sorted(served.folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_refusal_can_be_read_at_every_width(browser: Any, served: Bench, scheme: str) -> None:
+    with tab(browser, served, color_scheme=scheme) as one:
+        for path in ("/nothing", f"/{'long' * 30}/report.html"):
+            one.page.goto(served.base + path)
+            for width in (390, 1280):
+                one.page.set_viewport_size({"width": width, "height": 900})
+                wide, seen = one.page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+                assert wide <= seen, (path, width)
+            pairs = one.page.evaluate(CONTRASTS)
+            assert [pair for pair in pairs if pair[1] < LEAST_CONTRAST] == [], path
+            assert [words for words, _ in pairs if words in ("Not Found", "Bench", "All campaigns")]
+        dark = one.page.evaluate("getComputedStyle(document.body).backgroundColor") != "rgb(255, 255, 255)"
+        assert dark is (scheme == "dark")
+        assert [words for words in one.complaints if "404" not in words] == []  # what the browser itself says
+        one.complaints.clear()
+
+
+def test_a_full_disk_is_said_beside_the_drop_zone(browser: Any, tmp_path: Path) -> None:
+    (tmp_path / "full.csv").write_text("full")
+    with bench(tmp_path / "work", prelude=FULL_DISK) as served, tab(browser, served) as one:
+        one.page.set_input_files("input[type=file]", [str(tmp_path / "full.csv")])
+        one.page.wait_for_selector(".fault:has-text('The disk is full: nothing was kept.')")
+        assert [words for words in one.complaints if "507" not in words] == []
+        one.complaints.clear()
+        assert list(served.folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("headers", [{}, {"Origin": "http://evil.example"}, {"Host": "evil.example"}])
@@ -315,20 +343,30 @@ def test_the_fit_over_the_data_is_beside_the_answer(browser: Any, served: Bench)
     assert [text.partition(" ")[0] for text in shown] == ["alpha", "gamma"]
 
 
-PAGES = ("/", "/try", "/two/records", "/two/conditions", "/two/identify", "/two/diagnose", "/two/next-run")
+PAGES = {
+    "/": ".sessions",
+    "/try": ".car svg",
+    "/two/records": ".chart .uplot >> nth=1",
+    "/two/conditions": ".ag-row",
+    "/two/identify": "text=Continue: Diagnose",
+    "/two/diagnose": ".by-hand:not(.waiting) .value >> nth=0",
+    "/two/next-run": "text=Find the run",
+    "/two/report": "iframe",
+}
+"""Every page with the last part of it."""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench, scheme: str) -> None:
     session = Session(served.folder, "two")
     _diagnosed(session)
     with tab(browser, served, color_scheme=scheme) as one:
-        for path in PAGES:
+        for path, last in PAGES.items():
             one.open(path)
-            one.page.wait_for_timeout(700)
+            one.settle(last)
             for width in (390, 1280, 2560):
                 one.page.set_viewport_size({"width": width, "height": 900})
+                one.page.evaluate(DRAWN_AGAIN)
                 wide, seen = one.page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
                 assert wide <= seen, (path, width)
                 assert one.page.evaluate(SIDEWAYS) == [], (path, width)
@@ -338,6 +376,8 @@ def test_every_page_can_be_read_at_every_width(browser: Any, served: Bench, sche
             assert one.page.evaluate(NAMELESS) == [], path
 
 
+# Charts follow the width of the page after it is laid out.
+DRAWN_AGAIN = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 SIDEWAYS = """() => [...document.querySelectorAll(
   ".printed, .figures figure, .ag-center-cols-viewport")].filter((one) => one.checkVisibility()
   && one.scrollWidth > one.clientWidth + 1).map((one) => one.outerHTML.slice(0, 200))"""

@@ -10,11 +10,9 @@ import pytest
 
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import preview
+from tunnel_lab.bench.preview import Column, columns_of
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.columns import guessed_angle_unit, guessed_time_unit
-
-pytest.importorskip("nicegui")
-from tunnel_lab.bench.preview import Column, columns_of
 
 
 def session(folder: Path, heads: str, *columns: np.ndarray) -> Session:

@@ -37,7 +37,6 @@ def test_what_is_missing_is_said_in_one_line(
 
 
 def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
-    pytest.importorskip("nicegui")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

@@ -12,10 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from nicegui import Client, ui
+from starlette.requests import Request
 
 from identification.printing import TextTable
 from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
+from tunnel_lab.bench import diagnosis, parts, work
+from tunnel_lab.bench.parts import Frame
 from tunnel_lab.bench.workspace import Session
 from tunnel_lab.report import view
 from tunnel_lab.terminal import outputs
@@ -23,13 +27,6 @@ from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.campaign_folder import write_campaign
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
-
-pytest.importorskip("nicegui")
-from nicegui import Client, ui
-from starlette.requests import Request
-
-from tunnel_lab.bench import diagnosis, parts, work
-from tunnel_lab.bench.parts import Frame
 
 NORMALISED = {
     "before": {

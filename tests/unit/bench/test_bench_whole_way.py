@@ -22,11 +22,10 @@ from tests.unit.bench.served import Tab, bench, tab
 from tests.unit.browser import IN_A_BROWSER, chromium, screenshot
 from tunnel_lab.bench import work
 
-pytest.importorskip("nicegui")
 pytestmark = [*IN_A_BROWSER, pytest.mark.slow]
 
 ROOT = Path(__file__).parents[3]
-RAW = ROOT.parent / "shared" / "data" / "raw" / "pasco-rotation-10-runs.csv"
+RAW = ROOT / "docs" / "how-to" / "data" / "Measured_data2.mat"
 PICTURES = os.environ.get("BENCH_PICTURES")
 PLAN = """
 name = "dry"
@@ -96,21 +95,23 @@ def to_the_report(one: Tab, name: str) -> Path:
     return Path(found.value.path())
 
 
-@pytest.mark.skipif(not RAW.is_file(), reason="the file is not here")
 def test_a_real_file_becomes_a_report_in_seven_clicks(browser: Any, tmp_path: Path) -> None:
     size = {"viewport": {"width": 1024, "height": 768}}
     with bench(tmp_path / "work") as served, tab(browser, served, **size) as one:
         one.shoot()
         one.page.set_input_files("input[type=file]", [str(RAW)])
+        one.page.get_by_label("Column of the angle").click()  # of two channels
+        one.page.get_by_role("option", name="data[1]").click()
+        one.page.keyboard.press("Escape")
         one.wait(".mark.start")
         picture(one, "records")
         one.click("Write the campaign")
         report = to_the_report(one, "diagnose").read_text("utf-8")
-        assert "Diagnosis of pasco-rotation-10-runs" in report
+        assert "Diagnosis of Measured_data2" in report
         assert one.clicks <= 7  # the download among them
         one.shoot()
         pictures = one.film
-    document = json.loads((tmp_path / "work" / "pasco-rotation-10-runs.diagnosis.json").read_text())
+    document = json.loads((tmp_path / "work" / "Measured_data2.diagnosis.json").read_text())
     assert document["gap"]["detected"]
     if PICTURES:
         film(pictures, f"{PICTURES}/bench.mp4")

@@ -17,8 +17,6 @@ from tunnel_sim.files.importing.conditions import read_recipe
 from tunnel_sim.files.importing.records import read_records
 from tunnel_sim.vocabulary.errors import TunnelError
 
-pytest.importorskip("nicegui")
-
 
 @pytest.fixture
 def session(tmp_path: Path) -> Session:

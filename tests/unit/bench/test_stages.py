@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import work
 from tunnel_lab.bench.workspace import STAGES, Session, closed
@@ -64,7 +65,6 @@ def test_an_estimate_that_failed_does_not_open_the_diagnosis(tmp_path: Path) -> 
 def test_an_answer_is_shown_unless_the_campaign_has_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: bool
 ) -> None:
-    pytest.importorskip("nicegui")
     from nicegui import Client, ui
     from starlette.requests import Request
 
@@ -75,7 +75,9 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
     run = Run("a", Record(*decay()), 0.0)
     write_campaign(Campaign("rig", RigProperties(), SensorProperties(), (run,)), session.campaign)
     hashes = {} if changed else file_hashes(session.campaign)
-    session.diagnosis.write_text(json.dumps({"verdict": "A gap.", "provenance": {"sha256": hashes}}))
+    session.diagnosis.write_text(
+        json.dumps(document() | {"verdict": "A gap.", "provenance": {"sha256": hashes}})
+    )
     monkeypatch.setattr(diagnosis, "Answer", lambda _, document: ui.label(document["verdict"]))
     with Client(ui.page("/"), request=Request({"type": "http", "path": "/", "headers": []})) as client:
         diagnosis.DiagnosePage(session, Frame("Diagnose", session, "diagnose"))
@@ -88,7 +90,6 @@ def test_an_answer_is_shown_unless_the_campaign_has_changed(
 def test_as_many_estimators_run_at_a_time_as_there_are_processors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, processors: int
 ) -> None:
-    pytest.importorskip("nicegui")
     from tunnel_lab.bench import identify
 
     looks: Counter[Path] = Counter()

@@ -12,7 +12,6 @@ import pytest
 from tunnel_lab.bench import work
 from tunnel_sim.vocabulary.errors import TunnelError
 
-pytest.importorskip("fcntl")
 PLAN = 'name = "long"\nseed = 1\nsprings = [5]\nwind_speeds = [0.0]\nrelease_angles_deg = [20.0]\nduration = 9e4\n'
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from tests.skips import PLATFORM
 from tests.unit.gone_reader import unheard
 
 Tunnel = Callable[..., tuple[int, str, str]]
@@ -76,7 +77,7 @@ def test_without_standard_output(tmp_path: Path) -> None:
     assert (tmp_path / "e.json").exists()
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason=f"{PLATFORM}: there is no /dev/full")
 def test_a_full_disk_below_standard_output_is_one_line() -> None:
     with Path("/dev/full").open("w") as full:
         done = started("effects", stdout=full)

@@ -19,8 +19,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.skips import PLATFORM
 from tunnel_lab.show.film import Look, Request, backends, draw_trace, shown_run, write_film
-from tunnel_lab.show.live import Controls, History, LiveRun, Puppet, missing_display, window_loop
+from tunnel_lab.show.live import Controls, History, LiveRun, Overlay, Puppet, missing_display, window_loop
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.writing import as_json
@@ -202,10 +203,9 @@ def test_the_history_keeps_the_last_seconds_and_begins_anew() -> None:
 
 
 def test_the_panel_shows_a_long_title_whole_and_the_history_of_the_physics() -> None:
-    overlay = pytest.importorskip("tunnel_lab.show.live")
     effects = ("coulomb_friction:friction_moment=0.01", "rod_flexibility:compliance=0.01")
     live = LiveRun(shown_run(Request(effects=effects)))
-    panel = overlay.Overlay(live, "http://localhost:8080/")
+    panel = Overlay(live, "http://localhost:8080/")
     assert " ".join(panel._head) == live.run.title
     assert max(map(len, panel._head)) <= 54  # characters of Studio's font in a panel of 380 pixels
     assert panel._history is live.history
@@ -266,7 +266,7 @@ def test_no_display_is_one_clear_line(tunnel: Tunnel, monkeypatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     if not missing_display():
-        pytest.skip("this platform always has one")
+        pytest.skip(f"{PLATFORM}: there is always one")
     status, out, error = tunnel("view")
     assert (status, out) == (2, "")
     assert "there is no display" in error

@@ -16,6 +16,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RecordEpisodeStatistics, RecordVideo, TimeLimit
 
 import tunnel_sim.envs.rendering as rendering
+from tests.skips import PLATFORM
 from tunnel_sim.envs import EnvError, register_environments
 from tunnel_sim.envs.episodes import campaign_of
 from tunnel_sim.envs.rendering import RigView
@@ -206,7 +207,6 @@ def test_episode_statistics_sum_the_information() -> None:
 
 @pytest.mark.usefixtures("drawing")
 def test_a_video_is_recorded(tmp_path: Path) -> None:
-    pytest.importorskip("moviepy")
     env = RecordVideo(
         make(duration=0.05, render_mode="rgb_array", width=64, height=48), str(tmp_path / "film")
     )
@@ -251,7 +251,7 @@ def test_a_window_follows_the_run_and_outlives_episodes(windows: list[Window]) -
 
 def test_without_a_display_the_window_is_refused_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     if not sys.platform.startswith("linux"):
-        pytest.skip("windows open without a DISPLAY there")
+        pytest.skip(f"{PLATFORM}: windows open without a DISPLAY there")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(EnvError, match="rgb_array"):

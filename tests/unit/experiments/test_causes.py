@@ -223,7 +223,8 @@ def test_the_published_metadata_belongs_to_the_published_seal():
 
 def test_each_cause_in_mjcf_is_its_equation(small):
     """Moments of the compiled model at one state, against the equations of docs/reference/effects.md."""
-    mujoco = pytest.importorskip("mujoco")
+    import mujoco
+
     from benchmarks.causes.mjcf import _XML, BOUNDS, NOMINAL, Rig
 
     c0001 = Rig(small / CAMPAIGNS / "c0001")
@@ -274,8 +275,6 @@ def test_each_cause_in_mjcf_is_its_equation(small):
 
 
 def test_the_toolbox_fits_the_nominal_model_within_the_noise(small):
-    for package in ("colorama", "tabulate", "yaml", "absl", "plotly"):
-        pytest.importorskip(package)
     from benchmarks.causes.methods.mujoco_sysid import coefficients
     from benchmarks.causes.mjcf import NOMINAL, Rig
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.skips import USER
 from tests.unit.spoilt_campaign import (
     GOOD,
     HEAD,
@@ -149,7 +150,7 @@ def test_a_file_in_place_of_the_folder(tmp_path: Path) -> None:
     assert "run.csv: no such folder" in refusal(tmp_path / "run.csv")
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="the superuser may read anything")
+@pytest.mark.skipif(os.geteuid() == 0, reason=f"{USER}: root may read anything")
 def test_a_file_without_permission(folder: Path) -> None:
     (folder / "runs" / "r2.csv").chmod(0)
     try:

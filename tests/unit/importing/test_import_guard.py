@@ -8,6 +8,7 @@ import time
 import numpy as np
 import pytest
 
+from tests.skips import PLATFORM
 from tests.unit.importing.odd_readers import TABLES
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing import source as guard
@@ -43,7 +44,7 @@ def test_tables_come_back_as_they_were() -> None:
         pytest.param(
             b"fill",
             "log.h5: needs more than 4 GiB of memory to be read; split it",
-            marks=pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory"),
+            marks=pytest.mark.skipif(sys.platform != "linux", reason=f"{PLATFORM}: only Linux limits memory"),
         ),
         (b"refuse", "log.h5: is odd; mend it"),
     ],

@@ -1,4 +1,4 @@
-"""The report in a real browser: charts, themes and widths. Skipped where Playwright or a Chromium is missing.
+"""The report in a real browser: charts, themes and widths. Skipped where there is no Chromium.
 
 Truth: a document written by hand, and what the style sheet and WCAG 2 ask for.
 """
@@ -139,7 +139,7 @@ def test_runs_are_chosen_by_name_and_by_a_click_on_the_map(opened: Opened) -> No
     place = {"x": 0.1 * box["width"], "y": box["height"] * 2.5 / 3.0}  # the last of three runs
     cells.hover(position=place)
     hint = opened.page.locator('figure[data-figure="where-runs"] p.small')
-    assert re.fullmatch(r"gamma, .* 0 to 2: 2 noise variances", hint.inner_text())
+    assert re.fullmatch(r"gamma · 21\.5 m/s, time since .* 0 to 2: 2 noise variances", hint.inner_text())
     cells.click(position=place)
     assert choice.locator("option:checked").inner_text().startswith("gamma")
 
