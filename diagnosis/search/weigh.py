@@ -134,7 +134,7 @@ def misfit_scale(nominal: ChannelMisfit, common: float = 0.0, chance: float | Ar
 
     Args:
         nominal: what the nominal model leaves, and the motion.
-        common: χ² of a channel that all sets leave (`common_misfit`).
+        common: χ² of a channel that all sets leave (`common_misfit`), dimensionless.
         chance: χ² that chance explains, by channel or common to all; None: `NEEDLESS_CHI2`.
     """
     by_chance = policy.NEEDLESS_CHI2 if chance is None else chance
@@ -162,7 +162,8 @@ def log_misfit(left: Array, scale: Array, leaking: Array) -> float:
     Args:
         left: χ² by channel, shape (6,), dimensionless.
         scale: from `misfit_scale`, shape (6,).
-        leaking: the channels between which `LEAK` of a misfit counts: `OF_MOTION` or `ALL_CHANNELS`.
+        leaking: 1 for the channels between which `LEAK` of a misfit counts, else 0, shape (6,): `OF_MOTION` or
+            `ALL_CHANNELS`.
     """
     above = np.maximum(left, 0.0)
     shared = leaking * above

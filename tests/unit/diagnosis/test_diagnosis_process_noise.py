@@ -289,8 +289,7 @@ def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_stea
     drifting = [
         r * np.linspace(0.2, 1.8, r.size) if run.wind_on else r for run, r in zip(runs, misled, strict=True)
     ]
-    weigh_random_moments(replace(fitted, residuals=drifting), [], BOTH)
-    assert len(settled) == 1
+    assert weigh_random_moments(replace(fitted, residuals=drifting), [], BOTH) == []
 
 
 @pytest.mark.parametrize("order", [(1, 2, 1), (2, 1, 2)])
