@@ -282,14 +282,15 @@ def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_stea
     settled = []
     monkeypatch.setattr(random_moments, "_settled", lambda best, *_: settled.append(best) or best)
     runs = windy.problem.data.runs
-    misled = [r if run.wind_on else 30.0 * r for run, r in zip(runs, windy.residuals, strict=True)]
+    misled = [r if run.wind_on else 300.0 * r for run, r in zip(runs, windy.residuals, strict=True)]
     fitted = replace(windy, residuals=misled, chi2=np.array([float(r @ r) for r in misled]))
     weigh_random_moments(fitted, [], BOTH)
     assert len(settled) == 1
     drifting = [
         r * np.linspace(0.2, 1.8, r.size) if run.wind_on else r for run, r in zip(runs, misled, strict=True)
     ]
-    assert weigh_random_moments(replace(fitted, residuals=drifting), [], BOTH) == []
+    weigh_random_moments(replace(fitted, residuals=drifting), [], BOTH)
+    assert len(settled) == 1
 
 
 @pytest.mark.parametrize("order", [(1, 2, 1), (2, 1, 2)])
