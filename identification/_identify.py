@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from identification.campaign.springs import pair_remark
 from identification.estimate import Estimate, RunEstimate, Status, by_severity
 from identification.estimators import Estimator, make_estimator
 from identification.examination.examine import as_angles, examine
@@ -75,6 +76,8 @@ def identify(
             statuses=by_severity({*estimate.statuses, *why.values()}),
             remarks=(*examined.remarks, *estimate.remarks),
         )
+    if (pair := pair_remark(left, estimate.runs)) is not None:
+        estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)

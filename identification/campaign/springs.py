@@ -12,8 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from identification.estimate import Quantity
-from identification.policy import LEAST_SPRING_RESOLUTION, LEAST_SPRING_SPREAD, SPRING_FLAG_RATE
+from identification.estimate import Quantity, RunEstimate
+from identification.policy import (
+    DIFFERENCE_DEVIATIONS,
+    LEAST_SPRING_RESOLUTION,
+    LEAST_SPRING_SPREAD,
+    SPRING_FLAG_RATE,
+)
+from identification.printing import with_std
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -97,6 +105,41 @@ def fit_springs(
         residual_percent=tuple((100.0 * (springs / fitted - 1.0)).tolist()),
         flagged=tuple(flagged.tolist()),
         p_value=p_value,
+    )
+
+
+def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | None:
+    """That the two springs of a campaign give different inertias; None where they agree, or there are others.
+
+    Args:
+        campaign: states the stiffnesses.
+        runs: the estimates, of which the natural frequencies of free decays with the wind off are compared.
+    """
+    still = [run for run in campaign.runs if not run.wind_on and run.drive is None]
+    stated = {run.id: run for run in still if run.spring_stiffness}
+    inertias: dict[float, list[Quantity]] = {}
+    for one in runs:
+        run = stated.get(one.id)
+        if run is not None and run.spring_stiffness and one.omega_n is not None:
+            inertia = run.spring_stiffness / one.omega_n.value**2
+            std = 2.0 * inertia * one.omega_n.std / one.omega_n.value
+            inertias.setdefault(run.spring_stiffness, []).append(Quantity(inertia, std, "kg m2"))
+    if len(inertias) != 2 or {run.spring_stiffness for run in campaign.runs} != inertias.keys():
+        return None
+    (soft, one), (stiff, other) = sorted(inertias.items())
+    means = [float(np.mean([each.value for each in several])) for several in (one, other)]
+    stds = [float(np.sqrt(sum(each.std**2 for each in several))) / len(several) for several in (one, other)]
+    apart = abs(means[0] / means[1] - 1.0)
+    std = float(np.hypot(stds[0] / means[0], stds[1] / means[1]))
+    if stiff / soft < 1.0 + LEAST_SPRING_SPREAD or apart < LEAST_SPRING_SPREAD + DIFFERENCE_DEVIATIONS * std:
+        return None
+    return Remark(
+        Outcome.NOTED,
+        tuple(each.id for each in runs if each.id in stated),
+        f"with the wind off the springs of {soft:g} and {stiff:g} N m/rad give inertias that differ by "
+        f"{with_std(100.0 * apart, 100.0 * std)} %: one of them is not as stiff as stated, or another moment, such "
+        "as gravity's, acts; two springs cannot tell which",
+        "add runs with a third spring, or measure both stiffnesses again",
     )
 
 

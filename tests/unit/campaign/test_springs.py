@@ -1,11 +1,16 @@
 """The paper's Table II, and the rule that flags springs held to its stated false-alarm rate."""
 
+import re
+
 import numpy as np
 import pytest
 
+from identification import identify
 from identification.campaign.springs import fit_springs, wind_off_line
 from identification.datasets import paper_springs
 from identification.policy import SPRING_FLAG_RATE
+from tests.unit.gap_campaigns import campaign
+from tunnel_sim.effects import effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 
 ROWS = paper_springs()
@@ -94,3 +99,15 @@ def test_wind_off_line_needs_two_springs_for_an_intercept():
     inertia, intercept = wind_off_line(springs, np.sqrt((springs + 0.5) / 0.1), np.full(3, 1e-4))
     assert inertia.value == pytest.approx(0.1)
     assert intercept.value == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(("error", "said"), [(0.02, True), (-0.02, True), (0.003, False)])
+def test_two_springs_that_disagree_are_named(error, said):
+    """Two springs cannot tell which of them is off; below a per cent no spring is known as well."""
+    off = effect_from("spring_miscalibration", {"spring_stiffness": 44.84, "error": error})
+    words = [one.what for one in identify(campaign(off)).remarks if "give inertias that differ" in one.what]
+    assert bool(words) == said
+    if said:
+        assert "springs of 16.12 and 44.84 N m/rad" in words[0]
+        (differ,) = re.findall(r"differ by ([0-9.]+) ±", words[0])
+        assert float(differ) == pytest.approx(abs(100.0 * error), rel=1e-3)
