@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
 from tunnel_sim.vocabulary.record import Array
 
@@ -86,7 +87,7 @@ def kind_of(unit: str) -> str:
 
 def split_unit(heading: str) -> tuple[str, str]:
     """A heading such as ``Angle (deg) Run #1`` or ``t / s`` as name and unit, which may be empty."""
-    heading = " ".join(heading.split())
+    heading = " ".join(heading[: limits.NAME_CHARACTERS].split())
     if "/" in heading and known_unit(heading):  # a unit alone, such as "m/s"
         return heading, ""
     for found in _BRACKETS.finditer(heading):
@@ -128,7 +129,11 @@ class Channel:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        """Make every NaN quiet: a damaged file may hold signalling ones, and a minimum that meets one is NaN."""
+        """Make every NaN quiet: a damaged file may hold signalling ones, and a minimum that meets one is NaN.
+
+        A name that is too long is cut: what looks for units and numbers in it takes time with its length squared.
+        """
+        object.__setattr__(self, "name", self.name[: limits.NAME_CHARACTERS])
         object.__setattr__(self, "values", np.where(np.isnan(self.values), np.nan, self.values))
 
 
