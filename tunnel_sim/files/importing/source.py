@@ -248,7 +248,9 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
                 channel = replace(channel, values=np.where(wild, np.nan, channel.values))
             channels.append(channel)
         table = replace(table, channels=tuple(channels), said=tuple(said))
-        found += [with_input_facts(part) for part in by_run(table)]
+        parts = (with_input_facts(part) for part in by_run(table))
+        # A column that names the runs, or states the input, may be alone in its table.
+        found += [part for part in parts if part.channels]
     if not found:
         remedy = "name a file that holds times and angles"
         raise TunnelError("no column of numbers", where=where, remedy=remedy)

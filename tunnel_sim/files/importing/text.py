@@ -12,17 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from tunnel_sim.files.importing.tables import (
-    UNITS,
-    Channel,
-    Table,
-    by_texts,
-    hold_order,
-    kind_of,
-    known_unit,
-    names_runs,
-    split_unit,
-)
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
+from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
 from tunnel_sim.vocabulary import limits
@@ -109,7 +100,8 @@ def find_layout(
     bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
     few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
     if known and (not bare or few):
-        units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
+        beside = above.pop()[1]
+        units = [unit_beside(name, cell) for name, cell in zip(above[-1][1], beside, strict=True)]
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
