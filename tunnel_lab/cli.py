@@ -26,6 +26,7 @@ from tunnel_lab.commands import (
     show,
     simulate,
 )
+from tunnel_lab.terminal.encoding import replace_what_cannot_be_encoded
 from tunnel_lab.terminal.inputs import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -147,6 +148,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
     """
+    replace_what_cannot_be_encoded()
     try:
         status = _whole().main(args=arguments, prog_name="tunnel", standalone_mode=False)
         _flush()

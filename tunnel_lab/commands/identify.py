@@ -14,6 +14,7 @@ from rich.text import Text
 from typer import Argument, Option
 
 from identification.estimators import SUMMARIES, make_estimator
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, known_estimator, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import (
@@ -146,7 +147,7 @@ def run(
         estimate = budgets.with_budget(estimate, found)
     document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
     if to_stdout:
-        typer.echo(json_text(document), nl=False)
+        typer.echo(printable_json(json_text(document)), nl=False)
     else:
         if json is not None:
             write_json(json, document)

@@ -14,6 +14,7 @@ from tunnel_sim.files.importing.units import UNITS as UNITS
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.text_cells import from_text_cell
 
 if TYPE_CHECKING:
     import polars as pl
@@ -115,7 +116,8 @@ def by_texts(table: Table, column: str, texts: pl.Series) -> list[Table]:
     """A table as one for each run that a column of texts names; as it is where the column names none."""
     texts = texts.cast(str).fill_null("").str.strip_chars(" \t\r")
     changes = (texts != texts.shift()).fill_null(value=False).arg_true().to_numpy()
-    return by_label(table, column, changes, texts.gather([0, *changes]).to_list() if texts.len() else [])
+    names = texts.gather([0, *changes]).to_list() if texts.len() else []
+    return by_label(table, column, changes, [from_text_cell(name) for name in names])
 
 
 def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequence[str]) -> list[Table]:
