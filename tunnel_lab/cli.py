@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Annotated, cast
@@ -149,6 +150,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
     """
     replace_what_cannot_be_encoded()
+    if arguments is None and not sys.warnoptions:
+        # Of this process and of those that it starts: an overflow in a trial far off means nothing to a user.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning")
     try:
         status = _whole().main(args=arguments, prog_name="tunnel", standalone_mode=False)
         _flush()

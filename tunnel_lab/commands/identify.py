@@ -18,6 +18,7 @@ from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, known_estimator, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import (
+    bar,
     budget_lines,
     budget_table,
     console,
@@ -123,7 +124,8 @@ def run(
             remedy = f"add --estimator {' or '.join(WITH_WEIGHTS)}, or leave it out"
             raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
-    estimate = identify(data, chosen, throw=False)
+    with bar("identifying runs", len(data.runs)) as progress:
+        estimate = identify(data, chosen, throw=False, progress=progress)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
         from identification.uncertainty import budget as budgets

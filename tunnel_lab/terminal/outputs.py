@@ -116,8 +116,8 @@ def rendered(table: Table, kind: TableFormat) -> str:
         return f"**{_as_markdown(title)}**\n\n{body}\n"
     stream = io.StringIO()
     stream.write(f"# {title}\n")
-    lines = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
-    csv.writer(stream, lineterminator="\n").writerows(lines)
+    texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
+    csv.writer(stream, lineterminator="\n").writerows(texts)
     return stream.getvalue()
 
 

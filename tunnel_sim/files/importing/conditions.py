@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -249,6 +250,11 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
     return {key: float(re.sub("[,p]", ".", text)) for key, text in found.groupdict().items()}
 
 
+def _same(name: str) -> str:
+    """A name for comparison: some systems take the accents of file names apart."""
+    return unicodedata.normalize("NFC", name).lower()
+
+
 class ConditionTable:
     """A table of conditions in a text file, one row for each file or run, with keys of ``campaign.toml``."""
 
@@ -267,7 +273,7 @@ class ConditionTable:
         self._rows: dict[str, dict[str, float]] = {}
         for row in rows:
             name = row[self._key].strip()
-            if name.lower() in self._rows:
+            if _same(name) in self._rows:
                 remedy = "leave one out"
                 raise TunnelError(f"'{one_line(name)}' occurs twice", where=shown(path), remedy=remedy)
             values = {}
@@ -281,12 +287,12 @@ class ConditionTable:
                         remedy="give a number in SI units",
                     ) from None
             validate(Conditions, values, path)
-            self._rows[name.lower()] = values
+            self._rows[_same(name)] = values
 
     def of(self, path: Path, run: str) -> dict[str, float]:
         """Conditions of a run, by its name or that of the file that holds it."""
         for name in (run, path.name, path.stem):
-            if name.lower() in self._rows:
-                return self._rows[name.lower()]
+            if _same(name) in self._rows:
+                return self._rows[_same(name)]
         what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
         raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")
