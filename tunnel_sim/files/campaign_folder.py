@@ -195,7 +195,8 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         raise TunnelError("no such file", where=shown(folder / CAMPAIGN_FILE), remedy=remedy)
     document = read_document(folder / CAMPAIGN_FILE)
     sensor = SensorProperties(**document.sensor.model_dump())
-    runs, samples = [], 0
+    runs: list[Run] = []
+    samples = 0
     for run in document.runs:
         if progress is not None:
             progress(len(runs), len(document.runs))
