@@ -10,6 +10,7 @@ from identification.estimate import Estimate, RunEstimate, Status, by_severity
 from identification.estimators import Estimator, make_estimator
 from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
+from identification.progress import Progress, shown_by
 from identification.statistics import widened_by_contradictions
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -18,7 +19,11 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def identify(
-    campaign: Campaign | Path | str, estimator: str | Estimator = "output_error", *, throw: bool = True
+    campaign: Campaign | Path | str,
+    estimator: str | Estimator = "output_error",
+    *,
+    throw: bool = True,
+    progress: Progress | None = None,
 ) -> Estimate:
     """Identify a campaign's coefficients and each of its runs.
 
@@ -31,6 +36,7 @@ def identify(
         estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
             settings, such as ``OutputError(cycles_per_window=5)``.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
+        progress: called with the number of runs that are identified, and of all; None: nothing is reported.
 
     Returns:
         The estimate. Values that could not be identified are None; the statuses say why and what to do.
@@ -58,7 +64,8 @@ def identify(
         refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
     examined = examine(campaign).accepted()
     left = examined.campaign
-    found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
+    with shown_by(progress):
+        found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
     found = widened_by_contradictions(found, left, examined.remarks)
     estimate = as_angles(found, campaign.sensor)
     if examined.remarks:  # they belong to the estimate, and so does every run of the campaign, in its order

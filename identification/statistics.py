@@ -27,6 +27,18 @@ _WORST_CONDITION = 1e13
 _SMALLEST = 1e-290
 
 
+def inner(left: Array, right: Array) -> Array:
+    """The sum of products over the last axis, of samples.
+
+    BLAS splits such a sum among its threads, so that its last bit would depend on their number.
+
+    Args:
+        left: shape (..., n).
+        right: shape (..., n).
+    """
+    return np.asarray(np.sum(left * right, axis=-1))
+
+
 def eliminate(information: Array, score: Array, keep: int) -> tuple[Array, Array]:
     """The information and score of the first unknowns with the others eliminated (Schur complement).
 

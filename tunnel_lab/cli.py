@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Annotated, cast
@@ -26,6 +27,7 @@ from tunnel_lab.commands import (
     show,
     simulate,
 )
+from tunnel_lab.terminal.encoding import replace_what_cannot_be_encoded
 from tunnel_lab.terminal.inputs import with_format, with_quiet
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -147,6 +149,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 success, 1 a check or an estimate failed, 2 bad input, 130 interrupted.
     """
+    replace_what_cannot_be_encoded()
+    if arguments is None and not sys.warnoptions:
+        # Of this process and of those that it starts: an overflow in a trial far off means nothing to a user.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning")
     try:
         status = _whole().main(args=arguments, prog_name="tunnel", standalone_mode=False)
         _flush()

@@ -37,7 +37,8 @@ def run_logged(log: Path, words: Sequence[str]) -> int:
     from tunnel_lab.terminal.outputs import print_sets
 
     print_sets(_SETS_EVERY_S)
-    status = main(words)
+    sys.argv[1:] = words
+    status = main()
     sys.stdout.flush()
     print(f"exit status {status}", flush=True)
     return status

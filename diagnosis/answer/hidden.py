@@ -124,7 +124,7 @@ def _within(
     terms = np.linalg.solve(powers, np.array(lefts))
     slopes = np.linalg.solve(powers, np.array(moves))
     along, gram = terms @ np.concatenate(fit.residuals), terms @ terms.T
-    rise = np.zeros(5)  # χ²(k) − χ²(0), from the fourth power of k down
+    rise: Array = np.zeros(5)  # χ²(k) − χ²(0), from the fourth power of k down
     for i in range(len(terms)):
         rise[3 - i] -= 2.0 * along[i]
         for j in range(len(terms)):

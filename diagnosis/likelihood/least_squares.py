@@ -72,16 +72,19 @@ def by_run(
         Matrices, shape (runs, common, common), gradients, shape (runs, common), and the solutions of
         `normal_equations`.
     """
-    known = Products.of(jacobian) if products is None else products
     columns = list(zip(jacobian, residuals, strict=True))
-    seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
-    cross = np.concatenate([known.mixed, seen], axis=2)
-    size = np.sqrt(np.maximum(np.diagonal(known.own, axis1=1, axis2=2), 1e-300))
-    ridge = known.own / (size[:, :, None] * size[:, None, :]) + (1e-12 + damping) * np.eye(size.shape[1])
-    solutions = np.linalg.solve(ridge, cross / size[:, :, None]) / size[:, :, None]
-    absorbed = np.swapaxes(cross[:, :, :-1], 1, 2) @ solutions
-    seen_common = np.stack([common.T @ r for (common, _), r in columns])
-    return known.common - absorbed[:, :, :-1], seen_common - absorbed[:, :, -1], solutions
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # of a run that grew without bound; its step is refused
+        known = Products.of(jacobian) if products is None else products
+        seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
+        cross = np.concatenate([known.mixed, seen], axis=2)
+        size = np.sqrt(np.maximum(np.diagonal(known.own, axis1=1, axis2=2), 1e-300))
+        ridge = known.own / (size[:, :, None] * size[:, None, :]) + (1e-12 + damping) * np.eye(size.shape[1])
+        solutions = np.linalg.solve(ridge, cross / size[:, :, None]) / size[:, :, None]
+        absorbed = np.swapaxes(cross[:, :, :-1], 1, 2) @ solutions
+        seen_common = np.stack([common.T @ r for (common, _), r in columns])
+        return known.common - absorbed[:, :, :-1], seen_common - absorbed[:, :, -1], solutions
 
 
 def damped_step(

@@ -24,6 +24,7 @@ from identification.campaign.derivatives import (
 from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
 from identification.printing import with_std
+from identification.progress import counted
 from identification.signal.decay_fit import Reading, RunFit, project_run
 from identification.signal.driven_fit import DrivenRun, Gained, fit_with_inputs
 from identification.signal.free_decay import Decay
@@ -150,7 +151,7 @@ class RunByRun(ABC):
         """
         for run in campaign.runs:
             loads(run, campaign.rig)
-        pairs = [(run, self._run(run, campaign.sensor)) for run in campaign.runs]
+        pairs = [(run, self._run(run, campaign.sensor)) for run in counted(campaign.runs)]
         found = [
             RunDecay(RunEstimate(run.id, (one,))) if isinstance(one, Status) else one for run, one in pairs
         ]

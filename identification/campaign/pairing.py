@@ -22,6 +22,7 @@ from identification.campaign.derivatives import has_size, loads, wind_off
 from identification.campaign.springs import inertia_of_springs
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status, by_severity
 from identification.policy import LEAST_FOR_SCATTER
+from identification.progress import counted
 from identification.statistics import widened_covariance
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
@@ -171,7 +172,7 @@ class Paired(ABC):
             TunnelError: a wind-on run states no air density; raised before any run is analysed.
         """
         pairs = [loads(run, campaign.rig) for run in campaign.runs]
-        found = [self._run(run, campaign.sensor) for run in campaign.runs]
+        found = [self._run(run, campaign.sensor) for run in counted(campaign.runs)]
         estimate = Estimate(campaign.name, self.name, tuple(one for one, _ in found))
         known = [(one, load) for (_, one), load in zip(found, pairs, strict=True) if one is not None]
         if not known:

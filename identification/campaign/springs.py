@@ -118,11 +118,11 @@ def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | Non
     still = [run for run in campaign.runs if not run.wind_on and run.drive is None]
     stated = {run.id: run for run in still if run.spring_stiffness}
     inertias: dict[float, list[Quantity]] = {}
-    for one in runs:
-        run = stated.get(one.id)
-        if run is not None and run.spring_stiffness and one.omega_n is not None:
-            inertia = run.spring_stiffness / one.omega_n.value**2
-            std = 2.0 * inertia * one.omega_n.std / one.omega_n.value
+    for found in runs:
+        run = stated.get(found.id)
+        if run is not None and run.spring_stiffness and found.omega_n is not None:
+            inertia = run.spring_stiffness / found.omega_n.value**2
+            std = 2.0 * inertia * found.omega_n.std / found.omega_n.value
             inertias.setdefault(run.spring_stiffness, []).append(Quantity(inertia, std, "kg m2"))
     if len(inertias) != 2 or {run.spring_stiffness for run in campaign.runs} != inertias.keys():
         return None

@@ -31,7 +31,7 @@ from identification.signal.driven_fit import DrivenRun, Gained, driven_run
 from identification.signal.free_decay import Decay, response_rows
 from identification.signal.frequency import starting_decay
 from identification.signal.run_fit import decay_covariance_of, describe_run, noise_and_failure
-from identification.statistics import determined, inverse
+from identification.statistics import determined, inner, inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -90,9 +90,9 @@ class DecayPosterior:
         weights = np.exp(self.log_posterior - self.log_posterior.max())
         weights /= weights.sum()
         points = _points(self.axis)
-        mean = points @ weights.ravel()
+        mean = inner(points, weights.ravel())
         spread = points - mean[:, None]
-        covariance = (spread * weights.ravel()) @ spread.T
+        covariance = inner((spread * weights.ravel())[:, None], spread)
         return self.centre + self.scale @ mean, self.scale @ covariance @ self.scale.T
 
     def log_likelihood_at(self, decays: Array) -> Array:
@@ -263,8 +263,8 @@ def _points(axis: Array) -> Array:
 def _summary(values: Array, weights: Array) -> tuple[float, float, float, float]:
     order = np.argsort(values)
     values, weights = values[order], weights[order] / weights.sum()
-    mean = float(weights @ values)
-    std = float(np.sqrt(weights @ (values - mean) ** 2))
+    mean = float(inner(weights, values))
+    std = float(np.sqrt(inner(weights, (values - mean) ** 2)))
     reached = np.cumsum(weights) - 0.5 * weights
     low, high = np.interp((TAIL, 1.0 - TAIL), reached, values)
     return mean, std, float(low), float(high)
@@ -312,11 +312,11 @@ def shared_moments(
         logs = logs - proposal
         weights = np.exp(logs - logs.max())
         weights /= weights.sum()
-        mean = weights @ draws
+        mean = inner(draws.T, weights)
         spread = draws - mean
-        own = (spread * weights[:, None]).T @ spread
+        own = inner((spread * weights[:, None]).T[:, None], spread.T)
         centre, covariance = centre + factor @ mean, factor @ own @ factor.T
-        if 1.0 / float(weights @ weights) > _LEAST_SHARE * draws.shape[0]:
+        if 1.0 / float(inner(weights, weights)) > _LEAST_SHARE * draws.shape[0]:
             break
     return centre, covariance
 
@@ -423,7 +423,7 @@ class Bayesian(RunByRun):
         thin, factor = block_means(reading, frequency, self.blocks_per_cycle)
         means, _ = block_means(Reading(time, residual), frequency, self.blocks_per_cycle)
         known = variance if noise.source == "stated" or noise.departs else None
-        within = float(residual @ residual) - factor * float(means.yaw @ means.yaw)
+        within = float(inner(residual, residual) - factor * inner(means.yaw, means.yaw))
         by_root = run.driven_by_stiffness
         linear = _LINEAR + (rows is not None and not by_root)
         knowledge = NoiseKnowledge(known, factor, max(within, 0.0), time.size - linear)

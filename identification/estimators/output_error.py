@@ -24,6 +24,7 @@ from identification.campaign.derivatives import (
     statuses_of_runs,
 )
 from identification.estimate import Estimate, Quantity, Status, by_severity
+from identification.progress import counted
 from identification.signal.decay_fit import fit_decays
 from identification.signal.driven_fit import driven_run
 from identification.signal.noise import noise_level
@@ -65,7 +66,7 @@ class OutputError:
             identify_run(run, campaign.sensor, cycles_per_window=self.cycles_per_window)
             if run.drive is None
             else driven_run(run, campaign.sensor)
-            for run in campaign.runs
+            for run in counted(campaign.runs)
         ]
         estimate = Estimate(campaign.name, self.name, tuple(item.estimate for item in fitted))
         statuses = statuses_of_runs(campaign, estimate.runs)

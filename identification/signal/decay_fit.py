@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.policy import LEAST_SAMPLES
 from identification.signal.free_decay import Decay, response_rows, sensitivity_weights
-from identification.statistics import eliminate, embed, scaled_solve
+from identification.statistics import eliminate, embed, inner, scaled_solve
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced, read_only
 
 # Local order of one run's unknowns throughout: decay rate, stiffness | zero | initial angle, initial rate.
@@ -212,7 +212,7 @@ def linearised_at(
     """
     rows = response_rows(time, decay, constant=True)
     weights = _local_weights(decay, angle, rate)
-    return weights @ (rows @ rows.T) @ weights.T, weights @ (rows @ residual)
+    return weights @ (rows @ rows.T) @ weights.T, weights @ inner(rows, residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +241,7 @@ def _project(
         grams = [block @ block.T for block in rows]
     if not all(np.isfinite(gram).all() for gram in grams):
         return _Point(parameters, 0.0, ())
-    moments = [block @ reading.yaw for block, reading in zip(rows, readings, strict=True)]
+    moments = [inner(block, reading.yaw) for block, reading in zip(rows, readings, strict=True)]
     try:
         if own_zeros and zero is None:
             zeros = [_common_zero([gram], [moment]) for gram, moment in zip(grams, moments, strict=True)]
@@ -259,9 +259,9 @@ def _project(
     ):
         residual = reading.yaw - best - angle * block[0] - rate * block[1]
         weights = _local_weights(decay, float(angle), float(rate))
-        score = weights @ (block @ residual)
+        score = weights @ inner(block, residual)
         runs.append(RunFit(decay, float(angle), float(rate), residual, weights @ gram @ weights.T, score))
-        cost += float(residual @ residual)
+        cost += float(inner(residual, residual))
     mean = zeros[0] if len(set(zeros)) == 1 else float(np.mean(zeros))
     return _Point(parameters, mean, tuple(runs), cost)
 

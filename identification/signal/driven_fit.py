@@ -20,7 +20,7 @@ from identification.signal.decay_fit import Reading, RunFit
 from identification.signal.driven import driven_rows, driven_start
 from identification.signal.free_decay import Decay, response_rows, sensitivity_weights
 from identification.signal.run_fit import FittedRun, decay_covariance_of, describe_run, noise_and_failure
-from identification.statistics import determined, eliminate, inverse, scaled_solve
+from identification.statistics import determined, eliminate, inner, inverse, scaled_solve
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
@@ -196,7 +196,7 @@ def fit_with_inputs(
     damping, converged = 1e-9, False
     equations = partial(normal_equations, runs, links, own_zeros=own_zeros, derivative=derivative)
     residuals, normal, gradient = equations(parameters, own)
-    cost = sum(float(r @ r) for r in residuals)
+    cost = sum(float(inner(r, r)) for r in residuals)
     for _ in range(_MOST_STEPS):
         try:
             step = scaled_solve(normal + damping * np.diag(np.diag(normal)), gradient)
@@ -211,7 +211,7 @@ def fit_with_inputs(
             moved_own[:, 1:] += step[size + 1 :].reshape(-1, _OWN - 1)
         with np.errstate(all="ignore"):  # a trial far off may overflow; it is rejected then
             trial = equations(moved, moved_own)
-            after = sum(float(r @ r) for r in trial[0])
+            after = sum(float(inner(r, r)) for r in trial[0])
         if np.isfinite(after) and after <= cost:
             converged = cost - after <= _SETTLED * cost
             # of large residuals the step is too long, and without damping the fit would go to and fro
@@ -263,7 +263,7 @@ def normal_equations(
             residual, jacobian = (lfilter(*filters[i], values, axis=0) for values in (residual, jacobian))
         places = np.r_[np.arange(shared), shared + width * i + np.arange(width)]
         normal[np.ix_(places, places)] += jacobian.T @ jacobian
-        gradient[places] += jacobian.T @ residual
+        gradient[places] += inner(jacobian.T, residual)
         residuals.append(residual)
     return residuals, normal, gradient
 

@@ -23,7 +23,7 @@ from scipy.linalg import expm
 
 from identification.policy import LEAST_CORNER_DROP, LEAST_MOMENT_DROP, MOMENT_DROP_FOR_CORNER
 from identification.signal.free_decay import Decay, response_rows
-from identification.statistics import inverse, scaled_solve
+from identification.statistics import inner, inverse, scaled_solve
 from tunnel_sim.vocabulary.record import Array
 
 _GREATEST = 1e60  # of a growth or a variance over one interval: beyond it no filter is formed
@@ -187,11 +187,11 @@ def innovations(
     regressors = columns[1:] / lengths
     gram = regressors @ regressors.T
     try:
-        solution = np.linalg.solve(gram, regressors @ columns[0])
+        solution = np.linalg.solve(gram, inner(regressors, columns[0]))
     except np.linalg.LinAlgError:
         return None
     left = columns[0] - solution @ regressors
-    cost = float(left.size * np.log(variance) + left @ left / variance)
+    cost = float(left.size * np.log(variance) + inner(left, left) / variance)
     if response is None:
         return Innovations(left, variance, cost)
     length = float(lengths[-1, 0])
@@ -370,9 +370,9 @@ class _DrivenLikelihood:
                 slopes.append((ahead.values - back.values) / (2.0 * nudge))
                 logs.append(np.log(ahead.variance / back.variance) / (2.0 * nudge))
             slope, log = np.array(slopes), np.array(logs)
-            count, power = here.values.size, float(here.values @ here.values) / here.variance
+            count, power = here.values.size, float(inner(here.values, here.values)) / here.variance
             information = slope @ slope.T / here.variance + 0.5 * count * np.outer(log, log)
-            gradient = -slope @ here.values / here.variance + 0.5 * (power - count) * log
+            gradient = -inner(slope, here.values) / here.variance + 0.5 * (power - count) * log
             try:
                 step = scaled_solve(information, gradient)
                 covariance = inverse(information)

@@ -16,6 +16,7 @@ from scipy.special import fdtri
 
 from identification.estimate import NoiseLevel
 from identification.policy import LEAST_NOISE, MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANCE
+from identification.statistics import inner
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -65,7 +66,7 @@ def noise_level(residuals: Sequence[Residual], sensor: SensorProperties) -> Nois
     floor = LEAST_NOISE * max(residual.peak for residual in residuals)
     unknowns = sum(residual.unknowns for residual in residuals)
     count = sum(residual.values.size for residual in residuals)
-    squares = sum(float(residual.values @ residual.values) for residual in residuals)
+    squares = sum(float(inner(residual.values, residual.values)) for residual in residuals)
     total = max(float(np.sqrt(squares / max(count - unknowns, 1))), floor)
     fast, degrees = _fast_part(residuals, total)
     fast = max(fast, floor, (sensor.resolution or 0.0) / sqrt(12.0))
@@ -139,7 +140,7 @@ def slow_power(values: Array, block: int) -> tuple[float, int]:
     """
     blocks = values.size // block
     means = values[: blocks * block].reshape(blocks, block).mean(axis=1)
-    return float(means @ means) * block, blocks
+    return float(inner(means, means)) * block, blocks
 
 
 def _as_stated(fast: float, degrees: float, floor: float, sensor: SensorProperties) -> float:
@@ -155,7 +156,7 @@ def _fast_part(residuals: Sequence[Residual], fallback: float) -> tuple[float, f
     count = sum(difference.size for difference in differences)
     if count == 0:
         return fallback, 1.0
-    power = sum(float(difference @ difference) for difference in differences) / count
+    power = sum(float(inner(difference, difference)) for difference in differences) / count
     return float(np.sqrt(power / _DIFFERENCE_GAIN)), count / _SAMPLES_PER_DEGREE
 
 

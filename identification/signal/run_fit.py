@@ -28,7 +28,7 @@ from identification.signal.decay_fit import (
 from identification.signal.free_decay import Decay, envelope_amplitude
 from identification.signal.frequency import starting_decay, thinned_reading
 from identification.signal.noise import Residual, eighth_of_a_cycle, noise_level, slow_power
-from identification.statistics import determined, inverse, widened_covariance
+from identification.statistics import determined, inner, inverse, widened_covariance
 from tunnel_sim.vocabulary.campaign import Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -137,7 +137,7 @@ def noise_and_failure(
     """
     noise = noise_level(residuals_of([reading], [fitted], zero, _UNKNOWNS), sensor)
     motion = reading.yaw - zero - fitted.residual
-    if float(motion @ motion) < LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
+    if float(inner(motion, motion)) < LEAST_ENERGY * max(noise.std, noise.residual_std) ** 2:
         return noise, Status.NO_OSCILLATION
     return noise, None if determined(fitted.information) else Status.NOT_DETERMINED
 
@@ -273,7 +273,7 @@ def _series(
                 return series
             decay = fit.runs[0].decay
         motion = reading.yaw[part] - fit.zero - fit.runs[0].residual
-        if float(motion @ motion) < LEAST_WINDOW_ENERGY * noise.std**2:
+        if float(inner(motion, motion)) < LEAST_WINDOW_ENERGY * noise.std**2:
             return series
         window = _window_estimate(reading.time[part], fit.runs[0], noise, cycles) if fit.converged else None
         if window is not None:

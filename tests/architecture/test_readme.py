@@ -99,6 +99,38 @@ def test_excerpts_are_the_beginning_of_what_the_how_to_pages_show() -> None:
         assert shown == whole[command][: len(shown)]
 
 
+def as_printed(shown: list[str], real: list[str]) -> bool:
+    """Whether lines are the same, up to the last digit of decimals, which another processor may round otherwise."""
+    decimal = re.compile(r"[-+]?\d+\.\d+(?:e[-+]\d+)?")
+    shown, real = ([line.rstrip() for line in lines] for lines in (shown, real))
+    if [decimal.sub("#", line) for line in shown] != [decimal.sub("#", line) for line in real]:
+        return False
+    pairs = zip(decimal.findall("\n".join(shown)), decimal.findall("\n".join(real)), strict=True)
+    return all(abs(float(a) - float(b)) <= 1.001 * max(last_digit(a), last_digit(b)) for a, b in pairs)
+
+
+def test_the_console_shows_what_the_program_prints(tmp_path: Path) -> None:
+    """Where it fails, its message holds the lines to put into the README and the page that shows the whole."""
+    (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")
+    for command, shown in sessions(README):
+        real = output_of(command, tmp_path)
+        lines = shown[: shown.index("…")] if "…" in shown else shown
+        wanted = real[: len(lines)] if "…" in shown else real
+        text = "\n".join(line.rstrip() for line in wanted)
+        assert as_printed(lines, wanted), f"README.md, and docs/how-to: `{command}` now prints\n{text}"
+
+
+def test_that_comparison_can_fail() -> None:
+    assert as_printed([" gap  0.184 ", "12 more"], [" gap  0.185", "12 more"])
+    for other in (
+        [" gap  0.186", "12 more"],
+        [" gap  0.184", "11 more"],
+        [" gap 0.184", "12 more"],
+        [" gap  0.184"],
+    ):
+        assert not as_printed([" gap  0.184", "12 more"], other)
+
+
 @pytest.mark.slow
 def test_the_script_for_a_newcomer_runs_and_prints_what_is_shown(tmp_path: Path) -> None:
     (tmp_path / "plan.toml").write_text(toml_block("wind_speeds"), encoding="utf-8")

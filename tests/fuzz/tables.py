@@ -24,10 +24,17 @@ def changed_csv(content: bytes, rng: Rng) -> bytes:
         content: UTF-8 with commas.
         rng: decides what is changed.
     """
-    kind = rng.integers(8)
+    kind = rng.integers(10)
     if kind < 2:
         return changed_bytes(content, rng)
+    if kind == 8:  # what a crash or an open quote leaves
+        end = int(rng.integers(len(content) + 1))
+        return content[:end] + (b"\0", b'"x', b" ", b",", b"\n", b"1")[rng.integers(6)] * 2 ** int(
+            rng.integers(22)
+        )
     text = content.decode()
+    if kind == 9:
+        return _headed_anew(text, rng).encode("utf-8", "surrogatepass")
     rows = [line.split(",") for line in text.splitlines()]
     if kind < 4:
         for _ in range(int(rng.integers(1, 4))):
@@ -103,6 +110,54 @@ def parquet(frame: pl.DataFrame) -> bytes:
     except BaseException as error:  # a panic of polars is no Exception
         return b"PAR1" + repr(error).encode() + b"PAR1"
     return buffer.getvalue()
+
+
+def _headed_anew(text: str, rng: Rng) -> str:
+    """The same columns with names and units as loggers write them, of which one may be alone or very long."""
+    head, _, body = text.partition("\n")
+    units = (
+        "s",
+        "min",
+        "h",
+        "ms",
+        "Grad",
+        "grad",
+        "°",
+        "rad",
+        "gon",
+        "V",
+        "km/h",
+        "rad/s",
+        "1/min",
+        "Foo",
+        "N/s",
+        "°C",
+    )
+    names = (
+        "Zeit",
+        "t",
+        "Winkel",
+        "angle",
+        "φ",
+        "run",
+        "Lauf",
+        "min",
+        "V",
+        "yaw",
+        "drive_hold",
+        "=1+1",
+        "a_" * 2000,
+    )
+    forms = ("{}/{}", "{} / {}", "{} in {}", "{} [{}]", "{} ({})", "{}_{}", "{} {}", "{}, {}", "{}", "{1}")
+    cells = (
+        forms[rng.integers(len(forms))].format(
+            names[rng.integers(len(names))], units[rng.integers(len(units))]
+        )
+        for _ in head.split(",")
+    )
+    if rng.random() < 0.2:  # one column of several
+        return "\n".join([next(cells), *(line.split(",")[-1] for line in body.splitlines())])
+    return f"{','.join(cells)}\n{body}"
 
 
 def _cell(rng: Rng) -> str:

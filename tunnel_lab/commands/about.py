@@ -17,6 +17,7 @@ from typing import Annotated, Any
 import typer
 from typer import Argument, Option
 
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, library, shown
 
@@ -219,7 +220,7 @@ def schema(
             f"there is no schema {document!r}", where="tunnel schema", remedy=did_you_mean(document, SCHEMAS)
         )
     if out is None:
-        typer.echo(json_text(schema_of(document)), nl=False)
+        typer.echo(printable_json(json_text(schema_of(document))), nl=False)
         return
     write_json(out, schema_of(document))
     say_written(out)

@@ -13,6 +13,7 @@ import typer
 from typer import Argument, Option
 
 from identification.printing import TextTable, coefficient_label, estimated, in_stds, unit_mark, with_std
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
@@ -181,7 +182,7 @@ def diagnose(
             write_summary(document, answer.data, summary, byline)
     proposed = None if propose is None else write_proposal(propose, document)
     if to_stdout:
-        typer.echo(json_text(document), nl=False)
+        typer.echo(printable_json(json_text(document)), nl=False)
         return
     show(document)
     if propose is not None and proposed is None:

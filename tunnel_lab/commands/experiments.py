@@ -130,13 +130,15 @@ def _summarise(folder: Path) -> None:
     from tunnel_lab.experiments.sweep import open_store
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import output_folder, write_encoded
+    from tunnel_sim.vocabulary.text_cells import as_text_cell
 
     store = open_store(folder)
     lines = sweep_summary.summarise(store)
     grouped = sweep_summary.groups(lines)
     target = output_folder(folder / "summary")
     frame = pl.DataFrame([line.to_row() for line in lines])
-    written = [write_encoded(target / "summary.csv", frame.write_csv)]
+    texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
+    written = [write_encoded(target / "summary.csv", frame.with_columns(texts).write_csv)]
     for name, part in grouped.items():
         drawn = sweep_summary.error_figure(part)
         if drawn is not None:

@@ -14,9 +14,11 @@ from rich.text import Text
 from typer import Argument, Option
 
 from identification.estimators import SUMMARIES, make_estimator
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, known_estimator, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import (
+    bar,
     budget_lines,
     budget_table,
     console,
@@ -122,7 +124,8 @@ def run(
             remedy = f"add --estimator {' or '.join(WITH_WEIGHTS)}, or leave it out"
             raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
-    estimate = identify(data, chosen, throw=False)
+    with bar("identifying runs", len(data.runs)) as progress:
+        estimate = identify(data, chosen, throw=False, progress=progress)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
         from identification.uncertainty import budget as budgets
@@ -146,7 +149,7 @@ def run(
         estimate = budgets.with_budget(estimate, found)
     document = estimate.to_json_dict() | ({} if found is None else {"budget": found.to_json_dict()})
     if to_stdout:
-        typer.echo(json_text(document), nl=False)
+        typer.echo(printable_json(json_text(document)), nl=False)
     else:
         if json is not None:
             write_json(json, document)

@@ -35,11 +35,12 @@ def given_campaign(path: Path) -> Campaign:
 
     What was made of a file of a data logger is printed on standard error.
     """
-    from tunnel_lab.terminal.outputs import say
+    from tunnel_lab.terminal.outputs import bar, say
     from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, read_campaign
 
     if not path.is_file() or path.name == CAMPAIGN_FILE:
-        return read_campaign(path)
+        with bar("reading runs") as progress:
+            return read_campaign(path, progress)
     if path.suffix.lower() == ".toml":
         remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
         raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)

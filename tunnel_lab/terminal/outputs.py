@@ -9,6 +9,7 @@ import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from html import escape
 from math import sqrt
 from pathlib import Path
 from textwrap import wrap
@@ -22,8 +23,10 @@ from rich.text import Text
 
 from identification import printing
 from identification.printing import SYMBOLS, TextTable, concise, in_stds, significant, unit, with_std
+from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
 from tunnel_lab.terminal.time_left import Reached
+from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 if TYPE_CHECKING:
     from rich.table import Column
@@ -105,16 +108,23 @@ def rendered(table: Table, kind: TableFormat) -> str:
             }
             for row in rows
         ]
-        return json_line({"table": title, "rows": records}) + "\n"
+        return printable_json(json_line({"table": title, "rows": records})) + "\n"
     if kind is TableFormat.MD:
         lines = [heads, ["---"] * len(heads), *rows]
-        cells = (" | ".join(cell.replace("|", "\\|") for cell in line) for line in lines)
+        cells = (" | ".join(map(_as_markdown, line)) for line in lines)
         body = "\n".join(f"| {line} |" for line in cells)
-        return f"**{title}**\n\n{body}\n"
+        return f"**{_as_markdown(title)}**\n\n{body}\n"
     stream = io.StringIO()
     stream.write(f"# {title}\n")
-    csv.writer(stream, lineterminator="\n").writerows([heads, *rows])
+    texts = ([as_text_cell(cell) for cell in line] for line in (heads, *rows))
+    csv.writer(stream, lineterminator="\n").writerows(texts)
     return stream.getvalue()
+
+
+def _as_markdown(text: str) -> str:
+    """Text of a cell without HTML, links and ends of cells."""
+    marked = escape(text.replace("\\", "\\\\"), quote=False)
+    return marked.replace("|", "\\|").replace("](", "]\\(")
 
 
 def _plain(cell: object) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal
@@ -108,13 +109,17 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     parsed = validate(CampaignDocument, document, path)
     remedy = "put the runs into several campaigns"
     check_count(len(parsed.runs), limits.CAMPAIGN_RUNS, "runs", shown(path), remedy)
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
     for run in parsed.runs:
         where = run_place(path, run.id)
-        if run.id in seen:
-            remedy = "give every run its own id"
-            raise TunnelError(f"the id '{run.id}' is used twice", where=where, remedy=remedy)
-        seen.add(run.id)
+        earlier = seen.setdefault(unicodedata.normalize("NFC", run.id), run.id)
+        if earlier is not run.id:
+            how = (
+                "is used twice"
+                if earlier == run.id
+                else "is used twice, with its accents encoded differently"
+            )
+            raise TunnelError(f"the id '{run.id}' {how}", where=where, remedy="give every run its own id")
         scales = run.spring_stiffness, parsed.rig.frontal_area, parsed.rig.reference_length
         if run.air_density is None and needs_density(run.wind_speed, *scales):
             what = f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density"
@@ -167,11 +172,12 @@ IMPORT_RECIPE, IMPORT_PICTURE = "import.toml", "import.png"
 """What an import keeps beside the campaign."""
 
 
-def read_campaign(folder: Path | str) -> Campaign:
+def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | None = None) -> Campaign:
     """Read and check a campaign.
 
     Args:
         folder: the campaign's folder, or the ``campaign.toml`` in it.
+        progress: called with the number of runs that are read, and of all; None: nothing is reported.
 
     Returns:
         The campaign, angles in radians.
@@ -189,8 +195,11 @@ def read_campaign(folder: Path | str) -> Campaign:
         raise TunnelError("no such file", where=shown(folder / CAMPAIGN_FILE), remedy=remedy)
     document = read_document(folder / CAMPAIGN_FILE)
     sensor = SensorProperties(**document.sensor.model_dump())
-    runs, samples = [], 0
+    runs: list[Run] = []
+    samples = 0
     for run in document.runs:
+        if progress is not None:
+            progress(len(runs), len(document.runs))
         path = folder / run.file
         where = run_place(path, run.id)
         # Refuse a run file outside the folder, also through a symbolic link.

@@ -15,6 +15,7 @@ from tunnel_sim.files.writing import write_encoded
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import INPUT_COLUMNS
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, library
+from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 _CONDITIONS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
 _INPUT = ("drive_hold", "drive_gain")
@@ -41,7 +42,7 @@ def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     """One row for each sample, with the run's id and conditions and the rig's sizes."""
     frames = [
         pl.DataFrame(_record(campaign, run)).select(
-            pl.lit(run.id).alias("run"),
+            pl.lit(as_text_cell(run.id)).alias("run"),
             *(
                 pl.lit(value, dtype=pl.String if key == "drive_hold" else pl.Float64).alias(key)
                 for key, value in _cells(campaign, run).items()

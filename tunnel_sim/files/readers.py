@@ -15,7 +15,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.reading import check_count, decoded, read_regular
+from tunnel_sim.files.reading import check_count, check_lines, check_utf8, is_blank, read_regular
 from tunnel_sim.files.writing import encoded
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
@@ -42,7 +42,11 @@ USED_COLUMNS = ("time_s", *(name for names in COLUMNS.values() for name in names
 
 @dataclass(frozen=True)
 class FileTable:
-    """The table of a run file: at least its `USED_COLUMNS`, perhaps as texts below a line of headings."""
+    """The table of a run file: at least its `USED_COLUMNS`, perhaps as texts below a line of headings.
+
+    Args:
+        names: of all columns of the file, those that the frame leaves out included.
+    """
 
     frame: pl.DataFrame
     names: Sequence[str]
@@ -210,7 +214,7 @@ def _held(
         raise TunnelError(what, where=where, remedy=f"use {' or '.join(run_endings())}")
     readable = f"name a readable {' or '.join(RUN_ENDINGS)} file"
     content = read_regular(path, reader.limit, where=where, missing=missing, readable=readable)
-    if not content.strip():
+    if is_blank(content):
         raise TunnelError("the file is empty", where=where, remedy=holds)
     return reader.read_run(content, where, most)
 
@@ -268,13 +272,16 @@ def _numbers(series: pl.Series, text: bool, where: str) -> Array:
 
 
 def _read_csv(content: bytes, where: str, most: int) -> FileTable:
-    """A table as text. Columns without a name of their own are under their position."""
-    if not content.isascii():  # which needs no second copy of a large file
-        decoded(content, where)
-    columns = content.partition(b"\n")[0].count(b",") + 1
+    """A table as text."""
+    check_utf8(content, where)
+    check_lines(content, where, "save it again as text, or cut off what a crash has left at its end")
+    head = content[: content.find(b"\n") + 1] or content
+    columns, lines = head.count(b",") + 1, content.count(b"\n")
     check_count(columns, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
-    check_count(content.count(b"\n") - 1, most, "samples", where, "split the file, or thin it out")
+    check_count(lines - 1, most, "samples", where, "split the file, or thin it out")
+    check_count(lines * columns, limits.CELLS, "cells", where, "leave out columns that are not needed")
     try:
+        # All columns, though few are used: Polars does not see a value too many in a line that it reads in part.
         rows = pl.read_csv(content, has_header=False, infer_schema=False, quote_char=None)
     except pl.exceptions.PolarsError as error:
         what = f"not a comma-separated table ({one_line(error, 60)})"
@@ -291,11 +298,12 @@ def _read_csv(content: bytes, where: str, most: int) -> FileTable:
     twice = next((name for name in names if name in USED_COLUMNS and names.count(name) > 1), None)
     if twice is not None:
         raise TunnelError(f"the column {twice} occurs twice", where=where, remedy="leave one of them out")
-    # Other columns that have no name, or share one, are kept apart by their position; nobody asks for them.
-    rows.columns = [
-        name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)
-    ]
-    return FileTable(rows.slice(1), rows.columns, text=True)
+    # Other columns that have no name, or share one, are named by their position.
+    names = [name if name and names.count(name) == 1 else f"(column {i + 1})" for i, name in enumerate(names)]
+    used = [i for i, name in enumerate(names) if name in USED_COLUMNS]
+    frame = rows[1:, used]
+    frame.columns = [names[i] for i in used]
+    return FileTable(frame, names, text=True)
 
 
 CSV = Reader("a comma-separated table", limits.CSV_BYTES, read_run=_read_csv)

@@ -6,6 +6,7 @@ memory.
 
 from __future__ import annotations
 
+import codecs
 import io
 import json
 import os
@@ -90,12 +91,13 @@ def read_regular(path: Path, limit: int, *, where: str = "", missing: str = "", 
             remedy = (folder and inside(path)) or readable
             raise TunnelError(f"cannot be read ({kind})", where=where, remedy=remedy)
         check_count(state.st_size, limit, "bytes", where, "split the file, or name the right one")
-        # The file's content, which may be longer than its stated size.
-        found = bytearray()
-        while part := os.read(descriptor, _CHUNK):
-            found += part
-            check_count(len(found), limit, "bytes", where, "split the file, or name the right one")
-        return bytes(found)
+        # In one piece, so that a large file is in memory once; its content may be longer than its stated size.
+        parts, size = [os.read(descriptor, state.st_size + 1)], 0
+        while parts[-1]:
+            size += len(parts[-1])
+            check_count(size, limit, "bytes", where, "split the file, or name the right one")
+            parts.append(os.read(descriptor, _CHUNK))
+        return parts[0] if len(parts) <= 2 else b"".join(parts)
     except OSError as error:
         raise _unreadable(error, where, readable) from None
     finally:
@@ -112,9 +114,56 @@ def decoded(content: bytes, where: str) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        what = f"not UTF-8 text (line {line})"
-        raise TunnelError(what, where=where, remedy="save the file as UTF-8") from None
+        raise _not_utf8(content, error.start, where) from None
+
+
+def check_utf8(content: bytes, where: str) -> None:
+    """Refuse bytes that are not UTF-8, piece by piece: as one text they may take four times the memory."""
+    if content.isascii():
+        return
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    for start in range(0, len(content), _CHUNK):
+        part = content[start : start + _CHUNK]
+        try:
+            decoder.decode(part, final=start + _CHUNK >= len(content))
+        except UnicodeDecodeError as error:
+            at = start + len(part) - len(error.object) + error.start  # bytes kept from the piece before
+            raise _not_utf8(content, at, where) from None
+
+
+def _not_utf8(content: bytes, at: int, where: str) -> TunnelError:
+    what = f"not UTF-8 text ({_line(content, at)})"
+    return TunnelError(what, where=where, remedy="save the file as UTF-8")
+
+
+def _line(content: bytes, at: int) -> str:
+    before = content.count(b"\n", 0, at)
+    return f"line {before + 1}"
+
+
+def check_lines(content: bytes, where: str, remedy: str) -> None:
+    """Refuse bytes that are not lines of text: with NUL bytes, or longer lines than a table has.
+
+    Args:
+        remedy: where the text holds NUL bytes.
+    """
+    nul = content.find(b"\0")
+    if nul >= 0:
+        what = f"is not text: it contains NUL bytes ({_line(content, nul)})"
+        raise TunnelError(what, where=where, remedy=remedy)
+    start = 0
+    while len(content) - start > limits.LINE_BYTES:
+        end = content.rfind(b"\n", start, start + limits.LINE_BYTES + 1)
+        if end < 0:
+            what = f"{_line(content, start)} is longer than {limits.LINE_BYTES:,} bytes"
+            remedy = "give every sample a line of its own"
+            raise TunnelError(what, where=where, remedy=remedy)
+        start = end + 1
+
+
+def is_blank(content: bytes) -> bool:
+    """Whether a file holds nothing but white space."""
+    return not content or content.isspace()
 
 
 def read_json(path: Path, *, remedy: str) -> dict[str, Any]:

@@ -14,6 +14,10 @@ DATA_BYTES = 512 * 2**20
 """Largest Parquet file, bytes: twenty million samples of two columns take 320 MB."""
 CSV_BYTES = 384 * 2**20
 """Largest run file as CSV, bytes: ten million samples take 300 MB, and five times as much memory."""
+LINE_BYTES = 2**20
+"""Longest line of a table of text, bytes: as many columns as are read, with a thousand characters each."""
+CELLS = 64 * 2**20
+"""Most cells of a table of text, lines times columns: ten million samples in six columns, 1 GB in memory."""
 WEIGHTS_BYTES = 64 * 2**20
 """Largest file of network weights or training checkpoint, bytes: the paper's networks take 0.2 MB."""
 MODEL_BYTES = 16 * 2**20
@@ -37,7 +41,7 @@ KEY_PARTS = 32
 INTEGER_BITS = 128
 """Longest integer, bits: a NumPy seed has 128; a float cannot exceed 1024."""
 NAME_CHARACTERS = 200
-"""Longest name of a spring, characters: two lines of a table."""
+"""Longest name of a spring, or heading of a column, characters: two lines of a table."""
 EXPRESSION_CHARACTERS = 500
 """Longest expression of an effect, characters: six lines of a page."""
 OWN_EFFECTS = 64

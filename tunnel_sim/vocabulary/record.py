@@ -150,9 +150,10 @@ def count_cycles(record: Record) -> float:
         hum = pieces @ np.linalg.pinv(basis).T[:, :2] @ hum_basis.T
         overlap = len(starts) * block - reading.size
         reading = reading - np.concatenate([hum[:-1].ravel(), hum[-1, overlap:]])
-    # The reading less a fitted straight line, because a sensor's drift is not an oscillation.
+    # The reading less a fitted straight line, because a sensor's drift is not an oscillation. BLAS is not
+    # used: its sums depend on its number of threads.
     abscissa = np.linspace(-1.0, 1.0, reading.size)
-    slope = float(abscissa @ reading) / float(abscissa @ abscissa)
+    slope = float(np.sum(abscissa * reading) / np.sum(abscissa**2))
     level: Array = reading - float(reading.mean()) - slope * abscissa
     # Only rounding errors remain of a constant, a linear drift or pure hum.
     if reading.size < 6 or float(np.ptp(level)) <= 1e-9 * float(np.abs(record.yaw_rad).max()):

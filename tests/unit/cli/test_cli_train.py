@@ -44,6 +44,30 @@ def test_interrupted_and_gone_on_with_to_the_same_bits(tmp_path, monkeypatch, ca
     assert not (tmp_path / "w.part.safetensors").exists()
 
 
+def test_a_restart_gives_the_same_bits_and_takes_nothing_from_an_interrupted_training(tmp_path, monkeypatch):
+    from identification.neural import train as module
+
+    step, taken = module.advance_training, []
+
+    def interrupted(progress, problem):
+        taken.append(1)
+        if len(taken) == 5:
+            raise KeyboardInterrupt
+        return step(progress, problem)
+
+    out = tmp_path / "w.safetensors"
+    assert main(["train", str(out), *QUICK]) == 0
+    whole, record = out.read_bytes(), out.with_suffix(".json").read_bytes()
+    out.unlink()
+    monkeypatch.setattr(module, "advance_training", interrupted)
+    assert main(["train", str(out), *QUICK]) == 130
+    taken.clear()
+    taken += [1] * 5
+    assert main(["train", str(out), "--restart", *QUICK]) == 0
+    assert len(taken) == 5 + 16  # every step was taken again
+    assert (out.read_bytes(), out.with_suffix(".json").read_bytes()) == (whole, record)
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -12,7 +12,7 @@ from tests.unit.importing.import_files import decay, written
 from tunnel_sim import TunnelError
 from tunnel_sim.files.importing.conditions import Conditions, ImportChoices, condition_of, in_si
 from tunnel_sim.files.importing.records import Imported, read_records
-from tunnel_sim.files.importing.tables import split_unit
+from tunnel_sim.files.importing.units import split_unit
 
 TIME, ANGLE = decay()
 

@@ -11,10 +11,25 @@ import pytest
 from tests.unit.importing.import_files import decay
 from tunnel_sim.files.exporting import WRITERS, export_campaign
 from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.text import is_number
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
 NAMES = ("b 2", "a,1", "10", "9", "nan", "ä", "x;y", "007", "r/1", "..", "r_1", "-")
+FORMULAS = (
+    "=1+1",
+    "+a",
+    "-5",
+    "@x",
+    "'=a",
+    "''-",
+    "=cmd|' /C calc'!A0",
+    "＝x",
+    "-2+3+cmd|'",
+    "'",
+    "'a",
+    "+1",
+)
 
 
 def twelve_runs() -> Campaign:
@@ -35,6 +50,20 @@ def twelve_runs() -> Campaign:
             )
         )
     return Campaign("twelve", RigProperties(0.11, 0.036, 0.625, 0.225), SensorProperties(), tuple(runs))
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_names_that_spreadsheets_take_for_formulas_are_texts_and_come_back(kind: str, tmp_path: Path) -> None:
+    campaign = twelve_runs()
+    named = zip(campaign.runs, FORMULAS, strict=True)
+    campaign = replace(campaign, runs=tuple(replace(run, id=name) for run, name in named))
+    path = export_campaign(campaign, tmp_path / f"rig.{kind}", kind)
+    assert [run.id for run in read_records([path]).campaign.runs] == list(FORMULAS)
+    if kind == "csv":
+        first = {line.partition(",")[0].strip('"') for line in path.read_text("utf-8").splitlines()}
+        assert not [
+            cell for cell in first if cell[:1] in "=@＝" or (cell[:1] in "+-" and not is_number(cell))
+        ]
 
 
 @pytest.mark.parametrize("kind", WRITERS)

@@ -13,16 +13,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from tunnel_sim.files.importing.tables import (
-    Channel,
-    Table,
-    by_texts,
-    hold_order,
-    known_unit,
-    names_runs,
-    split_unit,
-)
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
 from tunnel_sim.files.importing.text import find_layout, is_number, tables_of
+from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import USED_COLUMNS, FileTable, Reader, faults
 from tunnel_sim.files.reading import check_count, frame_schema, read_frame
 from tunnel_sim.vocabulary import limits

@@ -12,7 +12,8 @@ import numpy as np
 
 from tunnel_sim.files.importing.cleaning import without_overflow
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
-from tunnel_sim.files.importing.tables import UNITS, Channel, Table, heading, is_input, kind_of, known_unit
+from tunnel_sim.files.importing.tables import Channel, Table, heading, is_input
+from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
@@ -145,7 +146,7 @@ def _readings(
         return [channel for channel in chosen if channel is not time]
     free = [c for c in _unconditional(block) if c is not time]
     others = [c for c in free if not is_input(c) and not is_stated(c, choices)]
-    levels: list[list[Channel]] = [[] for _ in range(6)]  # the most certain first
+    levels: list[list[Channel]] = [[] for _ in range(7)]  # the most certain first
     for c in others:
         kind, named = kind_of(c.unit), _ANGLE.search(c.name) and not _RATE.search(c.name)
         if not _span(c) > 0.0:
@@ -154,14 +155,16 @@ def _readings(
             levels[0].append(c)
         elif c.unit == "" and named:
             levels[1].append(c)
-        elif kind == "counts":
+        elif c.unit and kind == "" and named:  # in a unit that is not known, which is asked for
             levels[2].append(c)
-        elif c.unit == "" and not _OTHER.search(c.name) and not _RATE.search(c.name):
+        elif kind == "counts":
             levels[3].append(c)
-        elif kind == "voltage":
+        elif c.unit == "" and not _OTHER.search(c.name) and not _RATE.search(c.name):
             levels[4].append(c)
-        elif kind in ("rate", "acceleration"):
+        elif kind == "voltage":
             levels[5].append(c)
+        elif kind in ("rate", "acceleration"):
+            levels[6].append(c)
     found = next((level for level in levels if level), [])
     widest = {unit: max(_span(c) for c in found if c.unit == unit) for unit in {c.unit for c in found}}
     still = [c for c in found if _span(c) < _HARDLY * widest[c.unit]]
@@ -277,9 +280,19 @@ def in_seconds(
         remedy = "give --time-unit, or --time with the name of another column"
         raise TunnelError(what, where=where, remedy=remedy)
     if not unit:
+        _ask_for_unit(pair.time, ("time",), "--time-unit", where)
         unit, step = guessed_time_unit(values)
         said.append(f"no unit of the times in the file: steps of {step:.4g} are taken as {unit}")
     return values * UNITS["time"][unit] if unit != "s" else values
+
+
+def _ask_for_unit(channel: Channel, kinds: Sequence[str], option: str, where: str) -> None:
+    """Refuse to guess the unit of a column in whose name a unit may be written."""
+    word = written_unit(channel.name, kinds)
+    if word:
+        what = f"'{word}' in the name of '{one_line(channel.name, 40)}' may be its unit"
+        allowed = ", ".join(name for kind in kinds for name in UNITS[kind])
+        raise TunnelError(what, where=where, remedy=f"give {option}, one of {allowed}")
 
 
 def in_radians(
@@ -292,7 +305,7 @@ def in_radians(
         raise TunnelError(
             f"'{one_line(reading.name, 40)}' is in '{one_line(unit, 20)}', which is not a known unit of an angle",
             where=where,
-            remedy="give --unit, --counts-per-turn N or --calibration",
+            remedy=f"give --unit ({', '.join(UNITS['angle'])} or another), --counts-per-turn N or --calibration",
         )
     values = reading.values
     if calibration is not None:
@@ -317,6 +330,8 @@ def in_radians(
         option = "--counts-per-turn N" if kind_of(unit) == "counts" else '--calibration "a + b*V"'
         raise TunnelError(f"'{reading.name}' is in {unit}", where=where, remedy=f"give {option}")
     if not unit:
+        if calibration is None:
+            _ask_for_unit(reading, kinds, "--unit", where)
         unit, swing = guessed_angle_unit(values)
         said.append(
             f"no unit of '{reading.name}': a swing of ±{swing:.4g} is taken as {unit}; --unit says otherwise"

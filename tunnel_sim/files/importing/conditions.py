@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
-from tunnel_sim.files.importing.tables import UNITS, Channel, kind_of, split_unit
+from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.text import read_cells
+from tunnel_sim.files.importing.units import UNITS, kind_of, split_unit
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -248,6 +250,11 @@ def from_name(pattern: re.Pattern[str] | None, path: Path) -> dict[str, float]:
     return {key: float(re.sub("[,p]", ".", text)) for key, text in found.groupdict().items()}
 
 
+def _same(name: str) -> str:
+    """A name for comparison: some systems take the accents of file names apart."""
+    return unicodedata.normalize("NFC", name).lower()
+
+
 class ConditionTable:
     """A table of conditions in a text file, one row for each file or run, with keys of ``campaign.toml``."""
 
@@ -266,7 +273,7 @@ class ConditionTable:
         self._rows: dict[str, dict[str, float]] = {}
         for row in rows:
             name = row[self._key].strip()
-            if name.lower() in self._rows:
+            if _same(name) in self._rows:
                 remedy = "leave one out"
                 raise TunnelError(f"'{one_line(name)}' occurs twice", where=shown(path), remedy=remedy)
             values = {}
@@ -280,12 +287,12 @@ class ConditionTable:
                         remedy="give a number in SI units",
                     ) from None
             validate(Conditions, values, path)
-            self._rows[name.lower()] = values
+            self._rows[_same(name)] = values
 
     def of(self, path: Path, run: str) -> dict[str, float]:
         """Conditions of a run, by its name or that of the file that holds it."""
         for name in (run, path.name, path.stem):
-            if name.lower() in self._rows:
-                return self._rows[name.lower()]
+            if _same(name) in self._rows:
+                return self._rows[_same(name)]
         what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
         raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")

@@ -26,7 +26,8 @@ from tunnel_sim.files.importing.columns import (
 )
 from tunnel_sim.files.importing.conditions import ImportChoices, condition_of, from_column, from_facts
 from tunnel_sim.files.importing.source import Source
-from tunnel_sim.files.importing.tables import INPUT_FACTS, UNITS, Channel, Table, heading, is_input, kind_of
+from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table, heading, is_input
+from tunnel_sim.files.importing.units import UNITS, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.drive import Drive, InputColumn, checked_drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown

@@ -29,7 +29,7 @@ from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, Table, by_run, with_input_facts
 from tunnel_sim.files.importing.text import TEXT, read_text_tables
 from tunnel_sim.files.readers import load_reader, reader_place
-from tunnel_sim.files.reading import check_count, read_regular
+from tunnel_sim.files.reading import check_count, is_blank, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, shown
 
@@ -223,7 +223,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
     if reader is None or reader.read_tables is None:
         reader, place = TEXT, None
     content = read_regular(path, reader.limit)
-    if not content.strip():
+    if is_blank(content):
         raise TunnelError("the file is empty", where=where, remedy="name a file that holds a record")
     if not reader.magic or not content.startswith(reader.magic):
         really = next((kind for magic, kind in _BEGINNINGS.items() if content.startswith(magic)), None)
@@ -248,7 +248,9 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
                 channel = replace(channel, values=np.where(wild, np.nan, channel.values))
             channels.append(channel)
         table = replace(table, channels=tuple(channels), said=tuple(said))
-        found += [with_input_facts(part) for part in by_run(table)]
+        parts = (with_input_facts(part) for part in by_run(table))
+        # A column that names the runs, or states the input, may be alone in its table.
+        found += [part for part in parts if part.channels]
     if not found:
         remedy = "name a file that holds times and angles"
         raise TunnelError("no column of numbers", where=where, remedy=remedy)

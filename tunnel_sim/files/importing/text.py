@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from tunnel_sim.files.importing.tables import (
-    UNITS,
-    Channel,
-    Table,
-    by_texts,
-    hold_order,
-    kind_of,
-    known_unit,
-    names_runs,
-    split_unit,
-)
+from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
+from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_unit, unit_beside
 from tunnel_sim.files.readers import Reader
-from tunnel_sim.files.reading import check_count, read_regular
+from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 
@@ -108,12 +100,13 @@ def find_layout(
     bare = [cell for cell in stated if cell not in known and not re.fullmatch(r"[\[({].*[\])}]", cell)]
     few = len(known) > len(bare) and all(len(cell) <= _LONG_UNIT for cell in bare)
     if known and (not bare or few):
-        units = [known_unit(cell) or cell.strip("()[]{} -") for cell in above.pop()[1]]
+        beside = above.pop()[1]
+        units = [unit_beside(name, cell) for name, cell in zip(above[-1][1], beside, strict=True)]
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
     facts = {}  # such as "Sample rate: 1000 Hz" or "V = 54 km/h", in SI units where the unit is known
-    for line in lines[: above[-1][0] if above else first]:
+    for line in (line for line in lines[: above[-1][0] if above else first] if len(line) <= _LONG_LINE):
         for fact, number, text in _FACT.findall(line):
             text = text.lstrip(";,\t ").strip("()[] ")
             unit = known_unit(text) or ""
@@ -137,6 +130,9 @@ TEXT = Reader("a table of text", limits.CSV_BYTES)
 _CLOCK = r"(?:^|[ T])(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:\s*([AaPp])\.?[Mm]\.?|Z|[+-]\d{2}:?\d{2})?$"
 _DAY = 86400.0  # s
 _HEAD, _MIDDLE = 2**18, 2**14  # bytes that are looked at
+_LOOKED_AT = 1000  # texts of a column that tell whether they are times of day
+_PART = 2**20  # texts that are converted at once
+_LONG_LINE = 1000  # characters: a longer line above a table states no number
 _HEAD_LINES = 400
 _NAMES = {"tab": "\t", ";": ";", ",": ",", "|": "|", "blank": " "}
 _SAID = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}
@@ -165,6 +161,12 @@ def read_text_tables(
 ) -> tuple[list[Table], dict[str, str]]:
     """The table of a text file; and how it was read, for the recipe."""
     content, encoding = _as_utf8(content, where)
+    if b"\n" not in content:
+        content = content.replace(b"\r", b"\n")
+    nul = (
+        "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet), or save it again as text"
+    )
+    check_lines(content, where, nul)
     head = content[:_HEAD].decode(errors="replace").splitlines()
     if len(content) > _HEAD:
         head.pop()
@@ -179,7 +181,10 @@ def read_text_tables(
     check_count(dialect.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed")
     lines = content.count(b"\n")
     check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
+    cells = lines * dialect.width
+    check_count(cells, limits.CELLS, "cells", where, "leave out columns that are not needed")
     layout = find_layout([dialect.split(line) for line in head], head, dialect.decimal, dialect.width)
+    sample = [dialect.split(line) for line in body if line.strip()]
     if layout is None:
         what = f"no numbers in the first {len(head)} lines"
         raise TunnelError(what, where=where, remedy="remove the lines above the table")
@@ -193,8 +198,8 @@ def read_text_tables(
         "decimal": dialect.decimal,
     }
     if dialect.delimiter == " ":
-        content = re.sub(rb"(?m)^[ \t]+|[ \t\r]+$", b"", content)
-        content = re.sub(rb"[ \t]+", b" ", content)
+        content = re.sub(rb"[ \t\r]+", b" ", content)  # first, so that no run of blanks is looked at twice
+        content = re.sub(rb"(?m)^ | $", b"", content)
     options: dict[str, Any] = {
         "separator": dialect.delimiter,
         "has_header": False,
@@ -209,8 +214,13 @@ def read_text_tables(
             schema = dict.fromkeys(names, pl.String)
             labels = pl.read_csv(content, schema=schema, columns=[at], **options).to_series()
         try:
-            kinds = {name: pl.String if i == at else pl.Float64 for i, name in enumerate(names)}
-            numbers = {**options, "decimal_comma": dialect.decimal == ",", "quote_char": None}
+            text_at = {i for i in range(dialect.width) if _holds_texts(sample, i, dialect.decimal)} - {at}
+            kinds = {
+                name: pl.String if i in text_at or i == at else pl.Float64 for i, name in enumerate(names)
+            }
+            numbers = {**options, "decimal_comma": dialect.decimal == ","}
+            if not text_at:  # a text may hold delimiters in quotes
+                numbers["quote_char"] = None
             frame = pl.read_csv(content, schema=kinds, null_values=missing, **numbers)
         except pl.exceptions.ComputeError:  # a text somewhere: cell by cell
             texts = dict.fromkeys(names, pl.String)
@@ -220,6 +230,12 @@ def read_text_tables(
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
+
+
+def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bool:
+    """Whether a column holds a text in some rows of a table; it is then read as texts from the first row on."""
+    cells = (row[column] for row in rows if column < len(row))
+    return any(not is_number(cell, decimal) and not is_missing(cell) for cell in cells)
 
 
 def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
@@ -241,7 +257,7 @@ def find_dialect(body: Sequence[str], choices: ImportChoices) -> Dialect | None:
 
 
 def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
-    """The text as UTF-8 with line feeds, and its encoding."""
+    """The text as UTF-8, and its encoding."""
     encoding = "ASCII"
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         encoding = "UTF-16"
@@ -250,17 +266,13 @@ def _as_utf8(content: bytes, where: str) -> tuple[bytes, str]:
     try:
         if encoding == "UTF-16":
             content = content.decode("utf-16").encode()
-        elif encoding != "ASCII":
-            content.decode()
+        else:
+            check_utf8(content, where)
     except UnicodeDecodeError:
-        if encoding == "UTF-16":
-            raise TunnelError("not UTF-16 text", where=where, remedy="save the file as UTF-8") from None
+        raise TunnelError("not UTF-16 text", where=where, remedy="save the file as UTF-8") from None
+    except TunnelError:
         content, encoding = content.decode("latin-1").encode(), "Latin-1"
-    if b"\0" in content:
-        remedy = "give the file the ending of its format (.xlsx, .mat, .tdms, .h5, .parquet)"
-        raise TunnelError("is not text: it contains NUL bytes", where=where, remedy=remedy)
-    content = content.removeprefix(b"\xef\xbb\xbf")
-    return (content if b"\n" in content else content.replace(b"\r", b"\n")), encoding
+    return content.removeprefix(b"\xef\xbb\xbf"), encoding
 
 
 def tables_of(
@@ -276,21 +288,13 @@ def tables_of(
             number = column.map_elements(hold_order, return_dtype=pl.Float64).fill_nan(None)
             lost = number.null_count() - column.null_count()
         elif column.dtype == pl.String:
-            cells = column.str.strip_chars(' \t\r"')
-            cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
-            number = cells.cast(pl.Float64, strict=False)
+            number = _in_parts(column, partial(_as_numbers, decimal=decimal))
             lost = number.null_count() - column.null_count()
         if lost and number.null_count() == column.len():
-            # Times of day such as 14:03:07.25, with or without a date, in s; they go on at midnight.
-            text = column.str.strip_chars(' \t\r"')
-            parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
-            hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
-            half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
-            hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
-            hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
-            seconds = 3600.0 * hours + 60.0 * minutes + rest
             notes[i] = f"the column '{name}' holds text and is left out"
-            if 2 * seconds.null_count() <= seconds.len():
+            some = _seconds(column.drop_nulls().head(_LOOKED_AT))
+            if 2 * some.null_count() <= some.len():
+                seconds = _in_parts(column, _seconds)
                 midnights = (seconds.forward_fill().diff() < -_DAY / 2).fill_null(value=False).cum_sum()
                 number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
@@ -304,6 +308,29 @@ def tables_of(
         tables = by_texts(table, layout.names[layout.runs], labels)
     said = tuple(note for i, note in notes.items() if not (tables[0].named and i == layout.runs))
     return [replace(one, said=(*said, *one.said[1:])) for one in tables]
+
+
+def _in_parts(column: pl.Series, convert: Callable[[pl.Series], pl.Series]) -> pl.Series:
+    """Numbers of a column of texts, part by part: what a conversion holds in between takes ten times the memory."""
+    parts = [convert(column.slice(start, _PART)) for start in range(0, max(column.len(), 1), _PART)]
+    return pl.concat(parts)
+
+
+def _as_numbers(column: pl.Series, decimal: str) -> pl.Series:
+    cells = column.str.strip_chars(' \t\r"')
+    cells = cells.str.replace(",", ".", literal=True) if decimal == "," else cells
+    return cells.cast(pl.Float64, strict=False)
+
+
+def _seconds(column: pl.Series) -> pl.Series:
+    """Times of day such as 14:03:07.25, with or without a date, in s since midnight; null where there is none."""
+    text = column.str.strip_chars(' \t\r"')
+    parts = (text.str.extract(_CLOCK, group).str.replace(",", ".") for group in (1, 2, 3))
+    hours, minutes, rest = (part.cast(pl.Float64) for part in parts)
+    half = text.str.extract(_CLOCK, 4).str.to_lowercase()  # the twelfth hour is the first of its half
+    hours = pl.select(pl.when(half.is_null()).then(hours).otherwise(hours % 12.0)).to_series()
+    hours += (half == "p").fill_null(value=False).cast(pl.Float64) * 12.0
+    return 3600.0 * hours + 60.0 * minutes + rest
 
 
 def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
