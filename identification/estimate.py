@@ -298,12 +298,13 @@ class Estimate:
             found = [getattr(run, name) for run in runs]
             own = rng.standard_normal((1, draws, len(runs)))
             posterior[name] = np.array([q.value for q in found]) + own * np.array([q.std for q in found])
-        return from_dict(
+        data: InferenceData = from_dict(
             posterior=posterior,
             coords={"run": [run.id for run in runs]},
             dims={"omega_n": ["run"], "zeta": ["run"]},
             posterior_attrs={"campaign": self.campaign, "estimator": self.estimator},
         )
+        return data
 
     def runs_frame(self) -> pl.DataFrame:
         """A row for each run: its id and status, and the quantities of `RunEstimate` with each ``_std``."""

@@ -129,7 +129,7 @@ def _within(
         rise[3 - i] -= 2.0 * along[i]
         for j in range(len(terms)):
             rise[2 - i - j] += gram[i, j]
-    turns = [k for k in _real_roots(np.polyder(rise)) if least <= k <= greatest]
+    turns = [k for k in _real_roots(np.asarray(np.polyder(rise), np.float64)) if least <= k <= greatest]
     lowest = min(np.polyval(rise, [0.0, *turns]))
     ends = _real_roots(rise - np.array([0.0, 0.0, 0.0, 0.0, lowest + reach]))
     if not ends:
