@@ -12,10 +12,11 @@ import numpy as np
 from diagnosis import policy
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
+from diagnosis.likelihood.mains_lines import mains_interval
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, by_moment, mains_interval, misfit
+from diagnosis.likelihood.residuals import CHANNELS, by_moment, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import decays_start, joint_start, misses_motion, nominal_start
 from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
@@ -230,12 +231,10 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum, line = campaign, None, None
         if HUM.name in allowed:
-            fine, least = nominal, mains_interval(similarity)
-            if any(run.interval >= least for run in nominal.problem.data.runs):  # too long to show the mains
-                problem = Problem(prepare(campaign, noise.variance, similarity, 0.5 * least))
-                residuals = scaled_residuals(problem, nominal.point)
-                fine = replace(nominal, problem=problem, residuals=residuals)
-            line = find_hum(fine)
+            # block means short enough to show every line of the mains that the samples show
+            problem = Problem(prepare(campaign, noise.variance, similarity, mains_interval(similarity)))
+            residuals = scaled_residuals(problem, nominal.point)
+            line = find_hum(replace(nominal, problem=problem, residuals=residuals))
         if line is not None:
             frequency = refine_frequency(campaign, line)
             for _ in range(2):  # as a hum may count as noise at first

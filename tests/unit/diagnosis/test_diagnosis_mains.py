@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.residuals import mains_line
+from diagnosis.likelihood.mains_lines import mains_line
 from diagnosis.noise.mains import find_hum, refine_frequency, remove_hum
 from diagnosis.search.investigate import nominal_study
 from tests.reference import free_decays
