@@ -1,9 +1,9 @@
 """Where the mains show in residuals: at 50 or 60 Hz and their multiples, as sampled.
 
-A sampled line above half the sample rate appears at another frequency, at which the spectrum of the samples repeats:
-60 Hz sampled at 100 Hz are 40 Hz. So every line is sought where the samples show it, at its own frequency less the
-nearest multiple of the sample rate. It is not sought where it would fall on the motion or its harmonics, nor at the
-ends of the spectrum, where a sine and a cosine are not distinct.
+A line above half the sample rate appears at another frequency, as the spectrum of samples repeats: 60 Hz sampled
+at 100 Hz are 40 Hz. So every line is sought where the samples show it, at its own frequency less the nearest
+multiple of the sample rate. It is not sought where it would fall on the motion or its harmonics, nor at the ends of
+the spectrum, where a sine and a cosine are not distinct.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _WANDER = 0.02
 #: Least range that is worth seeking, a share of the frequency: large grids keep 50 Hz within 1 % during 99.5 % of a
 #: year (EN 50160:2010, 4.2.1) and 60 Hz within 0.5 Hz (NERC PRC-024-3, no-trip zone).
 _LEAST_WANDER = 0.01
-#: Largest share of the spectrum beyond the motion's harmonics that one line may be sought in, on either side of its
-#: place: where little of the spectrum is seen, a line of another source would often lie in a wider range. Judgement.
+#: Largest share of the spectrum beyond the motion's harmonics in which one line may be sought, on either side of
+#: its place: where little of the spectrum is seen, a line of another source often lies in a wider range. Judgement.
 _OF_SPECTRUM = 0.05
 _BEYOND_MOTION = 4.0  # times the motion's frequency: beyond its third harmonic
 _WIDTH = 2.0  # half a line's width with a Hann window, in 1/duration
@@ -99,6 +99,26 @@ def seen(frequency: float | Array, interval: float, duration: float, motion: flo
     return np.asarray((shown >= lowest) & (shown <= highest))
 
 
+def shown_multiples(frequency: float, interval: float, duration: float, motion: float) -> list[int]:
+    """The multiples of a frequency that samples show as `seen`, and apart from those before them.
+
+    Args:
+        frequency: of the mains, Hz.
+        interval: between samples, s.
+        duration: over which a line is resolved, s.
+        motion: frequency of the fastest motion, Hz.
+    """
+    found: list[int] = []
+    taken: list[float] = []
+    for multiple in HARMONICS:
+        place = abs(float(apparent(multiple * frequency, interval)))
+        apart = all(abs(place - other) * duration > 2.0 * _WIDTH for other in taken)
+        if apart and seen(multiple * frequency, interval, duration, motion):
+            found.append(multiple)
+            taken.append(place)
+    return found
+
+
 def _limits(interval: float, duration: float, motion: float) -> tuple[float, float]:
     """Lowest and highest apparent frequency at which a line is sought, Hz."""
     return _BEYOND_MOTION * motion + _WIDTH / duration, 0.5 / interval - _WIDTH / duration
@@ -141,7 +161,7 @@ class _Pieces:
         count: of the pieces.
         duration: of one, s.
         run: the run.
-        motion: its frequency, Hz.
+        motion: frequency of the fastest motion, Hz.
     """
 
     power: Array
@@ -183,6 +203,11 @@ class _Pieces:
         return share if whole and share >= _LEAST_WANDER else 0.0
 
 
+def fastest(fit: Fit) -> float:
+    """Frequency of the fastest motion of the fitted model, Hz."""
+    return max(resonance(fit, i) for i in range(len(fit.problem.data.runs)))
+
+
 def mains_lines(fit: Fit) -> list[MainsLine]:
     """The strongest line at every multiple of each nominal frequency of the mains that the runs show.
 
@@ -191,8 +216,8 @@ def mains_lines(fit: Fit) -> list[MainsLine]:
     data = fit.problem.data
     length = max(data.similarity.similar(_PIECE, "s"), _LEAST_PIECE)
     runs = [
-        _Pieces.of(run, residual, resonance(fit, i), length)
-        for i, (run, residual) in enumerate(zip(data.runs, fit.residuals, strict=True))
+        _Pieces.of(run, residual, fastest(fit), length)
+        for run, residual in zip(data.runs, fit.residuals, strict=True)
     ]
     sought = list(_sought(runs, data.similarity))
     trials = sum(_places(runs, *one) for one in sought)
@@ -304,6 +329,6 @@ def _evidence(runs: list[_Pieces], frequency: float) -> float:
     """Drop of χ² beyond what chance gives, at all multiples of a frequency that the runs show."""
     found = 0.0
     for run in runs:
-        places = {int(run.index(k * frequency)) for k in HARMONICS if run.shows(k * frequency)}
-        found += sum(max(float(run.power[at]) - 2.0 * run.count, 0.0) for at in places)
+        for multiple in shown_multiples(frequency, run.run.interval, run.duration, run.motion):
+            found += max(float(run.power[run.index(multiple * frequency)]) - 2.0 * run.count, 0.0)
     return found

@@ -11,8 +11,15 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.mains_lines import HARMONICS, MainsLine, alike, apparent, mains_lines, seen
-from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.mains_lines import (
+    HARMONICS,
+    MainsLine,
+    alike,
+    apparent,
+    mains_lines,
+    shown_multiples,
+)
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
 from diagnosis.noise.sensor_noise import SmoothCurve
 from diagnosis.policy import (
@@ -30,7 +37,6 @@ from tunnel_sim.vocabulary.record import Array, Record
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
 _KNOTS = 12.0  # per cycle of the motion: a curve follows what is slower than six times the motion
-_APART = 4.0  # least distance of two lines that are removed together, in 1/duration: a line's width
 _NEAR = 0.25  # of 1/duration, within which the frequency of a line found in the whole records is refined
 
 
@@ -59,18 +65,18 @@ def find_hum(nominal: Fit) -> float | None:
     """The frequency of the mains whose hum is in the residuals of the nominal fit, Hz; None where there is none.
 
     It is sought near 50 and 60 Hz and their multiples at `FALSE_ALARM_RATE`, all of them together. Where several
-    frequencies explain the same lines as sampled, it is the one that is folded least often.
+    frequencies explain the same lines as sampled, it is the one of least folding, then that of the lowest multiple.
     """
     found = [line for line in mains_lines(nominal) if _is_hum(line)]
     if not found:
         return None
     most = max(line.evidence for line in found)
-    return min((line for line in found if line.evidence >= (1.0 - AS_MUCH) * most), key=_folds).parameter
+    return min((line for line in found if line.evidence >= (1.0 - AS_MUCH) * most), key=_plainness).parameter
 
 
-def _folds(line: MainsLine) -> int:
-    """How often a line is folded."""
-    return line.folds
+def _plainness(line: MainsLine) -> tuple[int, int]:
+    """How often a line is folded, and its multiple."""
+    return line.folds, line.harmonic
 
 
 def _is_hum(line: MainsLine) -> bool:
@@ -89,13 +95,14 @@ def _is_hum(line: MainsLine) -> bool:
     )
 
 
-def refine_frequency(campaign: Campaign, frequency: float) -> float:
+def refine_frequency(campaign: Campaign, frequency: float, motion: float = REFERENCE_FREQUENCY) -> float:
     """The frequency at which a sine and its harmonics remove most power from all records, Hz.
 
     Args:
         frequency: of the mains, Hz, to within a quarter of a line's width.
+        motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is sought.
     """
-    shown = _showing(campaign, frequency)
+    shown = _showing(campaign, frequency, motion)
     cleared = [_without_motion(r, np.hanning(r.time_s.size))[1] for r, multiples in shown if multiples]
 
     def left(trial: float) -> float:
@@ -115,12 +122,15 @@ def refine_frequency(campaign: Campaign, frequency: float) -> float:
     return float(found.x)
 
 
-def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[Campaign, Hum]:
+def remove_hum(
+    campaign: Campaign, frequency: float, variance: float, motion: float = REFERENCE_FREQUENCY
+) -> tuple[Campaign, Hum]:
     """Remove a hum and its harmonics from every record, as far as the record shows them apart from the motion.
 
     Args:
-        frequency: of the fundamental, Hz.
+        frequency: of the fundamental, Hz, seen in one record or more.
         variance: of the noise of one sample, rad².
+        motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is removed.
 
     Returns:
         The campaign without it, and the hum that was removed. The standard deviation of its frequency is that of
@@ -130,7 +140,7 @@ def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[C
     """
     from scipy.signal.windows import tukey  # only here: slow to load
 
-    shown = _showing(campaign, frequency)
+    shown = _showing(campaign, frequency, motion)
     harmonic = _strongest(shown, frequency)
     swells = _swells(shown, frequency, harmonic, variance)
     cleaned, squares, powers, counts = [], [], [], []
@@ -196,23 +206,10 @@ def hum_remarks(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> 
     return tuple(found)
 
 
-def _showing(campaign: Campaign, frequency: float) -> list[tuple[Record, list[int]]]:
-    """Every record with the multiples of a frequency that it shows apart from its motion and from each other."""
-    return [(run.record, _harmonics(run.record, frequency)) for run in campaign.runs]
-
-
-def _harmonics(record: Record, frequency: float) -> list[int]:
-    """The multiples of a frequency that a record shows apart from its motion and from those before."""
-    interval, duration, motion = record.sample_interval, record.duration, motion_frequency(record)
-    found: list[int] = []
-    taken: list[float] = []
-    for multiple in HARMONICS:
-        place = abs(float(apparent(multiple * frequency, interval)))
-        apart = all(abs(place - other) * duration > _APART for other in taken)
-        if apart and seen(multiple * frequency, interval, duration, motion):
-            found.append(multiple)
-            taken.append(place)
-    return found
+def _showing(campaign: Campaign, frequency: float, motion: float) -> list[tuple[Record, list[int]]]:
+    """Every record with the multiples of a frequency that it shows apart from the motion and from each other."""
+    records = [run.record for run in campaign.runs]
+    return [(r, shown_multiples(frequency, r.sample_interval, r.duration, motion)) for r in records]
 
 
 def _strongest(shown: Sequence[tuple[Record, list[int]]], frequency: float) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis import policy
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
-from diagnosis.likelihood.mains_lines import mains_interval
+from diagnosis.likelihood.mains_lines import fastest, mains_interval
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
@@ -236,9 +236,11 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
             residuals = scaled_residuals(problem, nominal.point)
             line = find_hum(replace(nominal, problem=problem, residuals=residuals))
         if line is not None:
-            frequency = refine_frequency(campaign, line)
+            motion = fastest(nominal)
+            frequency = refine_frequency(campaign, line, motion)
             for _ in range(2):  # as a hum may count as noise at first
-                cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
+                variance = float(np.mean(list(noise.variance.values())))
+                cleaned, hum = remove_hum(campaign, frequency, variance, motion)
                 noise = campaign_noise(cleaned)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
