@@ -32,7 +32,7 @@ _LEAST_WANDER = 0.01
 #: Largest share of the spectrum beyond the motion's harmonics in which one line may be sought, on either side of
 #: its place: where little of the spectrum is seen, a line of another source often lies in a wider range. Judgement.
 _OF_SPECTRUM = 0.05
-_BEYOND_MOTION = 4.0  # times the motion's frequency: beyond its third harmonic
+_BEYOND_MOTION = 3.3  # times the frequency of the fastest motion: beyond its third harmonic by a tenth
 _WIDTH = 2.0  # half a line's width with a Hann window, in 1/duration
 #: Pieces of the records whose powers are added, s of the rig as measured: within them the mains' phase is steady. A
 #: standard measurement of the mains' frequency takes as long (IEC 61000-4-30:2015, 5.1).
