@@ -445,7 +445,7 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
 
     Effects of a few numbers close little of any noise, however it misbehaves.
     """
-    block = found.nominal.problem.data.runs[0].block
+    block = found.nominal.problem.data.mean_block
     small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
     closed = any(w.effects != UNKNOWN and w.share < 1.0 - policy.MOST for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)
