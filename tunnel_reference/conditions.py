@@ -106,6 +106,8 @@ class Conditions:
         kept: share of the duration that is written.
         every: of how many samples one is written.
         time_start: time stamp of the first sample, s.
+        gaps: stretches of every run that are not written, from and to, shares of the duration, shape (gaps, 2).
+        offset: angle that is added to all readings as written, rad.
     """
 
     spring_stiffness: Array
@@ -141,6 +143,8 @@ class Conditions:
     kept: Array = field(default_factory=lambda: np.ones(1))
     every: NDArray[np.int64] = field(default_factory=lambda: np.ones(1, np.int64))
     time_start: Array = field(default_factory=lambda: np.zeros(1))
+    gaps: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    offset: float = 0.0
 
     @property
     def runs(self) -> int:
@@ -207,10 +211,13 @@ class Conditions:
         """Variance of noise and quantisation, mean over the runs, rad²."""
         return float(self.noise_std**2 * np.mean(self.noise_scale**2) + self.resolution**2 / 12.0)
 
-    def written(self, run: int) -> slice:
-        """The samples of a run that are written."""
+    def written(self, run: int) -> NDArray[np.int64]:
+        """The samples of a run that are written, shape (n,)."""
         kept, every = (np.broadcast_to(value, (self.runs,))[run] for value in (self.kept, self.every))
-        return slice(0, round(float(kept) * self.samples), int(every))
+        samples = np.arange(0, round(float(kept) * self.samples), int(every))
+        share = samples / self.samples
+        missing = np.any((share[:, None] > self.gaps[:, 0]) & (share[:, None] < self.gaps[:, 1]), axis=1)
+        return np.asarray(samples[~missing], np.int64)
 
     @property
     def wind_off_omega(self) -> Array:

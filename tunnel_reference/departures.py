@@ -86,6 +86,21 @@ def _durations_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
     return replace(c, kept=rng.uniform(0.5, 1.0, c.runs))
 
 
+def _records_are_short(rng: np.random.Generator, c: Conditions) -> Conditions:
+    """Few cycles: about five to fifteen."""
+    if c.drive is not None:  # whose input is drawn for the duration already
+        return c
+    return replace(c, duration=float(np.round(rng.uniform(2.5, 4.0), 2)))
+
+
+def _samples_missing(rng: np.random.Generator, c: Conditions) -> Conditions:
+    """One to three gaps of up to a fiftieth of the record, which the time stamps show."""
+    if c.drive is not None:  # a gap in the input would be another input
+        return c
+    start = rng.uniform(0.05, 0.9, int(rng.integers(1, 4)))
+    return replace(c, gaps=np.stack([start, start + rng.uniform(0.002, 0.02, start.size)], axis=1))
+
+
 def _times_start_anywhere(rng: np.random.Generator, c: Conditions) -> Conditions:
     """Time stamps count from the logger's start, not from the release."""
     return replace(c, time_start=np.round(rng.uniform(-50.0, 5000.0, c.runs), 3))
@@ -95,6 +110,12 @@ def _both_sides(rng: np.random.Generator, c: Conditions) -> Conditions:
     """Released from either side."""
     side = np.where(rng.permutation(c.runs) < c.runs // 2, -1.0, 1.0)
     return replace(c, release_angle=c.release_angle * side, start_angle=c.start_angle * side)
+
+
+def _releases_are_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+    """From a fifth of the standard releases to twice as far."""
+    factor = float(_log_uniform(rng, 0.2, 2.0))
+    return replace(c, release_angle=np.round(c.release_angle * factor, 4), start_angle=c.start_angle * factor)
 
 
 def _starts_with_a_rate(rng: np.random.Generator, c: Conditions) -> Conditions:
@@ -137,6 +158,23 @@ def _zeros_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
     return replace(c, zero_shift=0.004 * rng.standard_normal(c.runs))
 
 
+def _rests_anywhere(rng: np.random.Generator, c: Conditions) -> Conditions:
+    """The reading at rest is any angle of a turn, as of an encoder without an index."""
+    return replace(c, offset=float(np.round(rng.uniform(-np.pi, np.pi), 4)))
+
+
+def _sensor_is_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+    """Less noise or more, and steps from a twentieth of it to three times as wide."""
+    noise = float(_log_uniform(rng, 3e-5, 2e-3))
+    resolution = noise * float(_log_uniform(rng, 0.05, 3.0))
+    return replace(c, noise_std=noise, resolution=resolution, stated_noise=None)
+
+
+def _inertia_is_other(rng: np.random.Generator, c: Conditions) -> Conditions:
+    """The true inertia is far from the stated one."""
+    return replace(c, yaw_inertia=float(rng.uniform(0.06, 0.2)))
+
+
 def _air_restores(rng: np.random.Generator, c: Conditions) -> Conditions:
     """The air restores the yaw angle (Cnβ < 0), and damps little or feeds a little in."""
     return replace(c, cn_beta=float(-rng.uniform(0.05, 0.5)), cn_r=float(rng.uniform(-0.3, 0.01)))
@@ -151,8 +189,11 @@ DEPARTURES: Mapping[str, Change] = {
     "sample_rate": _sample_rate,
     "rates_differ": _rates_differ,
     "durations_differ": _durations_differ,
+    "records_are_short": _records_are_short,
+    "samples_missing": _samples_missing,
     "times_start_anywhere": _times_start_anywhere,
     "both_sides": _both_sides,
+    "releases_are_other": _releases_are_other,
     "starts_with_a_rate": _starts_with_a_rate,
     "densities_differ": _densities_differ,
     "speeds_unpaired": _speeds_unpaired,
@@ -160,6 +201,9 @@ DEPARTURES: Mapping[str, Change] = {
     "noise_differs": _noise_differs,
     "noise_has_tails": _noise_has_tails,
     "zeros_differ": _zeros_differ,
+    "rests_anywhere": _rests_anywhere,
+    "sensor_is_other": _sensor_is_other,
+    "inertia_is_other": _inertia_is_other,
     "air_restores": _air_restores,
     "damping_is_other": _damping_is_other,
 }

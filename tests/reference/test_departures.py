@@ -25,8 +25,11 @@ CHANGES = {
     "sample_rate": {"sample_rate"},
     "rates_differ": {"every"},
     "durations_differ": {"kept"},
+    "records_are_short": {"duration"},
+    "samples_missing": {"gaps"},
     "times_start_anywhere": {"time_start"},
     "both_sides": {"release_angle", "start_angle"},
+    "releases_are_other": {"release_angle", "start_angle"},
     "starts_with_a_rate": {"start_rate"},
     "densities_differ": {"air_density"},
     "speeds_unpaired": {"wind_speed"},
@@ -34,9 +37,15 @@ CHANGES = {
     "noise_differs": {"noise_scale", "stated_noise"},
     "noise_has_tails": {"noise_tails"},
     "zeros_differ": {"zero_shift"},
+    "rests_anywhere": {"offset"},
+    "sensor_is_other": {"noise_std", "resolution", "stated_noise"},
+    "inertia_is_other": {"yaw_inertia"},
     "air_restores": {"cn_beta", "cn_r"},
     "damping_is_other": {"mechanical_damping"},
 }
+
+
+NOISE = ("noise_differs", "noise_has_tails", "zeros_differ", "sensor_is_other")
 
 
 def changed(name, seed=3, base=RIG):
@@ -71,7 +80,7 @@ def test_nothing_is_broken_or_drawn_where_it_is_not_asked_for():
 def test_all_together_are_the_motion_of_the_stated_physics():
     """Other rates, durations, clocks, sides, starts, densities, speeds, springs, air and damping at once."""
     quiet = replace(RIG, noise_std=1e-12, resolution=1e-9, zero=0.0)
-    names = [name for name in DEPARTURES if name not in ("noise_differs", "noise_has_tails", "zeros_differ")]
+    names = [name for name in DEPARTURES if name not in NOISE]
     c = draw_departures(np.random.default_rng(7), quiet, certain=names)
     draw = CampaignDraw("none", c, (), 1)
     campaign = make.as_campaign(read_and_fit(draw, simulate_motions([draw])[0]), "c")
@@ -86,13 +95,16 @@ def test_all_together_are_the_motion_of_the_stated_physics():
         time = run.record.time_s - start
         assert time[0] == pytest.approx(0.0, abs=1e-9)
         expected = damped_cosine(time, damping, stiffness, c.start_angle[number], c.start_rate[number])
-        assert np.allclose(run.record.yaw_rad, expected, atol=2e-7)  # readings have seven decimals
+        assert np.allclose(run.record.yaw_rad - c.offset, expected, atol=2e-7)  # readings have seven decimals
         sizes.add(run.record.duration)
         rates.add(round(run.record.sample_rate, 6))
     assert len(sizes) == c.runs
     assert len(rates) > 1
     assert {np.sign(run.release_angle) for run in campaign.runs} == {-1.0, 1.0}
     assert c.cn_beta < 0.0
+    assert abs(c.offset) > 0.1
+    steps = np.diff(campaign.runs[0].record.time_s)
+    assert steps.max() > 3.0 * np.median(steps)  # a gap
 
 
 def test_the_noise_of_a_run_and_its_tails_are_as_drawn():
