@@ -43,6 +43,7 @@ _BESIDE = (
     0.6,
     4.0,
 )  # Hz of the similar rig: nearest and farthest that a line is compared with what is beside it
+_MOTION_KNOWN = 1e-3  # of a multiple of the motion's frequency, which changes a little with the amplitude
 _SAME = 1e-6  # cycles per sample
 _CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
 
@@ -162,6 +163,7 @@ class _Pieces:
         duration: of one, s.
         run: the run.
         motion: frequency of the fastest motion, Hz.
+        own: frequency of the run's own motion, Hz.
     """
 
     power: Array
@@ -171,9 +173,10 @@ class _Pieces:
     duration: float
     run: RunData
     motion: float
+    own: float
 
     @classmethod
-    def of(cls, run: RunData, residual: Array, motion: float, length: float) -> _Pieces:
+    def of(cls, run: RunData, residual: Array, motion: float, own: float, length: float) -> _Pieces:
         """Cut into an even number of pieces about as long as given, s: two at least."""
         count = 2 * max(1, round(0.5 * residual.size * run.interval / length))
         size = residual.size // count
@@ -182,12 +185,25 @@ class _Pieces:
         spectra = np.abs(np.fft.rfft(parts, _PADDING * size, axis=1)) ** 2 * (2.0 / float(window @ window))
         halves = spectra.reshape(2, count // 2, -1).sum(axis=1)
         spacing = 1.0 / (_PADDING * size * run.interval)
-        return cls(halves.sum(axis=0), halves, spacing, count, size * run.interval, run, motion)
+        return cls(halves.sum(axis=0), halves, spacing, count, size * run.interval, run, motion, own)
 
     def index(self, frequency: float | Array) -> np.ndarray:
         """The nearest place of the spectrum at which a line of this frequency appears."""
         place = np.round(np.abs(apparent(frequency, self.run.interval)) / self.spacing).astype(int)
         return np.asarray(np.minimum(place, self.power.size - 1))
+
+    def of_motion(self, frequency: float) -> int:
+        """The multiple of the motion's frequency at which a line appears; 0 where it is at none."""
+        place = abs(float(apparent(frequency, self.run.interval)))
+        multiple = round(place / self.own)
+        near = 1.0 / (self.run.reading.size * self.run.interval) + _MOTION_KNOWN * place
+        return multiple if abs(place - multiple * self.own) < near else 0
+
+    def multiples(self, without: int) -> float:
+        """The largest drop of χ² at the multiples of the motion's frequency beyond the third, but for one."""
+        orders = np.arange(np.ceil(_BEYOND_MOTION), 0.5 / self.run.interval / self.own)
+        places = self.index(self.own * orders[orders != without])
+        return float(np.max(self.power[places], initial=0.0))
 
     def shows(self, frequency: float | Array) -> np.ndarray:
         """Whether the run shows a line of this frequency apart from the motion, as `seen`."""
@@ -216,8 +232,8 @@ def mains_lines(fit: Fit) -> list[MainsLine]:
     data = fit.problem.data
     length = max(data.similarity.similar(_PIECE, "s"), _LEAST_PIECE)
     runs = [
-        _Pieces.of(run, residual, fastest(fit), length)
-        for run, residual in zip(data.runs, fit.residuals, strict=True)
+        _Pieces.of(run, residual, fastest(fit), resonance(fit, i), length)
+        for i, (run, residual) in enumerate(zip(data.runs, fit.residuals, strict=True))
     ]
     sought = list(_sought(runs, data.similarity))
     trials = sum(_places(runs, *one) for one in sought)
@@ -280,6 +296,9 @@ def _line(
     earlier, later = np.sum([run.halves[:, at] for run, at in zip(among, places, strict=True)], axis=0)
     spectra = [whole[i] for i in concerned]
     refined = _refined(among, spectra, place)
+    orders = [run.of_motion(refined) for run in among]
+    if all(orders):  # at a multiple of every run's motion, of which none is far above all others
+        floor = max(floor, sum(run.multiples(order) for run, order in zip(among, orders, strict=True)))
     sines = _sines(among, spectra, refined)
     phases = np.zeros(len(runs))
     # a transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))

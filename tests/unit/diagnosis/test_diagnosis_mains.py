@@ -132,6 +132,20 @@ def test_a_mode_that_decays_is_not_a_hum():
     assert nominal_study(with_records(decays(), ring(0.0)), ALL_EFFECTS).hum is not None
 
 
+@pytest.mark.parametrize(("orders", "hums"), [((13, 19), False), ((25,), True)])
+def test_a_line_at_a_multiple_of_the_motion_is_a_hum_only_where_the_motion_has_no_others(orders, hums):
+    """A motion whose 25th multiple is at 50 Hz, and which has the 13th and the 19th as well."""
+    truth = free_decays.Truth(yaw_inertia=16.12 / (4.0 * np.pi) ** 2, mechanical_damping=0.001)
+    data = free_decays.campaign(
+        (Setting(16.12, 0.0),) * 2, truth=truth, noise=NOISE, duration=20.0, rng=np.random.default_rng(8)
+    )
+
+    def add(t, y):
+        return y + sum(1e-3 * np.sin(4.0 * np.pi * k * t + k) for k in {25, *orders})
+
+    assert (nominal_study(with_records(data, add), ALL_EFFECTS).hum is not None) == hums
+
+
 def test_a_hum_that_only_some_sample_rates_show_is_found_and_removed():
     fast = decays()
     slow = decays(rate=50.0, duration=8.0)  # 50 Hz would be at rest
