@@ -154,7 +154,7 @@ def _noise_has_tails(rng: np.random.Generator, c: Conditions) -> Conditions:
 
 
 def _zeros_differ(rng: np.random.Generator, c: Conditions) -> Conditions:
-    """Every run rests at its own zero."""
+    """Every run rests at its own zero, which the campaign states."""
     return replace(c, zero_shift=0.004 * rng.standard_normal(c.runs))
 
 

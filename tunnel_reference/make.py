@@ -112,7 +112,10 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
             WIDTH * length,
         ),
         sensor=SensorProperties(
-            c.sample_rate / c.time_scale if np.all(c.every == 1) else None, c.resolution, c.stated_noise
+            c.sample_rate / c.time_scale if np.all(c.every == 1) else None,
+            c.resolution,
+            c.stated_noise,
+            zero="per_run" if np.any(c.zero_shift) else None,
         ),
         runs=runs,
     )

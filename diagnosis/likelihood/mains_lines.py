@@ -131,23 +131,24 @@ def mains_interval(similarity: Similarity) -> float:
     return 1.0 / (2.0 * similarity.similar(highest, "Hz"))
 
 
-def alike(frequency: float, intervals: list[float]) -> float | None:
-    """The mains' frequency of the other nominal value that all records show at the same place; None where none.
+def alike(frequency: float, harmonic: int, intervals: list[float]) -> float | None:
+    """The mains' frequency of the other nominal value whose line all records show at the same place; None: no such.
 
     Args:
         frequency: of the mains, Hz of the rig as measured.
+        harmonic: multiple of it at which the line is.
         intervals: between samples, s of the rig as measured, by record.
     """
-    rate = 1.0 / intervals[0]
+    rate, line = 1.0 / intervals[0], harmonic * frequency
     for mains in MAINS:
         if abs(frequency - mains) <= _WANDER * mains:
             continue
-        for turned in (frequency, -frequency):
-            other = turned + rate * float(np.round((mains - turned) / rate))
-            shown = [np.abs(apparent(np.array([other, frequency]), interval)) for interval in intervals]
+        for turned in (line, -line):
+            other = turned + rate * float(np.round((harmonic * mains - turned) / rate))
+            shown = [np.abs(apparent(np.array([other, line]), interval)) for interval in intervals]
             same = all(abs(a - b) * h < _SAME for (a, b), h in zip(shown, intervals, strict=True))
-            if same and abs(other - mains) <= _WANDER * mains:
-                return other
+            if same and abs(other / harmonic - mains) <= _WANDER * mains:
+                return other / harmonic
     return None
 
 

@@ -199,9 +199,11 @@ def hum_remarks(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> 
         span = " to ".join(f"{place:.5g}" for place in sorted({min(places), max(places)}))
         what = f"the hum's line of {line:.5g} Hz is above half the sample rate and appears at {span} Hz"
         found.append(Remark(Outcome.NOTED, runs, what, "sample faster to see it where it is"))
-    other = alike(mains, intervals)
+    other = alike(mains, hum.harmonic, intervals)
     if other is not None:
-        what = f"a hum of {other:.5g} Hz would look the same as the one of {mains:.5g} Hz at this sample rate"
+        what = (
+            f"mains of {other:.5g} Hz would show the same line as mains of {mains:.5g} Hz at this sample rate"
+        )
         found.append(Remark(Outcome.NOTED, runs, what, "sample faster to tell them apart"))
     return tuple(found)
 

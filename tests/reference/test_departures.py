@@ -132,6 +132,13 @@ def test_a_hum_is_drawn_where_every_run_shows_it():
                 assert 16.0 <= place <= 0.5 * rate - 2.0
 
 
+def test_a_zero_of_every_run_is_stated_and_a_common_one_is_not():
+    for c, zero in ((RIG, None), (changed("zeros_differ"), "per_run")):
+        draw = CampaignDraw("none", c, (), 1)
+        found = make.as_campaign(read_and_fit(draw, simulate_motions([draw], fine=False)[0]), "c")
+        assert found.sensor.zero == zero
+
+
 def hum(form, seed=0, **changes):
     """A hum of one form of amplitude 1 in records at rest without noise, and its conditions."""
     c = replace(RIG, duration=20.0, noise_std=0.0, resolution=1e-12, zero=0.0, **changes)
