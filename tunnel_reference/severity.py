@@ -104,7 +104,8 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
         read = term.law(Reading(values, motion, conditions, np.random.default_rng(0)), term.params)
         drive = replace(drive, values=read[: draw.conditions.samples])
         draw = replace(draw, conditions=replace(draw.conditions, drive=drive))
-    fit = (fit_nominal if conditions.drive is None else fit_driven)(draw.conditions, readings)
+    about_one_zero = readings - conditions.zero_shift
+    fit = (fit_nominal if conditions.drive is None else fit_driven)(draw.conditions, about_one_zero)
     power = fit.residual_power / conditions.noise_power
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
 
