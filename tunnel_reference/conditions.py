@@ -107,7 +107,7 @@ class Conditions:
         every: of how many samples one is written.
         time_start: time stamp of the first sample, s.
         gaps: stretches of every run that are not written, from and to, shares of the duration, shape (gaps, 2).
-        offset: angle that is added to all readings as written, rad.
+        offset: angle that is subtracted from all readings as written, rad.
     """
 
     spring_stiffness: Array

@@ -93,7 +93,7 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
             id=f"r{number + 1:02d}",
             record=Record(
                 np.round((start[number] + stamps[c.written(number)]) * c.time_scale, 11),
-                np.round(c.offset + simulated.readings[c.written(number), number], 7),
+                np.round(simulated.readings[c.written(number), number] - c.offset, 7),
             ),
             wind_speed=float(c.wind_speed[number]) * speed,
             spring_stiffness=float(c.spring_stiffness[number]) * c.moment_scale,

@@ -95,7 +95,7 @@ def test_all_together_are_the_motion_of_the_stated_physics():
         time = run.record.time_s - start
         assert time[0] == pytest.approx(0.0, abs=1e-9)
         expected = damped_cosine(time, damping, stiffness, c.start_angle[number], c.start_rate[number])
-        assert np.allclose(run.record.yaw_rad - c.offset, expected, atol=2e-7)  # readings have seven decimals
+        assert np.allclose(run.record.yaw_rad + c.offset, expected, atol=2e-7)  # readings have seven decimals
         sizes.add(run.record.duration)
         rates.add(round(run.record.sample_rate, 6))
     assert len(sizes) == c.runs
