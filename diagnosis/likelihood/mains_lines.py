@@ -50,17 +50,22 @@ _CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
 
 @dataclass(frozen=True, eq=False)
 class MainsLine(Line):
-    """A line at a multiple of the mains' frequency, which is the parameter.
+    """A line at a multiple of the mains' frequency.
 
     Args:
+        parameter: frequency of the mains, Hz.
+        drop: of χ² when the line is removed from the runs concerned, dimensionless.
+        contrast: ratio of the drop at the line to the greatest beside it, dimensionless.
+        amplitude: of the line at the sensor, rad, root mean square over the runs concerned.
+        phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
         harmonic: the multiple.
         concerned: numbers of the runs in which it is sought.
         freedom: twice the number of pieces of records whose powers are added.
-        trials: independent places at which lines of the mains were sought, all of them together.
-        powers: drop of χ² of every run concerned, shape (concerned,).
+        trials: number of independent places at which lines of the mains were sought, all of them together.
+        powers: drop of χ² of every run concerned, dimensionless, shape (concerned,).
         pieces: of every run concerned, shape (concerned,).
         later: power in the later halves of these runs over that in the earlier halves, dimensionless.
-        evidence: drop of χ² beyond what chance gives, at all multiples of the frequency that are seen.
+        evidence: drop of χ² beyond chance, at all multiples of the frequency that are seen, dimensionless.
         folds: how often the line is folded, in the run of the lowest sample rate.
     """
 
