@@ -23,6 +23,7 @@ from diagnosis.diagnosable import (
     refuse_undiagnosable,
 )
 from diagnosis.noise.gap import noise_remarks
+from diagnosis.noise.mains import hum_remarks
 from diagnosis.own_joint import investigate_joint, lead_words, recorded, with_law
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
@@ -93,7 +94,11 @@ def diagnose(
         assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
         sized = replace(
             assembled,
-            remarks=(*chosen.remarks, *noise_remarks(study.noise, study.trend, study.test)),
+            remarks=(
+                *chosen.remarks,
+                *noise_remarks(study.noise, study.trend, study.test),
+                *hum_remarks(study.campaign, study.hum, study.similarity),
+            ),
             sizes=cause_sizes(study) if study.named else (),
             data=chosen.examined,
         )

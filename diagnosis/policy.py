@@ -73,6 +73,9 @@ NOISE_EXPLAINS_UP_TO = 1.0
 #: Drop of χ² at the hum's line over the largest beside it, all runs together. Judgement: rods and corners ring
 #: too.
 HUM_CONTRAST = 4.0
+#: Least power of a hum's line in one half of the runs over that in the other half. Judgement: what an amplifier or
+#: a lamp lets in may change by a factor of two; a mode that is excited at the release loses more.
+HUM_STEADY = 0.25
 #: Runs at one wind speed whose frequencies differ by more than this factor have different springs: stiffnesses a
 #: fifth apart. Judgement: what depends on amplitude changes a frequency gradually, and seldom as much.
 SAME_SPRING = 1.1

@@ -77,8 +77,8 @@ class Conditions:
         wind_speed: stated V, m/s.
         release_angle: nominal, rad.
         start_angle: true release angle (at rest), rad.
-        air_density: ρ, kg/m³.
-        duration: of every run, s.
+        air_density: ρ, kg/m³, the same in all runs or by run.
+        duration: of every run as simulated, s.
         yaw_inertia: Izz, kg m².
         mechanical_damping: Cr, N m s/rad.
         cn_beta: Cnβ, 1/rad.
@@ -100,13 +100,21 @@ class Conditions:
         moment_scale: moments as written over moments as simulated. All other moments here are as simulated.
         drive: the input of driven runs; None where all runs are free decays.
         start_rate: of the motion, rad/s.
+        noise_scale: a run's own noise over that of the campaign.
+        noise_tails: degrees of freedom of Student's t, which the white noise follows; 0: it is normal.
+        zero_shift: a run's own zero less that of the campaign, rad.
+        kept: share of the duration that is written.
+        every: of how many samples one is written.
+        time_start: time stamp of the first sample, s.
+        gaps: stretches of every run that are not written, from and to, shares of the duration, shape (gaps, 2).
+        offset: angle that is subtracted from all readings as written, rad.
     """
 
     spring_stiffness: Array
     wind_speed: Array
     release_angle: Array
     start_angle: Array
-    air_density: float
+    air_density: float | Array
     duration: float
     yaw_inertia: float
     mechanical_damping: float
@@ -129,6 +137,14 @@ class Conditions:
     moment_scale: float = 1.0
     drive: Input | None = None
     start_rate: Array = field(default_factory=lambda: np.zeros(1))
+    noise_scale: Array = field(default_factory=lambda: np.ones(1))
+    noise_tails: float = 0.0
+    zero_shift: Array = field(default_factory=lambda: np.zeros(1))
+    kept: Array = field(default_factory=lambda: np.ones(1))
+    every: NDArray[np.int64] = field(default_factory=lambda: np.ones(1, np.int64))
+    time_start: Array = field(default_factory=lambda: np.zeros(1))
+    gaps: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    offset: float = 0.0
 
     @property
     def runs(self) -> int:
@@ -192,8 +208,16 @@ class Conditions:
 
     @property
     def noise_power(self) -> float:
-        """Variance of noise and quantisation, rad²."""
-        return self.noise_std**2 + self.resolution**2 / 12.0
+        """Variance of noise and quantisation, mean over the runs, rad²."""
+        return float(self.noise_std**2 * np.mean(self.noise_scale**2) + self.resolution**2 / 12.0)
+
+    def written(self, run: int) -> NDArray[np.int64]:
+        """The samples of a run that are written, shape (n,)."""
+        kept, every = (np.broadcast_to(value, (self.runs,))[run] for value in (self.kept, self.every))
+        samples = np.arange(0, round(float(kept) * self.samples), int(every))
+        share = samples / self.samples
+        missing = np.any((share[:, None] > self.gaps[:, 0]) & (share[:, None] < self.gaps[:, 1]), axis=1)
+        return np.asarray(samples[~missing], np.int64)
 
     @property
     def wind_off_omega(self) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Conditions
+from tunnel_reference.departures import draw_departures
 from tunnel_reference.forms import DRIVEN_FAMILIES, FAMILIES, forms_of
 from tunnel_reference.inputs import draw_inputs
 from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
@@ -16,7 +17,7 @@ from tunnel_reference.outside import LAW_FORMS, OUTSIDE_FORMS
 _TIME_SCALE = 30.0  # periods from 1/30 of the standard rig's to 30 times as long
 _MOMENT_SCALE = 100.0
 _FASTER_AIR = 4.0  # at most 100 m/s, where the standard rig has 25 m/s
-_MAINS_SCALES = (0.3, 9.0)  # between these the mains lie above the motion and below half the sample rate
+_MAINS_SCALES = (0.3, 8.0)  # between these the mains lie above the motion and below half of 1000 Hz
 
 CIRCUMSTANCES = ("few_runs", "coloured", "uneven_stamps", "scaled")
 
@@ -142,7 +143,9 @@ class Mixture:
         rare: probability that any other form is a rare one (0 for tuning sets).
         variety: probability of another scale, of few runs, of coloured noise and of uneven time stamps, each.
         small: probability of a small effect beside those that matter, and of a second one beside the first.
-        certain: circumstances that every campaign has, of `tunnel_reference.draw.CIRCUMSTANCES`.
+        certain: circumstances that every campaign has, of `tunnel_reference.draw.CIRCUMSTANCES`, and assumptions
+            that all of them break, of `tunnel_reference.departures.DEPARTURES`.
+        departures: probability that an assumption is broken, each.
         driven: whether all runs are driven, or some.
     """
 
@@ -152,6 +155,7 @@ class Mixture:
     small: float = 0.25
     certain: tuple[str, ...] = ()
     driven: bool = False
+    departures: float = 0.0
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -179,12 +183,12 @@ def draw_campaign(
     if names:
         added = 0 if rng.random() >= mixture.small else 1 + int(rng.random() < mixture.small)
         small = draw_families(rng, number + added, names, known)[number:]
+    mains = "mains_hum" in (*names, *small)
     conditions = draw_circumstances(
-        rng,
-        draw_conditions(rng),
-        probability=mixture.variety,
-        mains="mains_hum" in (*names, *small),
-        certain=mixture.certain,
+        rng, draw_conditions(rng), probability=mixture.variety, mains=mains, certain=mixture.certain
+    )
+    conditions = draw_departures(
+        rng, conditions, probability=mixture.departures, mains=mains, certain=mixture.certain
     )
     if mixture.driven:
         # The law of structural damping is that of a spring with a fixed root.

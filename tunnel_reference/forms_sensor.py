@@ -141,23 +141,36 @@ def _hum(p: float, e: Extra, c: Conditions) -> dict[str, float | Array]:
     """Amplitude, frequency, and phases drawn per run."""
     rng = np.random.default_rng(int(e["seed"]))
     return {"amplitude": p, "frequency": e["frequency"], "phase": rng.uniform(0, 2 * np.pi, c.runs),
-            "third": e["third"], "third_phase": rng.uniform(0, 2 * np.pi, c.runs), "slow": 0.4}  # fmt: skip
+            "third": e["third"], "third_phase": rng.uniform(0, 2 * np.pi, c.runs), "slow": 0.4,
+            "seed": e["seed"], "apart": _APART * c.time_scale, "step": _STEP_OF_MAINS * c.time_scale}  # fmt: skip
 
 
-def _hum_draw(off: float, third: float) -> Draw:
-    """Seed, frequency within ``off`` of 50 Hz as written, and up to ``third`` of third harmonic."""
-    return lambda g, c: {"seed": float(g.integers(0, 2**31)),
-                         "frequency": (50.0 + g.uniform(-off, off)) * c.time_scale,
-                         "third": g.uniform(0.3, 1.0) * third}  # fmt: skip
+_WANDER = 0.5  # Hz: large grids stay within it (EN 50160; NERC PRC-024)
+_APART, _STEP_OF_MAINS = 0.02, 0.002  # Hz: of a large grid within minutes, and within half a second
+
+
+def _hum_draw(third: float) -> Draw:
+    """Seed, frequency within a grid's wander of 50 or 60 Hz as written, and up to ``third`` of third harmonic."""
+
+    def draw(g: np.random.Generator, c: Conditions) -> dict[str, float]:
+        seed = int(g.integers(0, 2**31))
+        mains = 50.0 if np.random.default_rng([seed, 1]).random() < 0.5 else 60.0
+        return {"seed": float(seed), "frequency": (mains + g.uniform(-_WANDER, _WANDER)) * c.time_scale,
+                "third": g.uniform(0.3, 1.0) * third}  # fmt: skip
+
+    return draw
 
 
 _HUM = (
-    Form("mains_hum", "line", T, "a, rad", 0.001,
-         reading(r.hum, Order.ADDED, _hum), draw=_hum_draw(0.0, 0.0)),
+    Form("mains_hum", "line", T, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum), draw=_hum_draw(0.0)),
     Form("mains_hum", "third_harmonic", C, "a, rad", 0.001, reading(r.hum, Order.ADDED, _hum),
-         draw=_hum_draw(0.03, 0.3)),
+         draw=_hum_draw(0.3)),
+    Form("mains_hum", "second_harmonic", C, "a, rad", 0.001, reading(r.hum_harmonic, Order.ADDED, _hum),
+         draw=_hum_draw(0.0)),
     Form("mains_hum", "bursts", R, "a, rad", 0.001, reading(r.hum_bursts, Order.ADDED, _hum),
-         draw=_hum_draw(0.05, 0.0)),
+         draw=_hum_draw(0.0)),
+    Form("mains_hum", "wandering", R, "a, rad", 0.001, reading(r.hum_wandering, Order.ADDED, _hum),
+         draw=_hum_draw(0.0)),
 )  # fmt: skip
 
 

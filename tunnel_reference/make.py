@@ -77,24 +77,27 @@ def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> li
 def as_campaign(simulated: Simulated, name: str) -> Campaign:
     """The campaign without its truth: stated conditions and readings, in the scales of its rig."""
     c = simulated.draw.conditions
-    time = np.round(c.time, 9) if c.stamp_step == 0.0 else np.round(c.time / c.stamp_step) * c.stamp_step
-    time = np.round(time * c.time_scale, 11)
+    stamps = np.round(c.time, 9) if c.stamp_step == 0.0 else np.round(c.time / c.stamp_step) * c.stamp_step
+    density, start = (np.broadcast_to(value, (c.runs,)) for value in (c.air_density, c.time_start))
     length, speed = c.length_scale, c.length_scale / c.time_scale
     drives: list[Drive | None] = [None] * c.runs
     if c.drive is not None:
         column = cast(InputColumn, c.drive.column)
         scale = c.moment_scale if column == "moment_nm" else 1.0
         gain = c.drive.gain * c.moment_scale if column == "drive" and c.drive.stated else None
-        for run in np.flatnonzero(c.drive.driven):
+        for run in np.flatnonzero(c.drive.driven).tolist():
             hold: Hold = "zero" if c.drive.held[run] else "linear"
-            drives[run] = Drive(column, c.drive.values[:, run] * scale, hold, gain)
+            drives[run] = Drive(column, c.drive.values[c.written(run), run] * scale, hold, gain)
     runs = tuple(
         Run(
             id=f"r{number + 1:02d}",
-            record=Record(time, np.round(simulated.readings[:, number], 7)),
+            record=Record(
+                np.round((start[number] + stamps[c.written(number)]) * c.time_scale, 11),
+                np.round(simulated.readings[c.written(number), number] - c.offset, 7),
+            ),
             wind_speed=float(c.wind_speed[number]) * speed,
             spring_stiffness=float(c.spring_stiffness[number]) * c.moment_scale,
-            air_density=round(c.air_density, 4),
+            air_density=round(float(density[number]), 4),
             release_angle=float(c.release_angle[number]) if drives[number] is None else None,
             drive=drives[number],
         )
@@ -108,7 +111,12 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
             REFERENCE_LENGTH * length,
             WIDTH * length,
         ),
-        sensor=SensorProperties(c.sample_rate / c.time_scale, c.resolution, c.stated_noise),
+        sensor=SensorProperties(
+            c.sample_rate / c.time_scale if np.all(c.every == 1) else None,
+            c.resolution,
+            c.stated_noise,
+            zero="per_run" if np.any(c.zero_shift) else None,
+        ),
         runs=runs,
     )
 
@@ -128,7 +136,7 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
         "schema_version": SCHEMA_VERSION,
         "yaw_inertia": c.yaw_inertia * c.moment_scale * c.time_scale**2,
         "mechanical_damping": c.mechanical_damping * c.moment_scale * c.time_scale,
-        "air_density": c.air_density,
+        "air_density": np.asarray(c.air_density).tolist(),
         "cn_beta": c.cn_beta,
         "cn_r": c.cn_r,
         "noise_std": c.noise_std,

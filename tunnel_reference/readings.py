@@ -76,7 +76,11 @@ def read_motion(
     Returns:
         The reading, shape (samples, runs), rad.
     """
-    noise = conditions.noise_std * rng.standard_normal(motion.angle.shape)
+    white = rng.standard_normal(motion.angle.shape)
+    if conditions.noise_tails > 0.0:  # of unit variance
+        tails = conditions.noise_tails
+        white = white * np.sqrt((tails - 2.0) / rng.chisquare(tails, white.shape))
+    noise = conditions.noise_std * white
     if conditions.coloured_share > 0.0:
         n = noise.shape[0]  # the noise is mixed with noise of a first-order spectrum; the variance remains
         frequency = np.fft.rfftfreq(n, 1.0 / conditions.sample_rate)
@@ -99,7 +103,7 @@ def read_motion(
     ordered = sorted(terms, key=lambda t: t.order)
     for term in (t for t in ordered if t.order < Order.NOISE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
-    value = value + conditions.zero + noise
+    value = value + conditions.zero + conditions.zero_shift + conditions.noise_scale * noise
     for term in (t for t in ordered if Order.NOISE <= t.order < Order.LINE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
     if not any(t.order is Order.ROUNDING for t in ordered):
@@ -221,6 +225,36 @@ def hum(r: Reading, p: Params) -> Array:
     return r.value + p["amplitude"] * (
         np.sin(arg + p["phase"]) + p["third"] * np.sin(3.0 * arg + p["third_phase"])
     )
+
+
+def hum_harmonic(r: Reading, p: Params) -> Array:
+    """Adds a sin(4πft + φ): what a rectifier or a lamp lets through."""
+    return r.value + p["amplitude"] * np.sin(
+        4.0 * np.pi * p["frequency"] * r.conditions.time[:, None] + p["phase"]
+    )
+
+
+_WANDERS_EACH = 0.5  # s, between two steps of the mains' frequency
+
+
+def hum_wandering(r: Reading, p: Params) -> Array:
+    """Hum whose frequency differs by run and wanders within it, and whose amplitude differs by run.
+
+    The frequency is that of a run plus a random walk with steps of ``step`` (Hz) twice a second.
+    """
+    t = r.conditions.time
+    out = np.array(r.value)
+    for run in range(out.shape[1]):
+        rng = np.random.default_rng([int(p["seed"][run]), run])
+        each = _WANDERS_EACH * r.conditions.time_scale**-1
+        knots = np.arange(int(t[-1] / each) + 3) * each
+        own = p["frequency"][run] + p["apart"][run] * rng.standard_normal()
+        frequency = own + p["step"][run] * np.cumsum(rng.standard_normal(knots.size))
+        turns = np.concatenate([[0.0], np.cumsum(frequency[:-1] * each)])
+        size = p["amplitude"][run] * np.exp(0.3 * rng.standard_normal())
+        phase = 2.0 * np.pi * np.interp(t, knots, turns) + p["phase"][run]
+        out[:, run] += size * np.sin(phase)
+    return out
 
 
 def hum_bursts(r: Reading, p: Params) -> Array:

@@ -29,6 +29,7 @@ _SUBSTEPS = 10
 _ROD_SUBSTEPS = 20
 _COARSE, _ROD_COARSE = 1, 10
 _SHORT = 10.0
+_RATE = 1000.0  # Hz, at which the numbers of steps are those above
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +70,15 @@ def simulate_motions(draws: Sequence[CampaignDraw], *, fine: bool = True) -> lis
     """
     bound = [bind_effects(d) for d in draws]
     motions: list[Motion | None] = [None] * len(draws)
-    batches: dict[tuple[bool, bool], list[int]] = {}  # by rod and by short or long runs: efficient together
+    # by rod, by short or long runs, which are efficient together, and by sample rate
+    batches: dict[tuple[bool, bool, float], list[int]] = {}
     for number, (c, _) in enumerate(bound):
-        batches.setdefault((c.rod is not None, c.duration > _SHORT), []).append(number)
-    for (flexible, _), numbers in batches.items():
+        batches.setdefault((c.rod is not None, c.duration > _SHORT, c.sample_rate), []).append(number)
+    for (flexible, _, rate), numbers in batches.items():
         substeps = (
             (_ROD_SUBSTEPS if flexible else _SUBSTEPS) if fine else (_ROD_COARSE if flexible else _COARSE)
         )
+        substeps = max(1, round(substeps * _RATE / rate))  # steps of equal length
         terms = [[t for t in bound[i][1] if isinstance(t, Term)] for i in numbers]
         for i, motion in zip(
             numbers, integrate([bound[i][0] for i in numbers], terms, substeps=substeps), strict=True
@@ -101,7 +104,8 @@ def read_and_fit(draw: CampaignDraw, motion: Motion) -> Simulated:
         read = term.law(Reading(values, motion, conditions, np.random.default_rng(0)), term.params)
         drive = replace(drive, values=read[: draw.conditions.samples])
         draw = replace(draw, conditions=replace(draw.conditions, drive=drive))
-    fit = (fit_nominal if conditions.drive is None else fit_driven)(draw.conditions, readings)
+    about_one_zero = readings - conditions.zero_shift
+    fit = (fit_nominal if conditions.drive is None else fit_driven)(draw.conditions, about_one_zero)
     power = fit.residual_power / conditions.noise_power
     return Simulated(draw, readings, float(np.mean(power)) - 1.0, power - 1.0, fit.residual)
 

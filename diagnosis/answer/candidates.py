@@ -85,8 +85,7 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         Answers, ``none`` and ``unknown`` among them: the answer, then the most probable ones. Their probabilities
         sum to 1.
     """
-    # a model's misfit has as many times the excess in block means as in samples
-    block = study.nominal.problem.data.runs[0].block
+    block = study.nominal.problem.data.mean_block
     excess = study.nominal.excess / block
     if not study.causes:
         return (

@@ -411,6 +411,7 @@ def score_set(
                     "rare": float(made_with["rare"]),
                     "variety": float(made_with.get("variety", 0.0)),
                     "small": float(made_with.get("small", 0.0)),
+                    "departures": float(made_with.get("departures", 0.0)),
                 }
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"

@@ -149,6 +149,7 @@ def make_blind(
                 "variety": mixture.variety,
                 "small": mixture.small,
                 "driven": mixture.driven,
+                "departures": mixture.departures,
             },
             "truths": truths,
         }

@@ -15,16 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
-_MAINS, _MAINS_WANDER = 50.0, 0.5  # Hz, of the rig as measured
-# Blocks per period of the mains: two, and room for 4 Hz beside the line of the standard rig, 2 (50 + 4)/50, rounded
-# up. It was 2.6 until two simulated records of 2.22 had shown what that missed.
-_NYQUIST = 2.2
-_BEYOND_MOTION = 4.0  # times the motion's frequency: beyond its third harmonic
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,41 +114,6 @@ def by_moment(fit: Fit) -> Data:
 
 # Of a random moment's response per interval, in variances of white noise.
 _POWERS = np.geomspace(1e-12, 1e12, 49)
-
-
-def mains_interval(similarity: Similarity) -> float:
-    """Longest interval between blocks at which the mains can be seen, s."""
-    return 1.0 / (_NYQUIST * similarity.similar(_MAINS, "Hz"))
-
-
-def mains_line(fit: Fit) -> Line | None:
-    """The strongest line near 50 Hz common to all runs.
-
-    None where the sampling is too slow to see it, or the motion too fast to distinguish it.
-    """
-    data = fit.problem.data
-    mains, around = (data.similarity.similar(value, "Hz") for value in (_MAINS, _MAINS_WANDER))
-    fast_enough = all(run.interval < mains_interval(data.similarity) for run in data.runs)
-    if not fast_enough or mains < _BEYOND_MOTION * REFERENCE_FREQUENCY:
-        return None
-    spectra = smooth_spectra(fit)
-    grid = np.arange(mains - around, mains + around, 0.005)
-    total = np.sum([s.power(grid) for s in spectra], axis=0)
-    best = float(grid[np.argmax(total)])
-    sides = np.arange(best - 4.0, best - 0.6, 0.02), np.arange(best + 0.6, best + 4.0, 0.02)
-    beside = np.concatenate(sides)
-    floor = float(np.max(np.sum([s.power(beside) for s in spectra], axis=0)))
-    drop = float(total.max())
-    gain = [block_gain(best, run) * run.response(best) for run in data.runs]
-    scale = [np.sqrt(run.noise_variance) / g for run, g in zip(data.runs, gain, strict=True)]
-    sines = [s.at(best) * k for s, k in zip(spectra, scale, strict=True)]
-    amplitude = float(np.sqrt(np.mean([np.abs(sine) ** 2 for sine in sines])))
-    amplitude *= float(
-        np.sqrt(1.5)
-    )  # the smoothed transform keeps the noise's level: lines lose a third of it
-    # transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
-    phases = np.array([float(np.angle(sine)) + np.pi / 2 for sine in sines])
-    return Line(best, drop, drop / max(floor, 1e-9), amplitude, phases)
 
 
 def smooth_spectra(fit: Fit) -> list[ResidualSpectrum]:

@@ -374,6 +374,12 @@ class Data:
             return ()
         return departure(self.law).program({}, {"b": "angle", "r": "rate"})
 
+    @property
+    def mean_block(self) -> float:
+        """Samples per block on average: a misfit has as many times the excess in block means as in samples."""
+        blocks = sum(run.reading.size for run in self.runs)
+        return sum(run.reading.size * run.block for run in self.runs) / blocks
+
     @cached_property
     def swing(self) -> float:
         """The largest angle of the motion from its middle, rad, also where the readings are rates."""

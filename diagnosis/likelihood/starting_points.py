@@ -10,10 +10,11 @@ from functools import partial
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, clip, damped_step, normal_equations
+from diagnosis.likelihood.mains_lines import mains_line
 from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
 from diagnosis.likelihood.per_run import PerRunParameters, excited, ringing, skip
 from diagnosis.likelihood.problem import Point, Problem
-from diagnosis.likelihood.residuals import CHANNELS, Line, mains_line, misfit, shedding_line
+from diagnosis.likelihood.residuals import CHANNELS, Line, misfit, shedding_line
 from diagnosis.likelihood.run_data import Data, RunData, departure
 from diagnosis.policy import GROSS_MISFIT
 from identification.signal.decay_fit import Reading, fit_run

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,17 +11,33 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.mains_lines import (
+    HARMONICS,
+    MainsLine,
+    alike,
+    apparent,
+    mains_lines,
+    shown_multiples,
+)
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
-from diagnosis.likelihood.residuals import mains_line, smooth_spectra
 from diagnosis.noise.sensor_noise import SmoothCurve
-from diagnosis.policy import FALSE_ALARM_RATE, HUM_CONTRAST, NOISE_FALSE_ALARM_SHARE, THROUGHOUT
+from diagnosis.policy import (
+    AS_MUCH,
+    FALSE_ALARM_RATE,
+    HUM_CONTRAST,
+    HUM_STEADY,
+    NOISE_FALSE_ALARM_SHARE,
+    THROUGHOUT,
+)
+from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
-_HARMONICS = 5
 #: Fastest swelling of its amplitude that is sought, Hz.
 _SWELL_UP_TO = 0.6
 _KNOTS = 12.0  # per cycle of the motion: a curve follows what is slower than six times the motion
+_NEAR = 0.25  # of 1/duration, within which the frequency of a line found in the whole records is refined
 
 
 @dataclass(frozen=True)
@@ -29,11 +45,12 @@ class Hum:
     """A hum found.
 
     Args:
-        frequency: Hz.
-        amplitude: of the fundamental, rad, root mean square over the runs.
+        frequency: of the mains, Hz.
+        amplitude: of its strongest line, rad, root mean square over the runs that show it.
         std: of the amplitude, rad.
         frequency_std: standard deviation of the frequency, Hz; None where the amplitude is not above the noise.
         excess: what it adds to the mean squared residual over the noise variance, a ratio.
+        harmonic: the multiple of the frequency at which the strongest line is.
     """
 
     frequency: float
@@ -41,119 +58,204 @@ class Hum:
     std: float
     frequency_std: float | None
     excess: float
+    harmonic: int = 1
 
 
 def find_hum(nominal: Fit) -> float | None:
-    """The frequency of a hum in the residuals of the nominal fit, Hz; None where there is none beyond chance.
+    """The frequency of the mains whose hum is in the residuals of the nominal fit, Hz; None where there is none.
+
+    It is sought near 50 and 60 Hz and their multiples at `FALSE_ALARM_RATE`, all of them together. Where several
+    frequencies explain the same lines as sampled, it is the one of least folding, then that of the lowest multiple.
+    """
+    found = [line for line in mains_lines(nominal) if _is_hum(line)]
+    if not found:
+        return None
+    most = max(line.evidence for line in found)
+    return min((line for line in found if line.evidence >= (1.0 - AS_MUCH) * most), key=_plainness).parameter
+
+
+def _plainness(line: MainsLine) -> tuple[int, int]:
+    """How often a line is folded, and its multiple."""
+    return line.folds, line.harmonic
+
+
+def _is_hum(line: MainsLine) -> bool:
+    """Whether a line is beyond chance, beyond what is beside it, in most runs, and in their later halves as well.
 
     A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
-    therefore rejected.
+    therefore rejected. A mode that is excited at the release decays.
     """
-    line = mains_line(nominal)
-    if line is None or line.contrast < HUM_CONTRAST:
-        return None
-    by_chance = float(chdtri(2, FALSE_ALARM_RATE))
-    shown = [spectrum.power(line.parameter) > by_chance for spectrum in smooth_spectra(nominal)]
-    return line.parameter if np.mean(shown) >= THROUGHOUT else None
+    chance = float(chdtri(line.freedom, FALSE_ALARM_RATE / line.trials))
+    shown = line.powers > chdtri(2.0 * line.pieces, FALSE_ALARM_RATE)
+    return (
+        line.drop > chance
+        and line.contrast >= HUM_CONTRAST
+        and float(np.mean(shown)) >= THROUGHOUT
+        and HUM_STEADY <= line.later <= 1.0 / HUM_STEADY
+    )
 
 
-def refine_frequency(campaign: Campaign, frequency: float) -> float:
+def refine_frequency(campaign: Campaign, frequency: float, motion: float = REFERENCE_FREQUENCY) -> float:
     """The frequency at which a sine and its harmonics remove most power from all records, Hz.
 
     Args:
-        frequency: of the mains, Hz, to within 0.02 Hz.
+        frequency: of the mains, Hz, to within a quarter of a line's width.
+        motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is sought.
     """
-    cleared = [_without_motion(run.record, np.hanning(run.record.time_s.size))[1] for run in campaign.runs]
+    shown = _showing(campaign, frequency, motion)
+    cleared = [_without_motion(r, np.hanning(r.time_s.size))[1] for r, multiples in shown if multiples]
 
     def left(trial: float) -> float:
         total = 0.0
-        for run, reading in zip(campaign.runs, cleared, strict=True):
-            wave = np.exp(-2j * np.pi * trial * (run.record.time_s - run.record.time_s[0]))
-            turn, power = wave, 0.0
-            for _ in _harmonics(run.record, trial):
-                power += float(abs(reading @ turn) ** 2)
+        for (record, multiples), reading in zip((one for one in shown if one[1]), cleared, strict=True):
+            wave = np.exp(-2j * np.pi * trial * (record.time_s - record.time_s[0]))
+            turn = np.ones_like(wave)
+            for multiple in range(1, max(multiples) + 1):
                 turn = turn * wave
-            total += power
+                total += float(abs(reading @ turn) ** 2) if multiple in multiples else 0.0
         return -total
 
+    near = _NEAR / max((record.duration for record, multiples in shown if multiples), default=1.0)
     found = minimize_scalar(
-        left, bounds=(frequency - 0.02, frequency + 0.02), method="bounded", options={"xatol": 1e-4}
+        left, bounds=(frequency - near, frequency + near), method="bounded", options={"xatol": 5e-3 * near}
     )
     return float(found.x)
 
 
-def remove_hum(campaign: Campaign, frequency: float, variance: float) -> tuple[Campaign, Hum]:
-    """Remove a hum and its harmonics from every record.
+def remove_hum(
+    campaign: Campaign, frequency: float, variance: float, motion: float = REFERENCE_FREQUENCY
+) -> tuple[Campaign, Hum]:
+    """Remove a hum and its harmonics from every record, as far as the record shows them apart from the motion.
 
     Args:
-        frequency: of the fundamental, Hz.
+        frequency: of the fundamental, Hz, seen in one record or more.
         variance: of the noise of one sample, rad².
+        motion: frequency of the fastest motion, Hz, beyond whose harmonics a line is removed.
 
     Returns:
         The campaign without it, and the hum that was removed. The standard deviation of its frequency is that of
-        the peak of all records' windowed spectra under white noise, of the fundamental only. Of one record of
+        the peak of all records' windowed spectra under white noise, of the strongest line only. Of one record of
         window w the variance of ω is 2 S² Σw²τ²/(a Σwτ²)², τ from its middle: with a flat window that is the bound
         24 S²/(a² n T²) (Rife & Boorstyn, IEEE Trans. Inf. Theory 20 (1974) 591, doi 10.1109/TIT.1974.1055282).
     """
     from scipy.signal.windows import tukey  # only here: slow to load
 
-    cleaned, squares, powers = [], [], []
+    shown = _showing(campaign, frequency, motion)
+    harmonic = _strongest(shown, frequency)
+    swells = _swells(shown, frequency, harmonic, variance)
+    cleaned, squares, powers, counts = [], [], [], []
     curvature, scatter = 0.0, 0.0
-    gained, freedom = 0.0, 0  # whether the hum's amplitude varies within the runs beyond chance
-    for record in [run.record for run in campaign.runs]:
-        if int(2.0 * _SWELL_UP_TO * (record.time_s[-1] - record.time_s[0])) < 1:
+    for run, (record, multiples) in zip(campaign.runs, shown, strict=True):
+        if not multiples:
+            cleaned.append(run)
+            powers.append(0.0)
             continue
-        steady, swelling = _lines(record, frequency), _swell(record, frequency)
-        window = np.hanning(record.time_s.size)
-        clear, reading = _without_motion(record, window)
-        both = np.linalg.qr(clear(np.column_stack([steady, swelling])))[0][:, steady.shape[1] :]
-        # windowed white noise has the window's mean square
-        share = both.T @ (both * window[:, None] ** 2)
-        found = both.T @ reading
-        gained += float(found @ np.linalg.solve(share, found)) / variance
-        freedom += swelling.shape[1]
-    swells = freedom > 0 and gained > float(chdtri(freedom, NOISE_FALSE_ALARM_SHARE * FALSE_ALARM_RATE))
-    for run in campaign.runs:
-        record = run.record
         flat = np.hanning(record.time_s.size)
-        design = np.column_stack(
-            [_lines(record, frequency), *([_swell(record, frequency)] if swells else [])]
-        )
+        swelling = [_swell(record, harmonic * frequency)] if swells and harmonic in multiples else []
+        design = np.column_stack([_lines(record, frequency, multiples), *swelling])
         # a window that keeps the ends, where a swelling hum may be strongest
         clear, reading = _without_motion(record, tukey(record.time_s.size, 0.3) if swells else flat)
         coefficients = np.linalg.lstsq(clear(design), reading, rcond=None)[0]
         wave: Array = design @ coefficients
         cleaned.append(dataclasses.replace(run, record=Record(record.time_s, record.yaw_rad - wave)))
-        squares.append(float(np.hypot(coefficients[0], coefficients[1])) ** 2)
         powers.append(float(np.mean(wave**2)))
+        if harmonic not in multiples:
+            continue
+        first = 2 * multiples.index(harmonic)
+        squares.append(float(np.hypot(coefficients[first], coefficients[first + 1])) ** 2)
+        counts.append(record.time_s.size)
         time = record.time_s - record.time_s.mean()
         curvature += float(flat.sum() * (flat @ time**2))
         scatter += float(flat.sum() ** 2 * (flat**2 @ time**2))
-    count = sum(run.record.yaw_rad.size for run in campaign.runs) / len(campaign.runs)
+    count = sum(counts) / len(counts)
     noise = 4.0 * variance / count  # of a squared amplitude
     amplitude = float(np.sqrt(max(sum(squares) / len(squares) - noise, 0.0)))
     std = float(np.sqrt(2.0 * variance / (count * len(squares))))
     frequency_std = None
     if amplitude > 0.0:
-        frequency_std = float(np.sqrt(2.0 * variance * scatter) / (amplitude * curvature * 2.0 * np.pi))
-    hum = Hum(frequency, amplitude, std, frequency_std, float(np.mean(powers)) / variance)
+        turns = amplitude * curvature * 2.0 * np.pi * harmonic
+        frequency_std = float(np.sqrt(2.0 * variance * scatter) / turns)
+    hum = Hum(frequency, amplitude, std, frequency_std, float(np.mean(powers)) / variance, harmonic)
     return dataclasses.replace(campaign, runs=tuple(cleaned)), hum
 
 
-def _harmonics(record: Record, frequency: float) -> list[int]:
-    """The multiples of a frequency that a record resolves."""
-    return [k for k in range(1, _HARMONICS + 1) if k * frequency < 0.48 * record.sample_rate]
+def hum_remarks(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> tuple[Remark, ...]:
+    """What the user should know of a hum: which line is stated, and what the sample rate cannot tell.
+
+    Args:
+        campaign: the similar campaign in which the hum was found.
+    """
+    if hum is None:
+        return ()
+    found, runs = [], tuple(run.id for run in campaign.runs)
+    mains = similarity.own(hum.frequency, "Hz")
+    intervals = [similarity.own(run.record.sample_interval, "s") for run in campaign.runs]
+    line = hum.harmonic * mains
+    places = [float(abs(apparent(line, interval))) for interval in intervals]
+    if hum.harmonic > 1:
+        what = f"the strongest line of the hum is at {line:.5g} Hz, {hum.harmonic} times the mains' frequency"
+        found.append(Remark(Outcome.NOTED, runs, what, "the stated amplitude is that line's"))
+    if any(abs(place - line) > 1e-6 * line for place in places):
+        span = " to ".join(f"{place:.5g}" for place in sorted({min(places), max(places)}))
+        what = f"the hum's line of {line:.5g} Hz is above half the sample rate and appears at {span} Hz"
+        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to see it where it is"))
+    other = alike(mains, hum.harmonic, intervals)
+    if other is not None:
+        what = (
+            f"mains of {other:.5g} Hz would show the same line as mains of {mains:.5g} Hz at this sample rate"
+        )
+        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to tell them apart"))
+    return tuple(found)
 
 
-def _lines(record: Record, frequency: float) -> Array:
-    """Sine and cosine of the fundamental, then of its harmonics, shape (n, 2 harmonics)."""
+def _showing(campaign: Campaign, frequency: float, motion: float) -> list[tuple[Record, list[int]]]:
+    """Every record with the multiples of a frequency that it shows apart from the motion and from each other."""
+    records = [run.record for run in campaign.runs]
+    return [(r, shown_multiples(frequency, r.sample_interval, r.duration, motion)) for r in records]
+
+
+def _strongest(shown: Sequence[tuple[Record, list[int]]], frequency: float) -> int:
+    """The multiple of a frequency at which the records hold most power."""
+    powers = dict.fromkeys(HARMONICS, 0.0)
+    for record, multiples in shown:
+        if multiples:
+            clear, reading = _without_motion(record, np.hanning(record.time_s.size))
+            found = np.linalg.lstsq(clear(_lines(record, frequency, multiples)), reading, rcond=None)[0]
+            for multiple, pair in zip(multiples, found.reshape(-1, 2), strict=True):
+                powers[multiple] += float(pair @ pair)
+    return max(powers, key=powers.__getitem__)
+
+
+def _swells(
+    shown: Sequence[tuple[Record, list[int]]], frequency: float, harmonic: int, variance: float
+) -> bool:
+    """Whether the amplitude or the phase of a hum's strongest line varies within the runs beyond chance."""
+    gained, freedom = 0.0, 0
+    for record, multiples in shown:
+        if harmonic not in multiples or int(2.0 * _SWELL_UP_TO * record.duration) < 1:
+            continue
+        steady = _lines(record, frequency, multiples)
+        window = np.hanning(record.time_s.size)
+        clear, reading = _without_motion(record, window)
+        columns = clear(np.column_stack([steady, _swell(record, harmonic * frequency)]))
+        both = np.linalg.qr(columns)[0][:, steady.shape[1] :]
+        # windowed white noise has the window's mean square
+        share = both.T @ (both * window[:, None] ** 2)
+        found = both.T @ reading
+        gained += float(found @ np.linalg.solve(share, found)) / variance
+        freedom += both.shape[1]
+    return freedom > 0 and gained > float(chdtri(freedom, NOISE_FALSE_ALARM_SHARE * FALSE_ALARM_RATE))
+
+
+def _lines(record: Record, frequency: float, multiples: Sequence[int]) -> Array:
+    """Sine and cosine at some multiples of a frequency, shape (n, 2 multiples)."""
     time = record.time_s - record.time_s[0]
-    phases = [2.0 * np.pi * k * frequency * time for k in _harmonics(record, frequency)]
+    phases = [2.0 * np.pi * k * frequency * time for k in multiples]
     return np.stack([wave(phase) for phase in phases for wave in (np.sin, np.cos)], axis=1)
 
 
 def _swell(record: Record, frequency: float) -> Array:
-    """The fundamental times slow cosines of time: a hum whose amplitude swells, shape (n, columns)."""
+    """A line times slow cosines of time: a hum whose amplitude swells, shape (n, columns)."""
     time = record.time_s - record.time_s[0]
     orders = range(1, int(2.0 * _SWELL_UP_TO * time[-1]) + 1)
     slow = [np.cos(np.pi * k * time / time[-1]) for k in orders]

@@ -88,7 +88,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
             f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
             f"{100.0 * policy.LOCAL_FALSE_ALARM_RATE:.2g} % of campaigns."
         )
-    excess = left.excess / left.problem.data.runs[0].block
+    excess = left.excess / left.problem.data.mean_block
     return Closable(excess, ceilings, kind, words, where, shape, law)
 
 

@@ -12,10 +12,11 @@ import numpy as np
 from diagnosis import policy
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
+from diagnosis.likelihood.mains_lines import fastest, mains_interval
 from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, by_moment, mains_interval, misfit
+from diagnosis.likelihood.residuals import CHANNELS, by_moment, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import decays_start, joint_start, misses_motion, nominal_start
 from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
@@ -238,16 +239,16 @@ def _test(campaign: Campaign, similarity: Similarity, kinds: Sequence[type[Effec
         nominal = fit_nominal(prepare(campaign, noise.variance, similarity))
         cleaned, hum, line = campaign, None, None
         if HUM.name in allowed:
-            fine, least = nominal, mains_interval(similarity)
-            if any(run.interval >= least for run in nominal.problem.data.runs):  # too long to show the mains
-                problem = Problem(prepare(campaign, noise.variance, similarity, 0.5 * least))
-                residuals = scaled_residuals(problem, nominal.point)
-                fine = replace(nominal, problem=problem, residuals=residuals)
-            line = find_hum(fine)
+            # block means short enough to show every line of the mains that the samples show
+            problem = Problem(prepare(campaign, noise.variance, similarity, mains_interval(similarity)))
+            residuals = scaled_residuals(problem, nominal.point)
+            line = find_hum(replace(nominal, problem=problem, residuals=residuals))
         if line is not None:
-            frequency = refine_frequency(campaign, line)
+            motion = fastest(nominal)
+            frequency = refine_frequency(campaign, line, motion)
             for _ in range(2):  # as a hum may count as noise at first
-                cleaned, hum = remove_hum(campaign, frequency, float(np.mean(list(noise.variance.values()))))
+                variance = float(np.mean(list(noise.variance.values())))
+                cleaned, hum = remove_hum(campaign, frequency, variance, motion)
                 noise = campaign_noise(cleaned)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity))
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
@@ -481,7 +482,7 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
 
     Effects of a few numbers close little of any noise, however it misbehaves.
     """
-    block = found.nominal.problem.data.runs[0].block
+    block = found.nominal.problem.data.mean_block
     small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
     closed = any(w.effects != UNKNOWN and w.share < 1.0 - policy.MOST for w in weighed)
     return found.nominal.chance > 1.0 or (small and not closed)

@@ -73,6 +73,16 @@ def make(
     small: Annotated[
         float, Option("--small", min=0, max=1, help="Share with a small effect beside those that matter.")
     ] = 0.25,
+    departures: Annotated[
+        float,
+        Option(
+            "--departures",
+            min=0,
+            max=1,
+            help="Share, each, with other sample rates, durations, clocks, release sides, starts, air, springs, "
+            "noise and zeros than the standard rig's.",
+        ),
+    ] = 0.0,
     driven: Annotated[
         bool, typer.Option("--driven", help="Drive the runs, all or some, by known moments or other inputs.")
     ] = False,
@@ -104,7 +114,8 @@ def make(
     with bar("writing campaigns", count) as progress:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, key=key,
-            mixture=Mixture(textbook, rare, variety, small, driven=driven), progress=progress,
+            mixture=Mixture(textbook, rare, variety, small, driven=driven, departures=departures),
+            progress=progress,
             show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
     say(f"Written: {out} ({count} campaigns), key {where}")

@@ -251,7 +251,7 @@ def at_low_rate(c: Conditions) -> Conditions:
         coloured_share=coloured / (white + coloured),
         noise_corner=min(c.noise_corner, 0.3 * SAMPLE_RATE),
         resolution=c.resolution * float(np.sqrt(share)),
-        air_density=round(c.air_density, 4),  # as the campaign will state it
+        air_density=round(float(np.mean(c.air_density)), 4),  # as the campaign will state it
         stamp_step=0.0,
         time_scale=1.0,
         moment_scale=1.0,

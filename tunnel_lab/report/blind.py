@@ -202,6 +202,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
             f"tunnel blind make {folder} --count {made['count']} --seed {made['seed']} --kinds {kinds} "
             f"--textbook {made['textbook']:g} --rare {made['rare']:g} "
             f"--variety {made['variety']:g} --small {made['small']:g}"
+            + (f" --departures {made['departures']:g}" if made["departures"] else "")
         ]
     lines = [
         "# Blind check",

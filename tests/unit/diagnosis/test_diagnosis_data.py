@@ -74,3 +74,14 @@ def test_a_run_that_would_lose_much_stays_whole():
     slow = with_records(data, lambda t, _y: np.cos(2.0 * np.pi * t / 12.0))
     prepared = prepare(slow, {"r01": 1e-6})
     assert without_start(prepared).runs[0].reading.size == prepared.runs[0].reading.size
+
+
+def test_the_mean_block_turns_an_excess_of_block_means_into_one_of_samples():
+    """A slow error of one power in all runs, sampled at different rates."""
+    fast = free_decays.campaign(SETTINGS, duration=5.0, rate=1000.0)
+    slow = free_decays.campaign(SETTINGS, duration=5.0, rate=200.0)
+    data = prepare(replace(fast, runs=(fast.runs[0], *slow.runs[1:])), {run.id: 1e-6 for run in fast.runs})
+    assert {run.block for run in data.runs} == {4, 1}
+    power = 3e-6
+    in_blocks = [np.full(run.reading.size, power / run.noise_variance) for run in data.runs]
+    assert np.mean(np.concatenate(in_blocks)) / data.mean_block == pytest.approx(power / 1e-6)

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
-from diagnosis.likelihood.residuals import mains_line
-from diagnosis.noise.mains import find_hum, refine_frequency, remove_hum
+from diagnosis.likelihood.mains_lines import mains_line, mains_lines
+from diagnosis.noise.mains import find_hum, hum_remarks, refine_frequency, remove_hum
+from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import nominal_study
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
@@ -56,6 +58,124 @@ def test_a_hum_is_found_and_taken_out_whole(frequency):
     # nine in a thousand of the hum at the most, where the frequency of a short record is off by its error
     assert np.mean(left) < 0.02 * hum.excess * NOISE**2
     assert find_hum(nominal(cleaned)) is None
+
+
+@pytest.mark.parametrize("frequency", [49.1, 50.4, 59.2, 60.0, 60.9])
+def test_a_hum_is_found_wherever_grids_wander(frequency):
+    found = nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS)
+    assert found.hum is not None
+    assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(frequency, abs=3e-3)
+    assert found.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.hum.std)
+    assert found.hum.harmonic == 1
+    assert not found.test.detected
+
+
+@pytest.mark.parametrize("frequency", [44.0, 55.0, 65.0, 72.0])
+def test_a_line_elsewhere_is_not_a_hum(frequency):
+    assert nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS).hum is None
+
+
+#: Sample rate and mains, Hz, the multiple that hums, and where it then appears, Hz.
+FOLDED = [
+    (100.0, 60.0, 1, 40.0),
+    (90.0, 50.0, 1, 40.0),
+    (90.0, 60.2, 1, 29.8),
+    (80.0, 49.8, 1, 30.2),
+    (125.0, 60.0, 2, 5.0),
+    (170.0, 49.9, 2, 70.2),
+    (250.0, 59.9, 3, 70.3),
+    (500.0, 60.0, 2, 120.0),
+]
+
+
+@pytest.mark.parametrize(("rate", "mains", "multiple", "place"), FOLDED)
+def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, place):
+    settings = [Setting(16.12, speed) for speed in (0.0, 15.0, 25.0)]
+    clean = free_decays.campaign(
+        settings, noise=NOISE, rate=rate, duration=10.0, rng=np.random.default_rng(2)
+    )
+    data = humming(clean, 2e-3, multiple * mains)
+    folded = abs(multiple * mains - rate * round(multiple * mains / rate))
+    assert folded == pytest.approx(place, abs=1e-9)
+    found = nominal_study(data, ALL_EFFECTS)
+    if place < 3.0 * 2.1:  # within the harmonics of a motion of 2 Hz
+        assert found.hum is None
+        return
+    assert found.hum is not None
+    assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(mains, abs=3e-3)
+    assert found.hum.harmonic == multiple
+    assert found.hum.amplitude == pytest.approx(2e-3, abs=4.0 * found.hum.std)
+    assert not found.test.detected
+    said = [remark.what for remark in hum_remarks(found.campaign, found.hum, found.similarity)]
+    assert any(f"appears at {place:.5g} Hz" in one for one in said) == (place != multiple * mains)
+    assert any("times the mains' frequency" in one for one in said) == (multiple > 1)
+    assert nominal_study(clean, ALL_EFFECTS).hum is None
+
+
+@pytest.mark.parametrize(("rate", "multiple"), [(110.0, 1), (220.0, 2)])
+def test_what_the_sample_rate_cannot_tell_apart_is_said(rate, multiple):
+    """At 110 Hz all multiples of 50 and of 60 Hz appear at the same places, and at 220 Hz the even ones do."""
+    data = humming(decays(rate=rate, duration=10.0), 2e-3, multiple * 60.0)
+    found = nominal_study(data, ALL_EFFECTS)
+    assert found.hum is not None
+    own = found.similarity.own(found.hum.frequency, "Hz")
+    said = [remark.what for remark in hum_remarks(found.campaign, found.hum, found.similarity)]
+    assert own == pytest.approx(50.0, abs=3e-3)
+    assert any(one.startswith(f"mains of {110.0 - own:.5g} Hz would show the same line") for one in said)
+    assert not found.test.detected
+
+
+def test_a_mode_that_decays_is_not_a_hum():
+    def ring(rate):
+        return lambda t, y: y + 3e-3 * np.exp(-rate * t) * np.sin(2.0 * np.pi * 60.0 * t)
+
+    assert nominal_study(with_records(decays(), ring(0.5)), ALL_EFFECTS).hum is None
+    assert nominal_study(with_records(decays(), ring(0.0)), ALL_EFFECTS).hum is not None
+
+
+@pytest.mark.parametrize(("orders", "hums"), [((13, 19), False), ((25,), True)])
+def test_a_line_at_a_multiple_of_the_motion_is_a_hum_only_where_the_motion_has_no_others(orders, hums):
+    """A motion whose 25th multiple is at 50 Hz, and which has the 13th and the 19th as well."""
+    truth = free_decays.Truth(yaw_inertia=16.12 / (4.0 * np.pi) ** 2, mechanical_damping=0.001)
+    data = free_decays.campaign(
+        (Setting(16.12, 0.0),) * 2, truth=truth, noise=NOISE, duration=20.0, rng=np.random.default_rng(8)
+    )
+
+    def add(t, y):
+        return y + sum(1e-3 * np.sin(4.0 * np.pi * k * t + k) for k in {25, *orders})
+
+    assert (nominal_study(with_records(data, add), ALL_EFFECTS).hum is not None) == hums
+
+
+def test_a_hum_that_only_some_sample_rates_show_is_found_and_removed():
+    fast = decays()
+    slow = decays(rate=50.0, duration=8.0)  # 50 Hz would be at rest
+    data = humming(replace(fast, runs=(*fast.runs[:4], *slow.runs[4:])), 1e-3)
+    found = nominal_study(data, ALL_EFFECTS)
+    assert found.hum is not None
+    assert found.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.hum.std)
+
+
+def noise_only(base, rng):
+    """The fit of a campaign whose residuals are white noise of unit variance."""
+    return replace(base, residuals=[rng.standard_normal(one.size) for one in base.residuals])
+
+
+@pytest.mark.parametrize(("runs", "rate"), [(1, 250.0), (1, 90.0), (6, 250.0)])
+def test_white_noise_is_a_hum_no_oftener_than_stated(runs, rate):
+    """Of a thousand campaigns one may have a line beyond chance, all frequencies and multiples together."""
+    data = decays(rate=rate, duration=8.0)
+    base = nominal(replace(data, runs=data.runs[:runs]))
+    rng = np.random.default_rng(5)
+    trials = 600 // runs
+    beyond = found = 0
+    for _ in range(trials):
+        fit = noise_only(base, rng)
+        lines = mains_lines(fit)
+        beyond += any(line.drop > chdtri(line.freedom, FALSE_ALARM_RATE / line.trials) for line in lines)
+        found += find_hum(fit) is not None
+    assert beyond <= 4  # of a Poisson variable of mean 0.6, five or more in 2500
+    assert found <= beyond
 
 
 @pytest.mark.slow

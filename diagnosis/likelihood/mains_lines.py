@@ -1,0 +1,359 @@
+"""Where the mains show in residuals: at 50 or 60 Hz and their multiples, as sampled.
+
+A line above half the sample rate appears at another frequency, as the spectrum of samples repeats: 60 Hz sampled
+at 100 Hz are 40 Hz. So every line is sought where the samples show it, at its own frequency less the nearest
+multiple of the sample rate. It is not sought where it would fall on the motion or its harmonics, nor at the ends of
+the spectrum, where a sine and a cosine are not distinct.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.residuals import Line, ResidualSpectrum, block_gain, resonance, smooth_spectra
+from diagnosis.likelihood.run_data import RunData
+from tunnel_sim.vocabulary.record import Array
+
+#: Nominal frequencies of the mains, Hz.
+MAINS = (50.0, 60.0)
+#: Multiples of them that are sought. Rectifiers and lamps give the even ones, transformers the odd ones.
+HARMONICS = range(1, 6)
+#: Farthest that the mains wander, a share of their frequency: a grid without a synchronous connection to others
+#: keeps 50 Hz within 2 % during 95 % of a week (EN 50160:2010, 4.2.1).
+_WANDER = 0.02
+#: Least range that is worth seeking, a share of the frequency: large grids keep 50 Hz within 1 % during 99.5 % of a
+#: year (EN 50160:2010, 4.2.1) and 60 Hz within 0.5 Hz (NERC PRC-024-3, no-trip zone).
+_LEAST_WANDER = 0.01
+#: Largest share of the spectrum beyond the motion's harmonics in which one line may be sought, on either side of
+#: its place: where little of the spectrum is seen, a line of another source often lies in a wider range. Judgement.
+_OF_SPECTRUM = 0.05
+_BEYOND_MOTION = 3.3  # times the frequency of the fastest motion: beyond its third harmonic by a tenth
+_WIDTH = 2.0  # half a line's width with a Hann window, in 1/duration
+#: Pieces of the records whose powers are added, s of the rig as measured: within them the mains' phase is steady. A
+#: standard measurement of the mains' frequency takes as long (IEC 61000-4-30:2015, 5.1).
+_PIECE = 10.0
+_LEAST_PIECE = 2.0  # s of the similar rig: four cycles
+_PADDING = 8
+_BESIDE = (
+    0.6,
+    4.0,
+)  # Hz of the similar rig: nearest and farthest that a line is compared with what is beside it
+_MOTION_KNOWN = 1e-3  # of a multiple of the motion's frequency, which changes a little with the amplitude
+_SAME = 1e-6  # cycles per sample
+_CLEAR = 3.0  # or this many 1/duration of a piece, where it is more
+
+
+@dataclass(frozen=True, eq=False)
+class MainsLine(Line):
+    """A line at a multiple of the mains' frequency.
+
+    Args:
+        parameter: frequency of the mains, Hz.
+        drop: of χ² when the line is removed from the runs concerned, dimensionless.
+        contrast: ratio of the drop at the line to the greatest beside it, dimensionless.
+        amplitude: of the line at the sensor, rad, root mean square over the runs concerned.
+        phases: of sine, rad, by run, shape (runs,); zero for runs not concerned.
+        harmonic: the multiple.
+        concerned: numbers of the runs in which it is sought.
+        freedom: twice the number of pieces of records whose powers are added.
+        trials: number of independent places at which lines of the mains were sought, all of them together.
+        powers: drop of χ² of every run concerned, dimensionless, shape (concerned,).
+        pieces: of every run concerned, shape (concerned,).
+        later: power in the later halves of these runs over that in the earlier halves, dimensionless.
+        evidence: drop of χ² beyond chance, at all multiples of the frequency that are seen, dimensionless.
+        folds: how often the line is folded, in the run of the lowest sample rate.
+    """
+
+    harmonic: int
+    concerned: tuple[int, ...]
+    freedom: int
+    trials: float
+    powers: Array
+    pieces: Array
+    later: float
+    evidence: float
+    folds: int
+
+
+def apparent(frequency: float | Array, interval: float) -> Array:
+    """The frequency at which samples show a line, Hz; negative where the phase runs backwards.
+
+    Args:
+        frequency: Hz, any shape.
+        interval: between samples, s.
+    """
+    cycles = np.asarray(frequency, np.float64) * interval
+    return np.asarray((cycles - np.round(cycles)) / interval, np.float64)
+
+
+def seen(frequency: float | Array, interval: float, duration: float, motion: float) -> np.ndarray:
+    """Whether samples show a line apart from the motion, its harmonics and the ends of the spectrum.
+
+    Args:
+        frequency: Hz, any shape.
+        interval: between samples, s.
+        duration: over which the line is resolved, s.
+        motion: frequency of the motion, Hz.
+    """
+    shown = np.abs(apparent(frequency, interval))
+    lowest, highest = _limits(interval, duration, motion)
+    return np.asarray((shown >= lowest) & (shown <= highest))
+
+
+def shown_multiples(frequency: float, interval: float, duration: float, motion: float) -> list[int]:
+    """The multiples of a frequency that samples show as `seen`, and apart from those before them.
+
+    Args:
+        frequency: of the mains, Hz.
+        interval: between samples, s.
+        duration: over which a line is resolved, s.
+        motion: frequency of the fastest motion, Hz.
+    """
+    found: list[int] = []
+    taken: list[float] = []
+    for multiple in HARMONICS:
+        place = abs(float(apparent(multiple * frequency, interval)))
+        apart = all(abs(place - other) * duration > 2.0 * _WIDTH for other in taken)
+        if apart and seen(multiple * frequency, interval, duration, motion):
+            found.append(multiple)
+            taken.append(place)
+    return found
+
+
+def _limits(interval: float, duration: float, motion: float) -> tuple[float, float]:
+    """Lowest and highest apparent frequency at which a line is sought, Hz."""
+    return _BEYOND_MOTION * motion + _WIDTH / duration, 0.5 / interval - _WIDTH / duration
+
+
+def mains_interval(similarity: Similarity) -> float:
+    """Longest interval between blocks at which no block mean folds a line of the mains, s of the similar rig."""
+    highest = HARMONICS[-1] * max(MAINS) * (1.0 + _WANDER)
+    return 1.0 / (2.0 * similarity.similar(highest, "Hz"))
+
+
+def alike(frequency: float, harmonic: int, intervals: list[float]) -> float | None:
+    """The mains' frequency of the other nominal value whose line all records show at the same place; None: no such.
+
+    Args:
+        frequency: of the mains, Hz of the rig as measured.
+        harmonic: multiple of it at which the line is.
+        intervals: between samples, s of the rig as measured, by record.
+    """
+    rate, line = 1.0 / intervals[0], harmonic * frequency
+    for mains in MAINS:
+        if abs(frequency - mains) <= _WANDER * mains:
+            continue
+        for turned in (line, -line):
+            other = turned + rate * float(np.round((harmonic * mains - turned) / rate))
+            shown = [np.abs(apparent(np.array([other, line]), interval)) for interval in intervals]
+            same = all(abs(a - b) * h < _SAME for (a, b), h in zip(shown, intervals, strict=True))
+            if same and abs(other / harmonic - mains) <= _WANDER * mains:
+                return other / harmonic
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """The residuals of one run in pieces of equal length.
+
+    Args:
+        power: sum over the pieces of the drop of χ² when a sine is removed, by frequency, shape (n,).
+        halves: its parts of the earlier and of the later half of the run, shape (2, n).
+        spacing: of the frequencies, Hz.
+        count: of the pieces.
+        duration: of one, s.
+        run: the run.
+        motion: frequency of the fastest motion, Hz.
+        own: frequency of the run's own motion, Hz.
+    """
+
+    power: Array
+    halves: Array
+    spacing: float
+    count: int
+    duration: float
+    run: RunData
+    motion: float
+    own: float
+
+    @classmethod
+    def of(cls, run: RunData, residual: Array, motion: float, own: float, length: float) -> _Pieces:
+        """Cut into an even number of pieces about as long as given, s: two at least."""
+        count = 2 * max(1, round(0.5 * residual.size * run.interval / length))
+        size = residual.size // count
+        window = np.hanning(size)
+        parts = residual[: count * size].reshape(count, size) * window
+        spectra = np.abs(np.fft.rfft(parts, _PADDING * size, axis=1)) ** 2 * (2.0 / float(window @ window))
+        halves = spectra.reshape(2, count // 2, -1).sum(axis=1)
+        spacing = 1.0 / (_PADDING * size * run.interval)
+        return cls(halves.sum(axis=0), halves, spacing, count, size * run.interval, run, motion, own)
+
+    def index(self, frequency: float | Array) -> np.ndarray:
+        """The nearest place of the spectrum at which a line of this frequency appears."""
+        place = np.round(np.abs(apparent(frequency, self.run.interval)) / self.spacing).astype(int)
+        return np.asarray(np.minimum(place, self.power.size - 1))
+
+    def of_motion(self, frequency: float) -> int:
+        """The multiple of the motion's frequency at which a line appears; 0 where it is at none."""
+        place = abs(float(apparent(frequency, self.run.interval)))
+        multiple = round(place / self.own)
+        near = 1.0 / (self.run.reading.size * self.run.interval) + _MOTION_KNOWN * place
+        return multiple if abs(place - multiple * self.own) < near else 0
+
+    def multiples(self, without: int) -> float:
+        """The largest drop of χ² at the multiples of the motion's frequency beyond the third, but for one."""
+        orders = np.arange(np.ceil(_BEYOND_MOTION), 0.5 / self.run.interval / self.own)
+        places = self.index(self.own * orders[orders != without])
+        return float(np.max(self.power[places], initial=0.0))
+
+    def shows(self, frequency: float | Array) -> np.ndarray:
+        """Whether the run shows a line of this frequency apart from the motion, as `seen`."""
+        return seen(frequency, self.run.interval, self.duration, self.motion)
+
+    def reach(self, frequency: float) -> float:
+        """How far about a frequency a line is sought, a share of it; 0 where it is not sought."""
+        lowest, highest = _limits(self.run.interval, self.duration, self.motion)
+        share = min(_WANDER, _OF_SPECTRUM * (highest - lowest) / frequency)
+        ends = frequency * (1.0 + share * np.array([-1.0, 0.0, 1.0]))
+        zones = np.floor(2.0 * ends * self.run.interval)
+        whole = bool(np.all(self.shows(ends))) and bool(np.all(zones == zones[0]))
+        return share if whole and share >= _LEAST_WANDER else 0.0
+
+
+def fastest(fit: Fit) -> float:
+    """Frequency of the fastest motion of the fitted model, Hz."""
+    return max(resonance(fit, i) for i in range(len(fit.problem.data.runs)))
+
+
+def mains_lines(fit: Fit) -> list[MainsLine]:
+    """The strongest line at every multiple of each nominal frequency of the mains that the runs show.
+
+    Those of the first nominal frequency and multiple come first.
+    """
+    data = fit.problem.data
+    length = max(data.similarity.similar(_PIECE, "s"), _LEAST_PIECE)
+    runs = [
+        _Pieces.of(run, residual, fastest(fit), resonance(fit, i), length)
+        for i, (run, residual) in enumerate(zip(data.runs, fit.residuals, strict=True))
+    ]
+    sought = list(_sought(runs, data.similarity))
+    trials = sum(_places(runs, *one) for one in sought)
+    whole = smooth_spectra(fit)
+    found = (_line(runs, whole, *one, trials) for one in sought)
+    return [line for line in found if line is not None]
+
+
+def mains_line(fit: Fit) -> MainsLine | None:
+    """The line of the mains that stands out most; None where the runs show no multiple of their frequency."""
+    return max(mains_lines(fit), key=lambda line: line.contrast, default=None)
+
+
+def _sought(
+    runs: list[_Pieces], similarity: Similarity
+) -> Iterator[tuple[float, int, float, tuple[int, ...]]]:
+    """Nominal frequency (Hz), multiple, range (a share) and numbers of the runs of every line that is sought."""
+    for own in MAINS:
+        nominal = similarity.similar(own, "Hz")
+        for harmonic in HARMONICS:
+            reaches = [run.reach(harmonic * nominal) for run in runs]
+            concerned = tuple(i for i, reach in enumerate(reaches) if reach > 0.0)
+            if concerned:
+                yield nominal, harmonic, min(reaches[i] for i in concerned), concerned
+
+
+def _places(
+    runs: list[_Pieces], nominal: float, harmonic: int, reach: float, concerned: tuple[int, ...]
+) -> float:
+    """Independent places in a range: two in each line of the spectrum, as a window halves the record."""
+    longest = max(runs[i].duration for i in concerned)
+    return 2.0 * (2.0 * reach * harmonic * nominal * longest + 1.0)
+
+
+def _line(
+    runs: list[_Pieces],
+    whole: list[ResidualSpectrum],
+    nominal: float,
+    harmonic: int,
+    reach: float,
+    concerned: tuple[int, ...],
+    trials: float,
+) -> MainsLine | None:
+    """The strongest line in a range; None where nothing is seen beside it."""
+    among = [runs[i] for i in concerned]
+    spacing = min(run.spacing for run in among)
+    middle = harmonic * nominal
+    grid = np.arange(middle * (1.0 - reach), middle * (1.0 + reach) + spacing, spacing)
+    total = np.sum([run.power[run.index(grid)] for run in among], axis=0)
+    place = float(grid[np.argmax(total)])
+    clear = max(_BESIDE[0], _CLEAR / min(run.duration for run in among))
+    offsets = np.arange(clear, max(_BESIDE[1], 2.0 * clear), spacing)
+    beside = place + np.concatenate([-offsets, offsets])
+    beside = beside[np.all([run.shows(beside) for run in among], axis=0)]
+    if beside.size == 0:
+        return None
+    floor = float(np.max(np.sum([run.power[run.index(beside)] for run in among], axis=0)))
+    places = [run.index(place) for run in among]
+    powers = np.array([float(run.power[at]) for run, at in zip(among, places, strict=True)])
+    earlier, later = np.sum([run.halves[:, at] for run, at in zip(among, places, strict=True)], axis=0)
+    spectra = [whole[i] for i in concerned]
+    refined = _refined(among, spectra, place)
+    orders = [run.of_motion(refined) for run in among]
+    if all(orders):  # at a multiple of every run's motion, of which none is far above all others
+        floor = max(floor, sum(run.multiples(order) for run, order in zip(among, orders, strict=True)))
+    sines = _sines(among, spectra, refined)
+    phases = np.zeros(len(runs))
+    # a transform is of cos − i sin: a sine a sin(ωt + φ) gives a exp(i(φ − π/2))
+    phases[list(concerned)] = np.angle(sines) + np.pi / 2
+    frequency = refined / harmonic
+    return MainsLine(
+        frequency,
+        float(powers.sum()),
+        float(powers.sum()) / max(floor, 1e-9),
+        # the smoothed transform keeps the noise's level: lines lose a third of it
+        float(np.sqrt(1.5 * np.mean(np.abs(sines) ** 2))),
+        phases,
+        harmonic=harmonic,
+        concerned=concerned,
+        freedom=2 * sum(run.count for run in among),
+        trials=trials,
+        powers=powers,
+        pieces=np.array([float(run.count) for run in among]),
+        later=float(later) / max(float(earlier), 1e-9),
+        evidence=_evidence(runs, frequency),
+        folds=max(int(np.round(refined * run.run.interval)) for run in among),
+    )
+
+
+def _refined(runs: list[_Pieces], spectra: list[ResidualSpectrum], place: float) -> float:
+    """The frequency within a piece's line at which the whole records hold most power, Hz."""
+    width = 1.0 / max(run.duration for run in runs)
+    near = np.arange(place - width, place + width, min(float(one.frequency[1]) for one in spectra))
+    pairs = zip(runs, spectra, strict=True)
+    total = np.sum([one.power(np.abs(apparent(near, run.run.interval))) for run, one in pairs], axis=0)
+    return float(near[np.argmax(total)])
+
+
+def _sines(runs: list[_Pieces], spectra: list[ResidualSpectrum], frequency: float) -> np.ndarray:
+    """Complex amplitude of a sine in every reading, in its unit, shape (runs,)."""
+    found = []
+    for piece, spectrum in zip(runs, spectra, strict=True):
+        run, shown = piece.run, float(apparent(frequency, piece.run.interval))
+        value = complex(spectrum.at(abs(shown)))
+        value = value if shown >= 0.0 else value.conjugate()
+        gain = block_gain(frequency, run) * complex(run.response(frequency))
+        found.append(value * np.sqrt(run.noise_variance) / gain)
+    return np.array(found)
+
+
+def _evidence(runs: list[_Pieces], frequency: float) -> float:
+    """Drop of χ² beyond what chance gives, at all multiples of a frequency that the runs show."""
+    found = 0.0
+    for run in runs:
+        for multiple in shown_multiples(frequency, run.run.interval, run.duration, run.motion):
+            found += max(float(run.power[run.index(multiple * frequency)]) - 2.0 * run.count, 0.0)
+    return found
