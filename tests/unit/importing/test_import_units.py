@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
+import nptdms
 import numpy as np
 import polars as pl
 import pytest
@@ -140,7 +142,6 @@ def test_a_table_of_nothing_but_names_of_runs_is_refused_in_one_line(
     numbers = np.repeat([1.0, 2.0], 50)
     path = tmp_path / f"log.{kind.partition(' ')[0]}"
     if kind in ("h5", "mat 7.3"):
-        h5py = pytest.importorskip("h5py")
         with h5py.File(path, "w") as file:
             file[name] = numbers
     elif kind == "mat":
@@ -148,7 +149,6 @@ def test_a_table_of_nothing_but_names_of_runs_is_refused_in_one_line(
 
         savemat(path, {name: numbers})
     elif kind == "tdms":
-        nptdms = pytest.importorskip("nptdms")
         with nptdms.TdmsWriter(path) as writer:
             writer.write_segment([nptdms.ChannelObject("g", name, numbers)])
     elif kind == "csv":
@@ -156,7 +156,6 @@ def test_a_table_of_nothing_but_names_of_runs_is_refused_in_one_line(
     elif kind == "parquet":
         pl.DataFrame({name: numbers}).write_parquet(path)
     else:
-        pytest.importorskip("xlsxwriter")
         pl.DataFrame({name: numbers}).write_excel(path)
     with pytest.raises(TunnelError, match="no column") as caught:
         read_records([path])
