@@ -372,7 +372,7 @@ def hidden_line(document: Document) -> str:
             moved.append(f"{COEFFICIENTS.get(name, name)} by {by}")
     if not moved:
         return ""
-    size = f"{significant(first['size']['value'], 2)} {unit_mark(first['size']['unit'])}"
+    size = f"{significant(abs(first['size']['value']), 2)} {unit_mark(first['size']['unit'])}"
     return (
         f"What could hide: {plain(first['effect'])} of up to {size.strip()}, which these runs do not exclude, "
         f"would move {' and '.join(moved)}. The intervals allow for it."

@@ -85,7 +85,7 @@ def test_the_table_and_the_sentence_state_sizes_and_moves_with_units():
         given["coefficients"]["after"][name] = {"value": -0.17, "std": std, "unit": "1/rad"}
     line = hidden_line(given)
     assert "unsteady aero lag of up to" in line
-    assert "0.011 l/V" in line
+    assert "up to 0.011 l/V" in line
     assert "Cnr by 0.0061 1/rad" in line
     assert "Cnβ" not in line  # it moves far less than its standard deviation
     (row,) = hidden_table(given).rows
