@@ -152,8 +152,9 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
     share, alternatives = _by_choice(study, study.fitted, chosen, own, kinds)
     starts = starts_beside(chosen, kinds)
     small = beside(chosen, starts) if study.causes else None
+    hidden = hidden_effects(chosen, starts, None if small is None else small.left)
     first = Possible(own * share, chosen, textbook.get(id(chosen)), small)
-    return Answers((first, *alternatives, *others), unknown, study.nominal, hidden_effects(chosen, starts))
+    return Answers((first, *alternatives, *others), unknown, study.nominal, hidden)
 
 
 def _by_choice(

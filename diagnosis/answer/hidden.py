@@ -37,7 +37,7 @@ from diagnosis.search.hypothesis import own_gain
 from tunnel_sim.vocabulary.record import Array
 
 
-def hidden_effects(fit: Fit, starts: Starts) -> tuple[Hidden, ...]:
+def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None) -> tuple[Hidden, ...]:
     """The largest sizes of effects beside those of a fit, two standard deviations from the likeliest size.
 
     The change of the readings that the other parameters cannot absorb is a polynomial of second order in the size
@@ -48,11 +48,14 @@ def hidden_effects(fit: Fit, starts: Starts) -> tuple[Hidden, ...]:
     Args:
         fit: with or without effects.
         starts: the effects that may act beside those of the fit.
+        left: scaled residuals of which the dispersion is taken, by run, where small causes beside the fit explain a
+            part of its own; each of shape (n,).
 
     Returns:
         In the order given, without those that the runs cannot show at all.
     """
-    beyond = max(fit.total - fit.count - CHANCE_STDS * np.sqrt(2.0 * fit.count), 0.0)
+    total = fit.total if left is None else sum(float(r @ r) for r in left)
+    beyond = max(total - fit.count - CHANCE_STDS * np.sqrt(2.0 * fit.count), 0.0)
     reach = CHANCE_STDS**2 * (1.0 + beyond / DEGREES)
     names, influence = coefficient_names(fit.problem), influences(fit)
     found = []
