@@ -51,6 +51,30 @@ LEAST_SPRING_RESOLUTION = 10.0
 """Rise of ωn² over the springs, in its standard deviations, that a wind-off line needs. Noise in the abscissa
 attenuates the gradient by the inverse square: here 1 %, a tenth of its standard deviation."""
 
+SPRING_DEPARTURE = 0.25
+"""Relative departure of a spring from its statement that an effect may cause: calibration, gravity, a flexible rod.
+A slip is looked for beyond it. Judgement."""
+
+SPEED_DEPARTURE = 0.04
+"""The same of a wind speed: calibration, an offset, the stream's unevenness. Judgement."""
+
+SLIP_AGREES = 0.1
+"""Rate at which runs with right labels, of departures as large as the two above, would be said not to agree. Another
+label is offered only where all agree better."""
+
+SCATTER_OF_STIFFNESS = 0.003
+"""Relative scatter of ωn² between runs of equal statements, beside its change along the run: springs are clamped anew to
+a few parts in ten thousand, and the amplitude of the release may move it. Judgement."""
+
+SCATTER_OF_DAMPING = 0.02
+"""Relative scatter of the decay rate between runs of equal statements: bearings come back to a per cent or two."""
+
+GREATEST_YAW_MOMENT = 10.0
+"""|Cnβ|, 1/rad. With the frontal area and the length of the body it is 0.1 to 2 for vehicles and slender bodies."""
+
+BODY_DENSITIES = (5.0, 30_000.0)
+"""kg/m³: a body as light as four times its air, or denser than lead, is more likely a slip of units."""
+
 NOISE_TOLERANCE = 0.05
 """Relative uncertainty of a stated or measured noise level, as on data sheets."""
 

@@ -16,8 +16,10 @@ from identification.estimate import Estimate, Quantity
 from identification.examination.free_motion import find_release, with_zeros, without_rest
 from identification.examination.labels import exchanged_labels, inertia_off_the_springs, springs_off_the_line
 from identification.examination.self_excited import growing_runs, self_excited_runs, swing_of
+from identification.examination.slips.base import Seen
+from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
@@ -26,34 +28,6 @@ _TIMER_DECIMALS = 10  # steps of the decimals that a timer's must exceed, or any
 _SWEEPS = 8
 _NO_GAP = 1.75  # usual steps: a longer one may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: beyond it the stamps are not those of one clock
-
-
-def without_repeats(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Leave out runs that hold the samples of an earlier one, with a remark for each.
-
-    The same samples under different conditions are refused: one of the two statements is wrong.
-    """
-    first: dict[bytes, Run] = {}
-    remarks = []
-    for run in campaign.runs:
-        earlier = first.setdefault(run.record.yaw_rad.tobytes(), run)
-        if earlier is run:
-            continue
-        if _conditions(earlier) == _conditions(run):
-            what = f"the same samples as run {earlier.id}, so counted once"
-            remedy = "remove the run, or correct its file name"
-            remarks.append(Remark(Outcome.LEFT_OUT, (run.id,), what, remedy))
-        else:
-            what = "the same samples with different springs or wind speeds"
-            remedy = "correct the file names, or remove one of the runs"
-            remarks.append(Remark(Outcome.REFUSED, (earlier.id, run.id), what, remedy))
-    if not remarks:
-        return campaign, ()
-    return replace(campaign, runs=tuple(first.values())), tuple(remarks)
-
-
-def _conditions(run: Run) -> tuple[float | None, ...]:
-    return run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None
 
 
 def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
@@ -123,9 +97,9 @@ def examine(campaign: Campaign) -> Examined:
     """
     for run in campaign.runs:
         loads(run, campaign.rig)
-    kept, repeats = without_repeats(campaign)
+    kept, repeats = mended(campaign)
     if any(remark.outcome is Outcome.REFUSED for remark in repeats):
-        return Examined(campaign, repeats)
+        return Examined(campaign, tuple(r for r in repeats if r.outcome is Outcome.REFUSED))
     noted = noted_readings(kept)
     kept, clocks = with_clocks(kept)
     # Driven runs neither begin with a release nor end at rest, and what sustains them is known.
@@ -139,8 +113,12 @@ def examine(campaign: Campaign) -> Examined:
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
-    faults = growing_runs(swings) or exchanged_labels(swings)
-    faults = faults or (*springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
+    faults = growing_runs(swings)
+    if not faults:
+        slips = found_in(Seen(kept, tuple(swings)))
+        refused = any(remark.outcome is Outcome.REFUSED for remark in slips)
+        faults = slips if refused else exchanged_labels(swings)
+        faults = faults or (*slips, *springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))

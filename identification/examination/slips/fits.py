@@ -1,0 +1,146 @@
+"""The straight lines that runs with right labels obey, with wide tolerances for everything but a slip.
+
+Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the departure of a spring, by its
+calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. It is told from an effect by
+tolerances that hold every effect, and by a value that agrees where the stated one contradicts them grossly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from identification import policy
+from identification.examination.self_excited import Swing
+from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Statements:
+    """Stated conditions and measured frequencies, run by run.
+
+    Args:
+        spring: Kr, shape (n,), N m/rad.
+        speed: V, shape (n,), m/s.
+        density: ρ, shape (n,), kg/m³; of runs that state none the median of the others, 1.2 where none states any.
+        seen: k = ωn², shape (n,), 1/s².
+        std: standard deviation of k, with its change along the run, shape (n,), 1/s².
+    """
+
+    runs: tuple[Run, ...]
+    spring: Array
+    speed: Array
+    density: Array
+    seen: Array
+    std: Array
+
+    @classmethod
+    def of(cls, swings: Sequence[Swing]) -> Statements:
+        """Of the runs that state a spring; where none does, all are taken to have one spring of 1 N m/rad."""
+        known = [s for s in swings if s.run.spring_stiffness] or list(swings)
+        runs = tuple(s.run for s in known)
+        stated = [run.air_density for run in runs if run.air_density is not None]
+        usual = float(np.median(stated)) if stated else 1.2
+        return cls(
+            runs,
+            np.array([run.spring_stiffness or 1.0 for run in runs]),
+            np.array([run.wind_speed for run in runs]),
+            np.array([usual if run.air_density is None else run.air_density for run in runs]),
+            np.array([s.stiffness for s in known]),
+            np.array([s.stiffness_std for s in known]),
+        )
+
+    def without(self, places: Sequence[int]) -> Statements:
+        """The other runs."""
+        keep = [i for i in range(len(self.runs)) if i not in places]
+        arrays = {key: getattr(self, key)[keep] for key in ("spring", "speed", "density", "seen", "std")}
+        return replace(self, runs=tuple(self.runs[i] for i in keep), **arrays)
+
+    @property
+    def pressure(self) -> Array:
+        """½ρV², shape (n,), Pa."""
+        return 0.5 * self.density * self.speed**2
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How well statements and frequencies agree.
+
+    Args:
+        squares: weighted sum of squared residuals, in tolerances.
+        away: residual of each run in tolerances, shape (n,).
+        inverse_inertia: g, 1/(kg m²).
+        air: n, of k, 1/(kg m²) per m³.
+        air_std: its standard deviation.
+    """
+
+    squares: float
+    freedom: int
+    away: Array
+    inverse_inertia: float
+    air: float
+    air_std: float
+
+    @property
+    def gross(self) -> bool:
+        """Whether the contradiction is beyond chance and beyond every effect."""
+        return self.freedom > 0 and self.squares > float(chdtri(self.freedom, policy.REFUSAL_RATE))
+
+    @property
+    def good(self) -> bool:
+        """Whether the statements agree well: the tolerances are so wide that right labels leave little of them."""
+        return self.squares <= float(chdtri(max(self.freedom, 1), policy.SLIP_AGREES))
+
+
+def agreement(labels: Statements) -> Agreement:
+    """Fit g, n and the springs' departures to statements; two passes, since the tolerance of a speed scales with n."""
+    settings, place = _settings(labels.spring)
+    scale = float(np.median(labels.seen / labels.spring))
+    windy = bool(np.any(labels.speed > 0.0))
+    count, springs = labels.seen.size, settings.size
+    columns = np.zeros((count + springs, 2 + springs))
+    columns[:count, 0] = labels.spring * scale
+    columns[:count, 1] = -labels.pressure
+    columns[np.arange(count), 2 + place] = labels.spring * scale
+    columns[count:, 2:] = np.eye(springs)
+    if not windy:
+        columns = np.delete(columns, 1, axis=1)
+    target = np.concatenate((labels.seen, np.zeros(springs)))
+    air, solution, sizes, std = 0.0, np.zeros(0), np.zeros(0), np.zeros(0)
+    for _ in range(3):
+        tolerance = np.sqrt(
+            labels.std**2
+            + (policy.SCATTER_OF_STIFFNESS * labels.seen) ** 2
+            + (2.0 * policy.SPEED_DEPARTURE * air * labels.pressure) ** 2
+        )
+        std = np.concatenate((tolerance, np.full(springs, policy.SPRING_DEPARTURE)))
+        weighted = columns / std[:, None]
+        sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
+        solution = np.linalg.lstsq(weighted / sizes, target / std, rcond=1e-10)[0] / sizes
+        air = float(solution[1]) if windy else 0.0
+    away = (target - columns @ solution) / std
+    spread = np.linalg.pinv((columns / std[:, None]).T @ (columns / std[:, None]), rcond=1e-14, hermitian=True)
+    # the departures are told from g where springs differ, and are prior knowledge besides: g and n alone are free
+    return Agreement(
+        squares=float(away @ away),
+        freedom=count - 1 - int(windy),
+        away=np.abs(away[:count]),
+        inverse_inertia=float(solution[0]) * scale,
+        air=air,
+        air_std=float(np.sqrt(spread[1, 1])) if windy else 0.0,
+    )
+
+
+def _settings(values: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Values that differ by more than the least difference of two springs, and the place of each run's among them."""
+    order = np.argsort(values)
+    new = np.diff(values[order]) > policy.LEAST_SPRING_SPREAD * values[order][1:]
+    group = np.concatenate(([0], np.cumsum(new)))
+    place = np.empty(values.size, dtype=np.intp)
+    place[order] = group
+    return np.array([values[place == i].mean() for i in range(int(group[-1]) + 1)]), place

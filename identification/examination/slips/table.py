@@ -1,0 +1,39 @@
+"""The slips that are looked for, in their order."""
+
+from __future__ import annotations
+
+from identification.examination.slips.base import RecordSlip, Seen, StatementSlip
+from identification.examination.slips.run_labels import WrongLabel
+from identification.examination.slips.tails import ConstantTail
+from identification.examination.slips.twins import RepeatedRecord
+from identification.examination.slips.wraps import WrappedAngle
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign
+
+#: Looked for in the records as they come.
+RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), ConstantTail())
+
+#: Looked for in what is measured; after the first refusal no further one is looked for.
+STATEMENT_SLIPS: tuple[StatementSlip, ...] = (WrongLabel(),)
+
+
+def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """A campaign without the faults of its records, and what was done."""
+    remarks: tuple[Remark, ...] = ()
+    for slip in RECORD_SLIPS:
+        campaign, said = slip.mend(campaign)
+        remarks += said
+        if any(remark.outcome is Outcome.REFUSED for remark in said):
+            break
+    return campaign, remarks
+
+
+def found_in(seen: Seen) -> tuple[Remark, ...]:
+    """Remarks on the statements that the measured oscillations contradict."""
+    remarks: tuple[Remark, ...] = ()
+    for slip in STATEMENT_SLIPS:
+        said = slip.find(seen)
+        remarks += said
+        if any(remark.outcome is Outcome.REFUSED for remark in said):
+            return tuple(remark for remark in said if remark.outcome is Outcome.REFUSED)
+    return remarks
