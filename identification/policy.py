@@ -69,6 +69,42 @@ a few parts in ten thousand, and the amplitude of the release may move it. Judge
 SCATTER_OF_DAMPING = 0.02
 """Relative scatter of the decay rate between runs of equal statements: bearings come back to a per cent or two."""
 
+LEAST_OF_WIND = 0.005
+"""Relative change of ωn² by the wind that a campaign is made to measure, at least. Judgement."""
+
+LEAST_DAMPING_OF_WIND = 0.1
+"""The same of the decay rate: air that passes a body adds to its damping. Judgement."""
+
+ZERO_STEADINESS = 0.03
+"""Share of a sensor's zero by which the zeros of runs may differ where they are called one zero of two signs."""
+
+LEAST_STEPS = 4.0
+"""Steps of the resolution in a swing, at least: a coarser sensor would not have been chosen. Judgement."""
+
+FINER_THAN_STATED = 0.03
+"""Noise over the resolution: rounding alone makes 0.29, so that a tenth of it contradicts the resolution."""
+
+OTHER_SPRING = 1.2
+"""Ratio of ωn² of runs of equal statements and swings that only another spring makes: scatter and wear stay below a few
+per cent. Judgement."""
+
+OTHER_WIND = (1.02, 1.3)
+"""Ratios of ωn² and of the decay rate, both at once, that only another wind speed makes. Judgement."""
+
+NOISE_RATIO = 0.15
+"""Tolerance of the ratio of two runs' noise, where one sensor made both."""
+
+LEAST_DRIFT = 5e-4
+"""Change of a clock's rate along a run that is called a drift: quartz keeps 1e-4, and a rig's temperature moves a spring
+by a few times that."""
+
+RELEASE_AS_STATED = (0.5, 1.5)
+"""A record's first angle over the stated release angle, where it begins at the release: the angle is nominal, and
+the body is let go by hand. Judgement."""
+
+CLEAR_RELEASE = 0.8
+"""Share of the amplitude at which a record must begin for the side of its release to be known."""
+
 GREATEST_YAW_MOMENT = 10.0
 """|Cnβ|, 1/rad. With the frontal area and the length of the body it is 0.1 to 2 for vehicles and slender bodies."""
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from identification.campaign.derivatives import loads
 from identification.estimate import Estimate, Quantity
 from identification.examination.free_motion import find_release, with_zeros, without_rest
-from identification.examination.labels import exchanged_labels, inertia_off_the_springs, springs_off_the_line
-from identification.examination.self_excited import growing_runs, self_excited_runs, swing_of
+from identification.examination.self_excited import self_excited_runs, swing_of
 from identification.examination.slips.base import Seen
 from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
@@ -113,12 +112,7 @@ def examine(campaign: Campaign) -> Examined:
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
-    faults = growing_runs(swings)
-    if not faults:
-        slips = found_in(Seen(kept, tuple(swings)))
-        refused = any(remark.outcome is Outcome.REFUSED for remark in slips)
-        faults = slips if refused else exchanged_labels(swings)
-        faults = faults or (*slips, *springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
+    faults = found_in(Seen(kept, tuple(swings)))
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))

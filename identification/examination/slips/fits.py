@@ -8,7 +8,7 @@ tolerances that hold every effect, and by a value that agrees where the stated o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +28,17 @@ class Statements:
         spring: Kr, shape (n,), N m/rad.
         speed: V, shape (n,), m/s.
         density: ρ, shape (n,), kg/m³; of runs that state none the median of the others, 1.2 where none states any.
-        seen: k = ωn², shape (n,), 1/s².
-        std: standard deviation of k, with its change along the run, shape (n,), 1/s².
+        clock: stamped times over true ones, shape (n,); 1 as stated.
+        recorded: k = ωn² by the stamped times, shape (n,), 1/s².
+        std: relative standard deviation of k, with its change along the run, shape (n,).
     """
 
     runs: tuple[Run, ...]
     spring: Array
     speed: Array
     density: Array
-    seen: Array
+    clock: Array
+    recorded: Array
     std: Array
 
     @classmethod
@@ -51,20 +53,20 @@ class Statements:
             np.array([run.spring_stiffness or 1.0 for run in runs]),
             np.array([run.wind_speed for run in runs]),
             np.array([usual if run.air_density is None else run.air_density for run in runs]),
+            np.ones(len(known)),
             np.array([s.stiffness for s in known]),
-            np.array([s.stiffness_std for s in known]),
+            np.array([s.stiffness_std / s.stiffness for s in known]),
         )
 
-    def without(self, places: Sequence[int]) -> Statements:
-        """The other runs."""
-        keep = [i for i in range(len(self.runs)) if i not in places]
-        arrays = {key: getattr(self, key)[keep] for key in ("spring", "speed", "density", "seen", "std")}
-        return replace(self, runs=tuple(self.runs[i] for i in keep), **arrays)
+    @property
+    def seen(self) -> Array:
+        """k by the true times, shape (n,), 1/s²."""
+        return np.asarray(self.recorded * self.clock**2)
 
     @property
     def pressure(self) -> Array:
         """½ρV², shape (n,), Pa."""
-        return 0.5 * self.density * self.speed**2
+        return np.asarray(0.5 * self.density * self.speed**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +99,18 @@ class Agreement:
         return self.squares <= float(chdtri(max(self.freedom, 1), policy.SLIP_AGREES))
 
 
-def agreement(labels: Statements) -> Agreement:
-    """Fit g, n and the springs' departures to statements; two passes, since the tolerance of a speed scales with n."""
+def agreement(
+    labels: Statements,
+    *,
+    departure: float = policy.SPRING_DEPARTURE,
+    of_speed: float = policy.SPEED_DEPARTURE,
+) -> Agreement:
+    """Fit g, n and the springs' departures to statements.
+
+    Args:
+        departure: relative tolerance of a spring.
+        of_speed: relative tolerance of a wind speed.
+    """
     settings, place = _settings(labels.spring)
     scale = float(np.median(labels.seen / labels.spring))
     windy = bool(np.any(labels.speed > 0.0))
@@ -112,13 +124,12 @@ def agreement(labels: Statements) -> Agreement:
         columns = np.delete(columns, 1, axis=1)
     target = np.concatenate((labels.seen, np.zeros(springs)))
     air, solution, sizes, std = 0.0, np.zeros(0), np.zeros(0), np.zeros(0)
-    for _ in range(3):
+    for _ in range(3):  # the tolerance of a speed scales with n
         tolerance = np.sqrt(
-            labels.std**2
-            + (policy.SCATTER_OF_STIFFNESS * labels.seen) ** 2
-            + (2.0 * policy.SPEED_DEPARTURE * air * labels.pressure) ** 2
+            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * labels.seen**2
+            + (2.0 * of_speed * air * labels.pressure) ** 2
         )
-        std = np.concatenate((tolerance, np.full(springs, policy.SPRING_DEPARTURE)))
+        std = np.concatenate((tolerance, np.full(springs, departure)))
         weighted = columns / std[:, None]
         sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
         solution = np.linalg.lstsq(weighted / sizes, target / std, rcond=1e-10)[0] / sizes

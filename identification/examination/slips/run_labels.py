@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
@@ -18,9 +18,14 @@ from identification.examination.slips.base import Seen, StatementSlip
 from identification.examination.slips.fits import Agreement, Statements, agreement
 from identification.status import Outcome, Remark
 
-Key = Literal["spring", "speed"]
-_UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s"}
-_NAMES: Mapping[Key, str] = {"spring": "spring_stiffness", "speed": "wind_speed"}
+Key = Literal["spring", "speed", "density", "clock"]
+#: Names of the labels, and the units of those that are numbers of their own.
+_NAMES: Mapping[Key, str] = {
+    "spring": "spring_stiffness", "speed": "wind_speed", "density": "air_density", "clock": "time_s",
+}  # fmt: skip
+_UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
+_FEWEST = 3  # runs: two determine g and n
+_MOST_PAIRED = 40  # runs of which all pairs are tried: more take over a second
 _DECIMAL = {"with its decimal point one place to the right": 10.0, "with its decimal point one place to the left": 0.1}
 
 
@@ -100,6 +105,29 @@ class SpringDecimal(InAnotherUnit):
 
 
 @dataclass(frozen=True)
+class DensityDecimal(InAnotherUnit):
+    """An air density whose decimal point is one place off."""
+
+    key: ClassVar[Key] = "density"
+    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
+
+
+@dataclass(frozen=True)
+class TimeInAnotherUnit(Label):
+    """Times in minutes or milliseconds, or of a run that was sampled at another rate than the others."""
+
+    key: ClassVar[Key] = "clock"
+
+    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
+        """The stamped times over true ones."""
+        yield value / 60.0, "in minutes"
+        yield value * 1e3, "in milliseconds"
+        for rate in (2.0, 4.0, 5.0, 10.0):
+            yield value * rate, f"of a run sampled {rate:g} times as fast as stated"
+            yield value / rate, f"of a run sampled {rate:g} times as slowly as stated"
+
+
+@dataclass(frozen=True)
 class OfAnotherRun(Label):
     """A label that belongs to another run of the campaign."""
 
@@ -147,7 +175,10 @@ LABELS: tuple[Label, ...] = (
     SpringOfAnotherRun(),
     SpringDecimal(),
     SpringInAnotherUnit(),
+    DensityDecimal(),
 )
+#: Tried where none of the above explains the runs.
+RARE_LABELS: tuple[Label, ...] = (TimeInAnotherUnit(),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,39 +195,52 @@ class _Trial:
 
 @dataclass(frozen=True)
 class WrongLabel(StatementSlip):
-    """One run's label contradicts the others grossly and agrees if a common slip is undone. Refused, with its name.
-
-    Where no single run explains it, the same slip in two runs, and in all runs of one setting, is tried.
-    """
+    """One run's label contradicts the others grossly and agrees if a common slip is undone. Refused, with its name."""
 
     labels: tuple[Label, ...] = LABELS
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
-        """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
-        swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
-        if len(swings) < 3:  # noqa: PLR2004 - two runs determine g and n
-            return ()
-        statements = Statements.of(swings)
-        if not agreement(statements).gross:
-            return ()
-        for places in (self._single(statements), self._several(statements)):
-            trials = [trial for label, at in places for trial in _tried(statements, label, at) if trial.found.good]
-            if trials:
-                return (_refusal(statements, trials),)
-        return ()
+        """Try every label of every run."""
+        return _found(seen, self._places)
 
-    def _single(self, statements: Statements) -> Iterator[tuple[Label, tuple[int, ...]]]:
+    def _places(self, statements: Statements) -> Iterator[tuple[Label, tuple[int, ...]]]:
         for label in self.labels:
             yield from ((label, (place,)) for place in range(len(statements.runs)))
 
-    def _several(self, statements: Statements) -> Iterator[tuple[Label, tuple[int, ...]]]:
+
+@dataclass(frozen=True)
+class WrongLabels(StatementSlip):
+    """The same slip in two runs, or in all runs of one setting. Refused, with their names."""
+
+    labels: tuple[Label, ...] = LABELS
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Try every label of every setting and of every pair."""
+        return _found(seen, self._places)
+
+    def _places(self, statements: Statements) -> Iterator[tuple[Label, tuple[int, ...]]]:
         count = len(statements.runs)
         for label in self.labels:
             values = getattr(statements, label.key)
             settings = {tuple(i for i in range(count) if values[i] == value) for value in set(values.tolist())}
             yield from ((label, at) for at in sorted(settings) if 1 < len(at) < count)
-            if label.repeats:
-                yield from ((label, at) for at in itertools.combinations(range(count), 2) if at not in settings)
+            pairs = itertools.combinations(range(count), 2) if label.repeats and count <= _MOST_PAIRED else ()
+            yield from ((label, at) for at in pairs if at not in settings)
+
+
+def _found(
+    seen: Seen, places: Callable[[Statements], Iterator[tuple[Label, tuple[int, ...]]]]
+) -> tuple[Remark, ...]:
+    """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
+    swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
+    if len(swings) < _FEWEST:
+        return ()
+    statements = Statements.of(swings)
+    if not agreement(statements).gross:
+        return ()
+    tried = (trial for label, at in places(statements) for trial in _tried(statements, label, at))
+    trials = [trial for trial in tried if trial.found.good]
+    return (_refusal(statements, trials),) if trials else ()
 
 
 def _tried(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:
@@ -223,8 +267,12 @@ def _refusal(statements: Statements, trials: Sequence[_Trial]) -> Remark:
     said = []
     for trial in best.values():
         names = ", ".join(statements.runs[i].id for i in trial.places)
-        stated, value = (" and ".join(dict.fromkeys(f"{v:.4g}" for v in some)) for some in (trial.stated, trial.values))
-        said.append(f"{_NAMES[trial.key]} = {stated} of {names} as {value} {_UNITS[trial.key]} ({trial.words})")
+        stated, value = (
+            " and ".join(dict.fromkeys(f"{v:.4g}" for v in some)) for some in (trial.stated, trial.values)
+        )
+        values = f" = {stated}" if trial.key in _UNITS else ""
+        instead = f" as {value} {_UNITS[trial.key]} ({trial.words})" if trial.key in _UNITS else f" {trial.words}"
+        said.append(f"{_NAMES[trial.key]}{values} of {names}{instead}")
     ids = tuple(dict.fromkeys(statements.runs[i].id for places in best for i in places))
     what = "what is stated contradicts the frequencies of the other runs, which agree with " + ", or with ".join(said)
     names = " or ".join(dict.fromkeys(_NAMES[trial.key] for trial in best.values()))

@@ -2,19 +2,51 @@
 
 from __future__ import annotations
 
+from identification.examination.slips.angle_unit import AngleInDegrees
 from identification.examination.slips.base import RecordSlip, Seen, StatementSlip
-from identification.examination.slips.run_labels import WrongLabel
+from identification.examination.slips.between_runs import (
+    InertiaOffTheSprings,
+    LabelsExchanged,
+    MotionGrows,
+    SpringOffTheLine,
+)
+from identification.examination.slips.clock import DriftingClock
+from identification.examination.slips.coupling import CoupledSensor
+from identification.examination.slips.equal_statements import EqualStatementsDiffer
+from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
+from identification.examination.slips.resolution import ResolutionTooCoarse
+from identification.examination.slips.run_labels import RARE_LABELS, WrongLabel, WrongLabels
+from identification.examination.slips.still_air import WindExchanged, WindNotSeen
 from identification.examination.slips.tails import ConstantTail
 from identification.examination.slips.twins import RepeatedRecord
+from identification.examination.slips.units_of_all import InertiaOfNoBody, YawMomentTooLarge
 from identification.examination.slips.wraps import WrappedAngle
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: Looked for in the records as they come.
-RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), ConstantTail())
+RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), ResolutionTooCoarse(), ConstantTail())
 
 #: Looked for in what is measured; after the first refusal no further one is looked for.
-STATEMENT_SLIPS: tuple[StatementSlip, ...] = (WrongLabel(),)
+STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
+    MotionGrows(),
+    WrongLabel(),
+    LabelsExchanged(),
+    WrongLabels(),
+    WrongLabel(RARE_LABELS),
+    EqualStatementsDiffer(),
+    WindExchanged(),
+    AngleInDegrees(),
+    CoupledSensor(),
+    DriftingClock(),
+    MirroredRun(),
+    WindNotSeen(),
+    YawMomentTooLarge(),
+    SpringOffTheLine(),
+    InertiaOffTheSprings(),
+    InertiaOfNoBody(),
+    ReleaseOnTheOtherSide(),
+)
 
 
 def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

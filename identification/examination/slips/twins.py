@@ -36,9 +36,10 @@ class RepeatedRecord(RecordSlip):
 
     def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
         """Leave out runs that repeat an earlier one."""
-        left, remarks = dict[str, Remark](), []
+        left, remarks = dict[str, Remark](), dict[tuple[str, str], Remark]()
         for earlier, run, said in [*_equal(campaign), *_alike(campaign)]:
-            if earlier.id in left or run.id in left:
+            pair = earlier.id, run.id
+            if earlier.id in left or run.id in left or pair in remarks:
                 continue
             if _conditions(earlier) == _conditions(run):
                 remedy = "remove the run, or correct its file name"
@@ -47,9 +48,9 @@ class RepeatedRecord(RecordSlip):
             else:
                 what = f"{said.format(earlier.id)} with different springs or wind speeds"
                 remedy = "correct the file names, or remove one of the runs"
-                remarks.append(Remark(Outcome.REFUSED, (earlier.id, run.id), what, remedy))
+                remarks[pair] = Remark(Outcome.REFUSED, pair, what, remedy)
         runs = tuple(run for run in campaign.runs if run.id not in left)
-        return (replace(campaign, runs=runs) if left else campaign), (*left.values(), *remarks)
+        return (replace(campaign, runs=runs) if left else campaign), (*left.values(), *remarks.values())
 
 
 def _conditions(run: Run) -> tuple[float | None, ...]:
