@@ -112,7 +112,7 @@ def examine(campaign: Campaign) -> Examined:
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
     swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
-    faults = found_in(Seen(kept, tuple(swings)))
+    faults = found_in(Seen(kept, campaign, tuple(swings)))
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))

@@ -23,11 +23,13 @@ class Seen:
     """What is stated and what the records show.
 
     Args:
-        campaign: its records as they are used.
+        campaign: its records as they are used, and its sensor's zeros as they are decided from them.
+        stated: the campaign as it came.
         swings: of its free decays that oscillate, in their order.
     """
 
     campaign: Campaign
+    stated: Campaign
     swings: tuple[Swing, ...]
 
 

@@ -26,7 +26,7 @@ class EqualStatementsDiffer(StatementSlip):
         for swing in seen.swings:
             run = swing.run
             if run.spring_stiffness and swing.rate > 0.0:
-                groups[run.spring_stiffness, run.wind_speed, run.air_density].append(swing)
+                groups[run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None].append(swing)
         ids: list[str] = []
         largest = 0.0, 0.0
         for group in groups.values():

@@ -20,6 +20,10 @@ from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
 
 
+_PASSES = 4
+_LEAST = 1e-3  # of the usual g, where a fit to wrong labels gives less
+
+
 @dataclass(frozen=True, eq=False)
 class Statements:
     """Stated conditions and measured frequencies, run by run.
@@ -90,7 +94,7 @@ class Agreement:
 
     @property
     def gross(self) -> bool:
-        """Whether the contradiction is beyond chance and beyond every effect."""
+        """Whether the statements contradict the frequencies beyond chance and beyond every effect."""
         return self.freedom > 0 and self.squares > float(chdtri(self.freedom, policy.REFUSAL_RATE))
 
     @property
@@ -105,45 +109,45 @@ def agreement(
     departure: float = policy.SPRING_DEPARTURE,
     of_speed: float = policy.SPEED_DEPARTURE,
 ) -> Agreement:
-    """Fit g, n and the springs' departures to statements.
+    """Fit g, n and the stiffness of each spring to statements.
 
     Args:
         departure: relative tolerance of a spring.
         of_speed: relative tolerance of a wind speed.
     """
     settings, place = _settings(labels.spring)
-    scale = float(np.median(labels.seen / labels.spring))
+    seen, pressure, count, springs = labels.seen, labels.pressure, labels.seen.size, settings.size
     windy = bool(np.any(labels.speed > 0.0))
-    count, springs = labels.seen.size, settings.size
+    # unknowns: ln of g is near its median, so g over it; n; the stiffness of each spring over its median
+    usual = float(np.median(seen / labels.spring))
+    least = np.array([seen[place == i].min() for i in range(springs)])
     columns = np.zeros((count + springs, 2 + springs))
-    columns[:count, 0] = labels.spring * scale
-    columns[:count, 1] = -labels.pressure
-    columns[np.arange(count), 2 + place] = labels.spring * scale
-    columns[count:, 2:] = np.eye(springs)
-    if not windy:
-        columns = np.delete(columns, 1, axis=1)
-    target = np.concatenate((labels.seen, np.zeros(springs)))
-    air, solution, sizes, std = 0.0, np.zeros(0), np.zeros(0), np.zeros(0)
-    for _ in range(3):  # the tolerance of a speed scales with n
-        tolerance = np.sqrt(
-            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * labels.seen**2
-            + (2.0 * of_speed * air * labels.pressure) ** 2
+    columns[:count, 1] = -pressure
+    columns[np.arange(count), 2 + place] = 1.0
+    columns[count:, 0] = settings
+    columns[count:, 2:] = -np.eye(springs)
+    target = np.concatenate((seen, np.zeros(springs)))
+    inverse_inertia, air, stiffness = usual, 0.0, least
+    for _ in range(_PASSES):  # the tolerances scale with what is fitted
+        of_runs = np.sqrt(
+            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2 + (2.0 * of_speed * air * pressure) ** 2
         )
-        std = np.concatenate((tolerance, np.full(springs, departure)))
-        weighted = columns / std[:, None]
+        of_springs = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
+        weighted = columns / np.concatenate((of_runs, of_springs))[:, None]
+        scaled = target / np.concatenate((of_runs, of_springs))
         sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
-        solution = np.linalg.lstsq(weighted / sizes, target / std, rcond=1e-10)[0] / sizes
-        air = float(solution[1]) if windy else 0.0
-    away = (target - columns @ solution) / std
-    spread = np.linalg.pinv((columns / std[:, None]).T @ (columns / std[:, None]), rcond=1e-14, hermitian=True)
-    # the departures are told from g where springs differ, and are prior knowledge besides: g and n alone are free
+        solution = np.linalg.lstsq(weighted / sizes, scaled, rcond=1e-12)[0] / sizes
+        away = scaled - weighted @ solution
+        inverse_inertia, air = float(solution[0]), float(solution[1])
+        stiffness = np.maximum(solution[2:], least)
+    variance = np.linalg.pinv((weighted / sizes).T @ (weighted / sizes), rcond=1e-14, hermitian=True)
     return Agreement(
         squares=float(away @ away),
         freedom=count - 1 - int(windy),
         away=np.abs(away[:count]),
-        inverse_inertia=float(solution[0]) * scale,
+        inverse_inertia=inverse_inertia,
         air=air,
-        air_std=float(np.sqrt(spread[1, 1])) if windy else 0.0,
+        air_std=float(np.sqrt(variance[1, 1]) / sizes[1]),
     )
 
 

@@ -30,7 +30,7 @@ class MirroredRun(StatementSlip):
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare the zeros of all runs with those of some signs inverted."""
         swings = seen.swings
-        if len(swings) < _FEWEST or seen.campaign.sensor.zero == "per_run":
+        if len(swings) < _FEWEST or seen.stated.sensor.zero == "per_run":
             return ()
         zeros = np.array([swing.zero for swing in swings])
         std = np.array([max(swing.zero_std, 1e-300) for swing in swings])

@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
+import numpy as np
 from scipy.special import chdtri
 
 from identification import policy
 from identification.examination.slips.base import Seen, StatementSlip
-from identification.examination.slips.fits import Agreement, Statements, agreement
+from identification.examination.slips.fits import Statements, agreement
 from identification.status import Outcome, Remark
 
 Key = Literal["spring", "speed", "density", "clock"]
@@ -25,7 +26,9 @@ _NAMES: Mapping[Key, str] = {
 }  # fmt: skip
 _UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
 _FEWEST = 3  # runs: two determine g and n
-_MOST_PAIRED = 40  # runs of which all pairs are tried: more take over a second
+_MOST_SUSPECTS = 12  # runs that agree worst, whose labels are tried
+_MOST_SAID = 3
+_TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
 _DECIMAL = {"with its decimal point one place to the right": 10.0, "with its decimal point one place to the left": 0.1}
 
 
@@ -176,21 +179,27 @@ LABELS: tuple[Label, ...] = (
     SpringDecimal(),
     SpringInAnotherUnit(),
     DensityDecimal(),
+    TimeInAnotherUnit(),
 )
-#: Tried where none of the above explains the runs.
-RARE_LABELS: tuple[Label, ...] = (TimeInAnotherUnit(),)
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """Runs with another label, and how the campaign agrees then."""
+    """Other labels for some runs.
+
+    Args:
+        familiar: whether the values are those of other runs, or no wind.
+        said: words for the change.
+    """
 
     places: tuple[int, ...]
-    key: Key
-    stated: tuple[float, ...]
-    values: tuple[float, ...]
-    words: str
-    found: Agreement
+    names: tuple[str, ...]
+    labels: Statements
+    familiar: bool
+    said: str
+
+
+Trials = Callable[[Statements, Sequence[int]], Iterator[_Trial]]
 
 
 @dataclass(frozen=True)
@@ -201,79 +210,121 @@ class WrongLabel(StatementSlip):
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Try every label of every run."""
-        return _found(seen, self._places)
+        return _found(seen, self._trials)
 
-    def _places(self, statements: Statements) -> Iterator[tuple[Label, tuple[int, ...]]]:
+    def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
         for label in self.labels:
-            yield from ((label, (place,)) for place in range(len(statements.runs)))
+            for place in suspects:
+                yield from _relabelled(statements, label, (place,))
 
 
 @dataclass(frozen=True)
 class WrongLabels(StatementSlip):
-    """The same slip in two runs, or in all runs of one setting. Refused, with their names."""
+    """Labels of two runs or two settings are exchanged, or a slip is in two runs or a whole setting. Refused, with names."""
 
     labels: tuple[Label, ...] = LABELS
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
-        """Try every label of every setting and of every pair."""
-        return _found(seen, self._places)
+        """Try all exchanges, and every label of every setting and of every pair."""
+        return _found(seen, self._trials)
 
-    def _places(self, statements: Statements) -> Iterator[tuple[Label, tuple[int, ...]]]:
+    def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
         count = len(statements.runs)
+        for keys in (("spring",), ("speed",), ("spring", "speed")):
+            for i, j in itertools.combinations(range(count), 2):
+                if i in suspects or j in suspects:
+                    yield from _exchanged(statements, keys, (i,), (j,))
         for label in self.labels:
-            values = getattr(statements, label.key)
-            settings = {tuple(i for i in range(count) if values[i] == value) for value in set(values.tolist())}
-            yield from ((label, at) for at in sorted(settings) if 1 < len(at) < count)
-            pairs = itertools.combinations(range(count), 2) if label.repeats and count <= _MOST_PAIRED else ()
-            yield from ((label, at) for at in pairs if at not in settings)
+            settings = _settings(statements, label.key)
+            yield from (trial for at in settings if 1 < len(at) < count for trial in _relabelled(statements, label, at))
+            for at in itertools.combinations(suspects, 2) if label.repeats else ():
+                if at not in settings:
+                    yield from _relabelled(statements, label, at)
+        for key in ("spring", "speed"):
+            for one, two in itertools.combinations(_settings(statements, key), 2):
+                if len(one) + len(two) > 2:  # noqa: PLR2004 - not a pair
+                    yield from _exchanged(statements, (key,), one, two)
 
 
-def _found(
-    seen: Seen, places: Callable[[Statements], Iterator[tuple[Label, tuple[int, ...]]]]
-) -> tuple[Remark, ...]:
+def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
+    """The runs of each stated value."""
+    values = getattr(statements, key)
+    return [tuple(np.flatnonzero(values == value).tolist()) for value in np.unique(values)]
+
+
+def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
     swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
     if len(swings) < _FEWEST:
         return ()
     statements = Statements.of(swings)
-    if not agreement(statements).gross:
+    stated = agreement(statements)
+    suspects = np.argsort(-stated.away)[:_MOST_SUSPECTS]
+    if not stated.gross:
+        suspects = suspects[stated.away[suspects] > policy.MISFIT_DEVIATIONS]
+    tried = list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
+    # one more label is fitted than where all are taken as stated
+    gain = float(chdtri(1, policy.REFUSAL_RATE / max(len(tried), 1)))
+    mended = []
+    for trial in tried:
+        found = agreement(trial.labels)
+        if found.good and (stated.gross or stated.squares - found.squares > gain):
+            mended.append((trial, found.squares))
+    if not mended:
         return ()
-    tried = (trial for label, at in places(statements) for trial in _tried(statements, label, at))
-    trials = [trial for trial in tried if trial.found.good]
-    return (_refusal(statements, trials),) if trials else ()
+    limit = min(squares for _, squares in mended) + _TIE
+    mended = [(trial, squares) for trial, squares in mended if squares <= limit]
+    best: dict[tuple[int, ...], _Trial] = {}
+    for trial, _ in sorted(mended, key=lambda pair: not pair[0].familiar):  # of equals, the first in the table
+        if trial.familiar or trial.places not in best:
+            best.setdefault(trial.places, trial)
+    shown = sorted(best.values(), key=lambda trial: len(trial.places))[:_MOST_SAID]
+    said = ", or with ".join(trial.said for trial in shown)
+    ids = tuple(dict.fromkeys(statements.runs[i].id for trial in shown for i in trial.places))
+    what = f"what is stated contradicts the frequencies of the other runs, which agree with {said}"
+    names = " or ".join(dict.fromkeys(name for trial in shown for name in trial.names))
+    return (Remark(Outcome.REFUSED, ids, what, f"correct {names}, or leave the run out"),)
 
 
-def _tried(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:
-    """The campaign with the values that may have been meant in some runs."""
+def _relabelled(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:
+    """The campaign with the values that may have been meant in some runs, by the same way of slipping in each."""
     values = getattr(statements, label.key)
     others = [float(value) for i, value in enumerate(values.tolist()) if i not in places]
-    meant = [list(label.meant(float(values[i]), others)) for i in places]
-    for options in zip(*meant, strict=False):  # the same way of slipping in every run
+    ids = ", ".join(statements.runs[i].id for i in places)
+    name, unit = _NAMES[label.key], _UNITS.get(label.key)
+    for options in zip(*(list(label.meant(float(values[i]), others)) for i in places), strict=False):
+        if len({words for _, words in options}) > 1:
+            continue
         changed = values.copy()
         changed[list(places)] = [value for value, _ in options]
-        if len({words for _, words in options}) == 1:
-            found = agreement(replace(statements, **{label.key: changed}))
-            stated = tuple(float(values[i]) for i in places)
-            yield _Trial(places, label.key, stated, tuple(v for v, _ in options), options[0][1], found)
-
-
-def _refusal(statements: Statements, trials: Sequence[_Trial]) -> Remark:
-    """The slips that agree about equally well, the commonest of each set of runs."""
-    limit = min(trial.found.squares for trial in trials) + float(chdtri(1, policy.SLIP_AGREES))
-    best: dict[tuple[int, ...], _Trial] = {}
-    for trial in trials:  # the commonest slip first
-        if trial.found.squares <= limit:
-            best.setdefault(trial.places, trial)
-    said = []
-    for trial in best.values():
-        names = ", ".join(statements.runs[i].id for i in trial.places)
-        stated, value = (
-            " and ".join(dict.fromkeys(f"{v:.4g}" for v in some)) for some in (trial.stated, trial.values)
+        familiar = unit is None or all(
+            value == 0.0 or any(abs(value - o) <= policy.LEAST_SPRING_SPREAD * o for o in others) for value, _ in options
         )
-        values = f" = {stated}" if trial.key in _UNITS else ""
-        instead = f" as {value} {_UNITS[trial.key]} ({trial.words})" if trial.key in _UNITS else f" {trial.words}"
-        said.append(f"{_NAMES[trial.key]}{values} of {names}{instead}")
-    ids = tuple(dict.fromkeys(statements.runs[i].id for places in best for i in places))
-    what = "what is stated contradicts the frequencies of the other runs, which agree with " + ", or with ".join(said)
-    names = " or ".join(dict.fromkeys(_NAMES[trial.key] for trial in best.values()))
-    return Remark(Outcome.REFUSED, ids, what, f"correct {names}, or leave the run out")
+        words = options[0][1]
+        said = f"{name} of {ids} {words}"
+        if unit is not None:
+            before, after = (
+                " and ".join(dict.fromkeys(f"{value:.4g}" for value in some))
+                for some in (values[list(places)].tolist(), [value for value, _ in options])
+            )
+            said = f"{name} = {before} of {ids} as {after} {unit} ({words})"
+        yield _Trial(places, (name,), replace(statements, **{label.key: changed}), familiar, said)
+
+
+def _exchanged(
+    statements: Statements, keys: Sequence[str], one: tuple[int, ...], two: tuple[int, ...]
+) -> Iterator[_Trial]:
+    """The campaign with the labels of two sets of runs exchanged, if all of them differ."""
+    changes = {}
+    for key in keys:
+        values = getattr(statements, key)
+        low, high = sorted((values[one[0]], values[two[0]]))
+        if high - low <= policy.SAME_PRESSURE * high:
+            return
+        changed = values.copy()
+        changed[list(one)], changed[list(two)] = values[two[0]], values[one[0]]
+        changes[key] = changed
+    sides = (", ".join(statements.runs[i].id for i in side) for side in (one, two))
+    names = tuple(_NAMES[key] for key in _NAMES if key in keys)
+    said = f"{' and '.join(names)} of {' and '.join(sides)} exchanged"
+    yield _Trial(tuple(sorted((*one, *two))), names, replace(statements, **changes), True, said)

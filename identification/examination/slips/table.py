@@ -15,7 +15,7 @@ from identification.examination.slips.coupling import CoupledSensor
 from identification.examination.slips.equal_statements import EqualStatementsDiffer
 from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
 from identification.examination.slips.resolution import ResolutionTooCoarse
-from identification.examination.slips.run_labels import RARE_LABELS, WrongLabel, WrongLabels
+from identification.examination.slips.run_labels import WrongLabel, WrongLabels
 from identification.examination.slips.still_air import WindExchanged, WindNotSeen
 from identification.examination.slips.tails import ConstantTail
 from identification.examination.slips.twins import RepeatedRecord
@@ -31,9 +31,8 @@ RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), Resolu
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
     MotionGrows(),
     WrongLabel(),
-    LabelsExchanged(),
     WrongLabels(),
-    WrongLabel(RARE_LABELS),
+    LabelsExchanged(),
     EqualStatementsDiffer(),
     WindExchanged(),
     AngleInDegrees(),

@@ -14,13 +14,17 @@ from identification.status import Outcome, Remark
 _KEEP = "or state plausible = false under [sensor]"
 _SLENDER = 12.0  # Izz of a uniform rod of mass m and length l is m l²/12
 
-#: What the inertia is over the true one where a value is in another unit.
-_OF_INERTIA = {
+#: What the density is over the true one where a value is in another unit.
+_OF_DENSITY = {
     "spring_stiffness in N mm/rad": 1e3,
     "spring_stiffness in N cm/rad": 1e2,
     "spring_stiffness in N m/deg": np.pi / 180.0,
     "time_s in minutes": 1.0 / 3600.0,
     "time_s in milliseconds": 1e6,
+    "frontal_area in cm2": 1e-4,
+    "frontal_area in mm2": 1e-6,
+    "reference_length in cm": 1e-6,
+    "reference_length in mm": 1e-9,
 }
 
 
@@ -70,7 +74,7 @@ class InertiaOfNoBody(StatementSlip):
         low, high = policy.BODY_DENSITIES
         if low <= density <= high:
             return ()
-        likely = [words for words, factor in _OF_INERTIA.items() if low <= density / factor <= high]
+        likely = [words for words, factor in _OF_DENSITY.items() if low <= density / factor <= high]
         looks = f"; it looks like {' or '.join(likely)}" if likely else ""
         what = (
             f"the frequencies give Izz = {inertia:.3g} kg m2, which a body of the stated frontal_area and reference_length "
