@@ -55,14 +55,14 @@ SPRING_DEPARTURE = 0.25
 """Relative departure of a spring from its statement that an effect may cause: calibration, gravity, a flexible rod.
 A slip is looked for beyond it. Judgement."""
 
-SPEED_DEPARTURE = 0.04
+SPEED_DEPARTURE = 0.03
 """The same of a wind speed: calibration, an offset, the stream's unevenness. Judgement."""
 
 SLIP_AGREES = 0.1
 """Rate at which runs with right labels, of departures as large as the two above, would be said not to agree. Another
 label is offered only where all agree better."""
 
-SCATTER_OF_STIFFNESS = 0.003
+SCATTER_OF_STIFFNESS = 0.002
 """Relative scatter of ωn² between runs of equal statements, beside its change along the run: springs are clamped anew to
 a few parts in ten thousand, and the amplitude of the release may move it. Judgement."""
 

@@ -21,6 +21,7 @@ from tunnel_sim.vocabulary.record import Array
 
 
 _PASSES = 4
+_MOST_AIR = 3.0  # air's stiffness over the whole, a standard deviation: more is less likely, and not excluded
 _LEAST = 1e-3  # of the usual g, where a fit to wrong labels gives less
 
 
@@ -118,23 +119,24 @@ def agreement(
     settings, place = _settings(labels.spring)
     seen, pressure, count, springs = labels.seen, labels.pressure, labels.seen.size, settings.size
     windy = bool(np.any(labels.speed > 0.0))
-    # unknowns: ln of g is near its median, so g over it; n; the stiffness of each spring over its median
+    # unknowns: g, n, and the stiffness of each spring per unit inertia
     usual = float(np.median(seen / labels.spring))
     least = np.array([seen[place == i].min() for i in range(springs)])
-    columns = np.zeros((count + springs, 2 + springs))
+    columns = np.zeros((count + springs + int(windy), 2 + springs))
     columns[:count, 1] = -pressure
     columns[np.arange(count), 2 + place] = 1.0
-    columns[count:, 0] = settings
-    columns[count:, 2:] = -np.eye(springs)
-    target = np.concatenate((seen, np.zeros(springs)))
+    columns[count : count + springs, 0] = settings
+    columns[count : count + springs, 2:] = -np.eye(springs)
+    columns[count + springs :, 1] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
+    target = np.concatenate((seen, np.zeros(springs + int(windy))))
     inverse_inertia, air, stiffness = usual, 0.0, least
     for _ in range(_PASSES):  # the tolerances scale with what is fitted
         of_runs = np.sqrt(
             (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2 + (2.0 * of_speed * air * pressure) ** 2
         )
         of_springs = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
-        weighted = columns / np.concatenate((of_runs, of_springs))[:, None]
-        scaled = target / np.concatenate((of_runs, of_springs))
+        std = np.concatenate((of_runs, of_springs, np.ones(int(windy))))
+        weighted, scaled = columns / std[:, None], target / std
         sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
         solution = np.linalg.lstsq(weighted / sizes, scaled, rcond=1e-12)[0] / sizes
         away = scaled - weighted @ solution

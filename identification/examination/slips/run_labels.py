@@ -263,8 +263,7 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     if not stated.gross:
         suspects = suspects[stated.away[suspects] > policy.MISFIT_DEVIATIONS]
     tried = list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
-    # one more label is fitted than where all are taken as stated
-    gain = float(chdtri(1, policy.REFUSAL_RATE / max(len(tried), 1)))
+    gain = float(chdtri(1, policy.REFUSAL_RATE))  # of one more label that is fitted
     mended = []
     for trial in tried:
         found = agreement(trial.labels)

@@ -17,7 +17,7 @@ from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheO
 from identification.examination.slips.resolution import ResolutionTooCoarse
 from identification.examination.slips.run_labels import WrongLabel, WrongLabels
 from identification.examination.slips.still_air import WindExchanged, WindNotSeen
-from identification.examination.slips.tails import ConstantTail
+from identification.examination.slips.tails import ConstantTail, StuckReading
 from identification.examination.slips.twins import RepeatedRecord
 from identification.examination.slips.units_of_all import InertiaOfNoBody, YawMomentTooLarge
 from identification.examination.slips.wraps import WrappedAngle
@@ -25,7 +25,7 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: Looked for in the records as they come.
-RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), ResolutionTooCoarse(), ConstantTail())
+RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), ResolutionTooCoarse(), ConstantTail(), StuckReading())
 
 #: Looked for in what is measured; after the first refusal no further one is looked for.
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (

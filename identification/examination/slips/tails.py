@@ -14,6 +14,8 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Record
 
+_STUCK = 0.6  # of a cycle
+_MOVING = 0.1  # of the record's range: the swings on both sides of a stuck stretch
 _STANDS = 0.01  # of the record's largest excursion: the reading stands while it stays as near its last value,
 _NOISE = 5.0  # or within as many standard deviations of its last fiftieth
 _LEAST_CYCLES = 0.75  # of standing: at a turning point a swing stays within a hundredth for a twentieth of a cycle
@@ -22,6 +24,54 @@ _LEAST_KEPT = 2.0  # cycles of motion before it, whose last swings are compared
 #: damping takes a share. A swing of more than three steps does not stop by itself.
 _STEPS = 3.0
 _CLEAR = 5.0  # bands of standing that the last swing must exceed
+
+
+@dataclass(frozen=True)
+class StuckReading(RecordSlip):
+    """The reading keeps one value to the last bit for most of a cycle, between swings. Those samples are left out.
+
+    A clipped or coarse reading keeps a value for less than half a cycle, at its turning points.
+    """
+
+    def mend(self, campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+        """Leave out the stretches in which the reading of a free decay is stuck."""
+        runs, remarks = [], []
+        for run in campaign.runs:
+            stuck = None if run.drive is not None else stuck_samples(run.record)
+            if stuck is not None:
+                time, yaw = run.record.time_s, run.record.yaw_rad
+                where = np.flatnonzero(stuck)
+                what = (
+                    f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading keeps one value while the body "
+                    f"moves ({where.size} samples); they are left out"
+                )
+                remarks.append(Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable"))
+                run = replace(run, record=Record(time[~stuck], yaw[~stuck]))
+            runs.append(run)
+        return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
+
+
+def stuck_samples(record: Record) -> NDArray[np.bool_] | None:
+    """The samples that repeat one value between swings for `_STUCK` cycles or longer; None where there are none."""
+    yaw, time = record.yaw_rad, record.time_s
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(yaw)) + 1))  # of stretches of one value
+    lengths = np.diff(np.concatenate((starts, [yaw.size])))
+    longest = int(lengths.max())
+    if longest < LEAST_SAMPLES or (frequency := starting_frequency(record)) is None:
+        return None
+    cycle = max(int(record.sample_rate / frequency), 1)
+    long = np.flatnonzero(lengths >= _STUCK * cycle)
+    stuck = np.zeros(yaw.size, dtype=np.bool_)
+    for place in long.tolist():
+        begin, end = int(starts[place]), int(starts[place] + lengths[place])
+        before, after = yaw[max(begin - cycle, 0) : begin], yaw[end : end + cycle]
+        if before.size < cycle // 2 or after.size < cycle // 2:
+            continue  # at an end: a release or a rest
+        swings = min(float(np.ptp(before)), float(np.ptp(after)))
+        if swings > _MOVING * float(np.ptp(yaw)):
+            stuck[begin:end] = True
+    kept = float(np.sum(~stuck)) * (time[-1] - time[0]) / yaw.size
+    return stuck if stuck.any() and kept * frequency > _LEAST_KEPT else None
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ _LEAST = 500  # differences in common: noise alone correlates by 0.3 at the best
 _SAME = 0.7
 _ALONE = 0.5  # of the correlation: none is as large at another shift, as it is for hum that two runs share
 _NEAR = 12  # shifts about the best that the differencing itself correlates
+_THINNED = (2, 3, 4)  # samples of which one is kept
+_SAME_RATE = 1e-3
 _MOST_PAIRS = 1500  # half a second of comparisons
 _ROUNDING = 1e-9  # of the largest reading: differences as small are those of the numbers
 
@@ -79,10 +81,27 @@ def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
         spectrum = rfft(noise, size)
         for other, its, samples in near:
             found = _correlation(spectrum, its, min(samples, noise.size), size)
+            if abs(found) <= _SAME:
+                found = _thinned_correlation(run, other, size)
             if abs(found) > _SAME:
                 first, second = sorted((run, other), key=lambda one: place[one.id])
                 yield first, second, f"the noise of run {{}} (correlation {found:.2f}), hence the same record"
         near.append((run, spectrum, noise.size))
+
+
+def _thinned_correlation(run: Run, other: Run, size: int) -> float:
+    """The correlation of a record with every second to fourth sample of a faster one; 0 where neither is faster."""
+    slow, fast = sorted((run, other), key=lambda one: one.record.sample_rate)
+    ratio = fast.record.sample_rate / slow.record.sample_rate
+    step = round(ratio)
+    if step not in _THINNED or abs(ratio / step - 1.0) > _SAME_RATE:
+        return 0.0
+    noise = _noise(slow.record.yaw_rad)
+    spectrum, best = rfft(noise, size), 0.0
+    for phase in range(step):
+        thin = _noise(fast.record.yaw_rad[phase::step])
+        best = max(best, _correlation(spectrum, rfft(thin, size), min(thin.size, noise.size), size), key=abs)
+    return best
 
 
 def _noise(yaw: Array) -> Array:
