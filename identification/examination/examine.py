@@ -85,38 +85,52 @@ def _in_unit(quantity: Quantity | None, unit: str) -> Quantity | None:
 def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
-    Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
+    Records are mended, and statements that they contradict are refused or noted, by the slips of
+    `identification.examination.slips.table`. Rounded time stamps are replaced by the clock behind them. Samples before
     the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are cut to
-    their linear growth, or left out. Runs whose zeros differ get one each. Motion that grows with the wind off,
-    and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies,
-    and an inertia that does not fit the springs, are noted.
+    their linear growth, or left out. Runs whose zeros differ get one each.
 
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.
     """
+    kept, remarks, seen = measured(campaign)
+    return Examined(kept, (*remarks, *(() if seen is None else found_in(seen))))
+
+
+def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], Seen | None]:
+    """Mend the records of a campaign, and measure its free decays.
+
+    Returns:
+        The campaign, what was done with it, and what its free decays show; None where all runs are driven, or the
+        records are refused.
+
+    Raises:
+        TunnelError: as `examine`.
+    """
     for run in campaign.runs:
         loads(run, campaign.rig)
-    kept, repeats = mended(campaign)
-    if any(remark.outcome is Outcome.REFUSED for remark in repeats):
-        return Examined(campaign, tuple(r for r in repeats if r.outcome is Outcome.REFUSED))
+    kept, faults = mended(campaign)
+    refused = tuple(remark for remark in faults if remark.outcome is Outcome.REFUSED)
+    if refused:
+        return campaign, refused, None
     noted = noted_readings(kept)
     kept, clocks = with_clocks(kept)
     # Driven runs neither begin with a release nor end at rest, and what sustains them is known.
     driven, order = [run for run in kept.runs if run.drive is not None], [run.id for run in kept.runs]
     if driven and len(driven) == len(order):
-        return Examined(kept, (*repeats, *noted, *clocks))
+        return kept, (*faults, *noted, *clocks), None
     if driven:
         kept = replace(kept, runs=tuple(run for run in kept.runs if run.drive is None))
     kept, releases = from_releases(kept)
     kept, rests = without_rest(kept)
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
-    swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
-    faults = found_in(Seen(kept, campaign, tuple(swings)))
+    swings = tuple(swing for run in kept.runs if (swing := swing_of(run)) is not None)
+    seen = Seen(kept, campaign, swings)
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
-    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *excited, *zeros, *faults))
+    return kept, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), seen
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

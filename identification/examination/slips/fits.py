@@ -117,31 +117,43 @@ def agreement(
         of_speed: relative tolerance of a wind speed.
     """
     settings, place = _settings(labels.spring)
-    seen, pressure, count, springs = labels.seen, labels.pressure, labels.seen.size, settings.size
-    windy = bool(np.any(labels.speed > 0.0))
-    # unknowns: g, n, and the stiffness of each spring per unit inertia
+    seen, pressure, springs = labels.seen, labels.pressure, settings.size
+    count, windy = seen.size, bool(np.any(labels.speed > 0.0))
     usual = float(np.median(seen / labels.spring))
-    least = np.array([seen[place == i].min() for i in range(springs)])
-    columns = np.zeros((count + springs + int(windy), 2 + springs))
+    least = np.full(springs, np.inf)
+    np.minimum.at(least, place, seen)
+    # rows of the runs, of the springs, and of n; columns g and n; the stiffness of each spring per unit inertia, which
+    # is the third kind of unknown, is eliminated
+    group = np.concatenate((place, np.arange(springs), [springs]))
+    of_spring = np.concatenate((np.ones(count), -np.ones(springs), [0.0]))
+    columns = np.zeros((count + springs + 1, 2))
     columns[:count, 1] = -pressure
-    columns[np.arange(count), 2 + place] = 1.0
-    columns[count : count + springs, 0] = settings
-    columns[count : count + springs, 2:] = -np.eye(springs)
-    columns[count + springs :, 1] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
-    target = np.concatenate((seen, np.zeros(springs + int(windy))))
+    columns[count:-1, 0] = settings
+    columns[-1, 1] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
+    target = np.concatenate((seen, np.zeros(springs + 1)))
     inverse_inertia, air, stiffness = usual, 0.0, least
     for _ in range(_PASSES):  # the tolerances scale with what is fitted
         of_runs = np.sqrt(
             (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2 + (2.0 * of_speed * air * pressure) ** 2
         )
         of_springs = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
-        std = np.concatenate((of_runs, of_springs, np.ones(int(windy))))
-        weighted, scaled = columns / std[:, None], target / std
-        sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-300)
+        std = np.concatenate((of_runs, of_springs, [1.0]))
+        indicator = of_spring / std
+        squares = np.bincount(group, indicator**2) + np.r_[np.zeros(springs), 1.0]
+
+        def on_springs(values: Array, unit: Array = indicator, over: Array = squares) -> Array:
+            return np.asarray(np.bincount(group, unit * values) / over)
+
+        scaled, weighted = target / std, columns / std[:, None]
+        of_target = on_springs(scaled)
+        of_columns = np.column_stack([on_springs(column) for column in weighted.T])
+        scaled = scaled - indicator * of_target[group]
+        weighted = weighted - indicator[:, None] * of_columns[group]
+        sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-150)
         solution = np.linalg.lstsq(weighted / sizes, scaled, rcond=1e-12)[0] / sizes
         away = scaled - weighted @ solution
-        inverse_inertia, air = float(solution[0]), float(solution[1])
-        stiffness = np.maximum(solution[2:], least)
+        inverse_inertia, air = (float(value) for value in solution)
+        stiffness = np.maximum((of_target - of_columns @ solution)[:springs], least)
     variance = np.linalg.pinv((weighted / sizes).T @ (weighted / sizes), rcond=1e-14, hermitian=True)
     return Agreement(
         squares=float(away @ away),
@@ -149,7 +161,7 @@ def agreement(
         away=np.abs(away[:count]),
         inverse_inertia=inverse_inertia,
         air=air,
-        air_std=float(np.sqrt(variance[1, 1]) / sizes[1]),
+        air_std=float(np.sqrt(variance[1, 1]) / sizes[1]) if windy else 0.0,
     )
 
 

@@ -27,6 +27,7 @@ _NAMES: Mapping[Key, str] = {
 _UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
 _FEWEST = 3  # runs: two determine g and n
 _MOST_SUSPECTS = 12  # runs that agree worst, whose labels are tried
+_MOST_PAIRED = 40  # runs of which all pairs with a suspect are tried
 _MOST_SAID = 3
 _TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
 _DECIMAL = {"with its decimal point one place to the right": 10.0, "with its decimal point one place to the left": 0.1}
@@ -231,7 +232,7 @@ class WrongLabels(StatementSlip):
     def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
         count = len(statements.runs)
         for keys in (("spring",), ("speed",), ("spring", "speed")):
-            for i, j in itertools.combinations(range(count), 2):
+            for i, j in itertools.combinations(range(count) if count <= _MOST_PAIRED else suspects, 2):
                 if i in suspects or j in suspects:
                     yield from _exchanged(statements, keys, (i,), (j,))
         for label in self.labels:

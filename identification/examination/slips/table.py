@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from identification.examination.slips.angle_unit import AngleInDegrees
 from identification.examination.slips.base import RecordSlip, Seen, StatementSlip
 from identification.examination.slips.between_runs import (
@@ -49,22 +51,27 @@ STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
 
 
 def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """A campaign without the faults of its records, and what was done."""
+    """A campaign without the faults of its records, and what was done; as far as the first refusal."""
     remarks: tuple[Remark, ...] = ()
-    for slip in RECORD_SLIPS:
-        campaign, said = slip.mend(campaign)
-        remarks += said
-        if any(remark.outcome is Outcome.REFUSED for remark in said):
-            break
+    with np.errstate(all="ignore"):  # readings may have any size; the methods refuse what cannot be squared
+        for slip in RECORD_SLIPS:
+            campaign, said = slip.mend(campaign)
+            remarks += said
+            if any(remark.outcome is Outcome.REFUSED for remark in said):
+                break
     return campaign, remarks
 
 
 def found_in(seen: Seen) -> tuple[Remark, ...]:
-    """Remarks on the statements that the measured oscillations contradict."""
+    """Remarks on the statements that the measured oscillations contradict; a refusal alone."""
     remarks: tuple[Remark, ...] = ()
-    for slip in STATEMENT_SLIPS:
-        said = slip.find(seen)
-        remarks += said
-        if any(remark.outcome is Outcome.REFUSED for remark in said):
-            return tuple(remark for remark in said if remark.outcome is Outcome.REFUSED)
+    with np.errstate(all="ignore"):
+        for slip in STATEMENT_SLIPS:
+            try:
+                said = slip.find(seen)
+            except np.linalg.LinAlgError:  # values so far apart that they cannot be compared
+                continue
+            remarks += said
+            if any(remark.outcome is Outcome.REFUSED for remark in said):
+                return said
     return remarks
