@@ -72,7 +72,9 @@ class DriftingClock(StatementSlip):
                 f"the frequency changes by {100.0 * drift:+.2g} % along {who}, linearly with time and whatever the amplitude: "
                 f"the clock of the logger drifts{'' if still.intersection(ids) else ', or the wind speed'}"
             )
-            return (Remark(Outcome.REFUSED, ids, what, "correct time_s by a reference, or leave the runs out"),)
+            return (
+                Remark(Outcome.REFUSED, ids, what, "correct time_s by a reference, or leave the runs out"),
+            )
         return ()
 
 

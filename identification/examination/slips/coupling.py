@@ -103,9 +103,7 @@ def _decaying(swing: Swing) -> _Decaying | None:
     return _Decaying(swing.run.id, tau, centre, zero, float(std), float(lead), float(expected))
 
 
-def _fit(
-    time: Array, yaw: Array, decay: Decay, tau: float
-) -> tuple[float, Decay, Array, Array]:
+def _fit(time: Array, yaw: Array, decay: Decay, tau: float) -> tuple[float, Decay, Array, Array]:
     """Sum of squares, corrected poles, (angle, rate, corrections, centre, zero), and the inverse of the normal matrix."""
     for _ in range(_SWEEPS):
         unit, sine, slope, ramp, one = response_rows(time, decay, constant=True)

@@ -26,7 +26,9 @@ class EqualStatementsDiffer(StatementSlip):
         for swing in seen.swings:
             run = swing.run
             if run.spring_stiffness and swing.rate > 0.0:
-                groups[run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None].append(swing)
+                groups[run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None].append(
+                    swing
+                )
         ids: list[str] = []
         largest = 0.0, 0.0
         for group in groups.values():
@@ -54,7 +56,11 @@ def _apart(low: Swing, high: Swing) -> tuple[float, float]:
         return 0.0, 0.0
     found = []
     for one, other, stds in (
-        (high.stiffness, low.stiffness, (high.stiffness_std / high.stiffness, low.stiffness_std / low.stiffness)),
+        (
+            high.stiffness,
+            low.stiffness,
+            (high.stiffness_std / high.stiffness, low.stiffness_std / low.stiffness),
+        ),
         (high.rate, low.rate, (high.rate_std / high.rate, low.rate_std / low.rate)),
     ):
         found.append(max(abs(np.log(one / other)) - policy.REFUSAL_DEVIATIONS * float(np.hypot(*stds)), 0.0))

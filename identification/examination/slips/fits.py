@@ -134,7 +134,8 @@ def agreement(
     inverse_inertia, air, stiffness = usual, 0.0, least
     for _ in range(_PASSES):  # the tolerances scale with what is fitted
         of_runs = np.sqrt(
-            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2 + (2.0 * of_speed * air * pressure) ** 2
+            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2
+            + (2.0 * of_speed * air * pressure) ** 2
         )
         of_springs = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
         std = np.concatenate((of_runs, of_springs, [1.0]))

@@ -57,7 +57,11 @@ class MirroredRun(StatementSlip):
             f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {seen.campaign.sensor.unit} and the "
             f"others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
         )
-        return (Remark(Outcome.REFUSED, ids, what, "invert the sign of these readings, or state zero = 'per_run'"),)
+        return (
+            Remark(
+                Outcome.REFUSED, ids, what, "invert the sign of these readings, or state zero = 'per_run'"
+            ),
+        )
 
 
 def _scatter(values: Array, std: Array) -> float:

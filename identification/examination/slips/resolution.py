@@ -50,4 +50,6 @@ def _off_lattice(yaw: Array, step: float) -> bool:
     changes = np.abs(np.diff(yaw)) / step
     changes = changes[changes > _ROUNDING]
     whole = np.round(changes)
-    return changes.size > 0 and float(np.mean((whole == 0.0) | (np.abs(changes - whole) > _OFF_LATTICE))) > _MOST
+    return (
+        changes.size > 0 and float(np.mean((whole == 0.0) | (np.abs(changes - whole) > _OFF_LATTICE))) > _MOST
+    )

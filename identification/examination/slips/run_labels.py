@@ -30,7 +30,10 @@ _MOST_SUSPECTS = 12  # runs that agree worst, whose labels are tried
 _MOST_PAIRED = 40  # runs of which all pairs with a suspect are tried
 _MOST_SAID = 3
 _TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
-_DECIMAL = {"with its decimal point one place to the right": 10.0, "with its decimal point one place to the left": 0.1}
+_DECIMAL = {
+    "with its decimal point one place to the right": 10.0,
+    "with its decimal point one place to the left": 0.1,
+}
 
 
 class Label(ABC):
@@ -237,7 +240,12 @@ class WrongLabels(StatementSlip):
                     yield from _exchanged(statements, keys, (i,), (j,))
         for label in self.labels:
             settings = _settings(statements, label.key)
-            yield from (trial for at in settings if 1 < len(at) < count for trial in _relabelled(statements, label, at))
+            yield from (
+                trial
+                for at in settings
+                if 1 < len(at) < count
+                for trial in _relabelled(statements, label, at)
+            )
             for at in itertools.combinations(suspects, 2) if label.repeats else ():
                 if at not in settings:
                     yield from _relabelled(statements, label, at)
@@ -263,7 +271,9 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     suspects = np.argsort(-stated.away)[:_MOST_SUSPECTS]
     if not stated.gross:
         suspects = suspects[stated.away[suspects] > policy.MISFIT_DEVIATIONS]
-    tried = list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
+    tried = (
+        list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
+    )
     gain = float(chdtri(1, policy.REFUSAL_RATE))  # of one more label that is fitted
     mended = []
     for trial in tried:
@@ -275,7 +285,9 @@ def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
     limit = min(squares for _, squares in mended) + _TIE
     mended = [(trial, squares) for trial, squares in mended if squares <= limit]
     best: dict[tuple[int, ...], _Trial] = {}
-    for trial, _ in sorted(mended, key=lambda pair: not pair[0].familiar):  # of equals, the first in the table
+    for trial, _ in sorted(
+        mended, key=lambda pair: not pair[0].familiar
+    ):  # of equals, the first in the table
         if trial.familiar or trial.places not in best:
             best.setdefault(trial.places, trial)
     shown = sorted(best.values(), key=lambda trial: len(trial.places))[:_MOST_SAID]
@@ -298,7 +310,8 @@ def _relabelled(statements: Statements, label: Label, places: tuple[int, ...]) -
         changed = values.copy()
         changed[list(places)] = [value for value, _ in options]
         familiar = unit is None or all(
-            value == 0.0 or any(abs(value - o) <= policy.LEAST_SPRING_SPREAD * o for o in others) for value, _ in options
+            value == 0.0 or any(abs(value - o) <= policy.LEAST_SPRING_SPREAD * o for o in others)
+            for value, _ in options
         )
         words = options[0][1]
         said = f"{name} of {ids} {words}"

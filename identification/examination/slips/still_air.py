@@ -28,11 +28,16 @@ class _Change:
 def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
     found = []
     for swing in swings:
-        same = [s for s in swings if not s.run.wind_on and s.run.spring_stiffness == swing.run.spring_stiffness]
+        same = [
+            s for s in swings if not s.run.wind_on and s.run.spring_stiffness == swing.run.spring_stiffness
+        ]
         if not swing.run.wind_on or not same:
             continue
         k, a = np.mean([s.stiffness for s in same]), np.mean([s.rate for s in same])
-        k_std, a_std = (np.linalg.norm(v) / len(same) for v in ([s.stiffness_std for s in same], [s.rate_std for s in same]))
+        k_std, a_std = (
+            np.linalg.norm(v) / len(same)
+            for v in ([s.stiffness_std for s in same], [s.rate_std for s in same])
+        )
         if not a > 0.0:
             continue
         found.append(
@@ -64,7 +69,10 @@ class WindNotSeen(StatementSlip):
                 return ()
             if policy.MISFIT_DEVIATIONS * damping_std > policy.LEAST_DAMPING_OF_WIND:
                 return ()
-        largest = max(abs(change.stiffness) for change in changes), max(abs(change.damping) for change in changes)
+        largest = (
+            max(abs(change.stiffness) for change in changes),
+            max(abs(change.damping) for change in changes),
+        )
         what = (
             f"with the wind on frequency and damping are those with the wind off, to {50.0 * largest[0]:.2g} % and "
             f"{100.0 * largest[1]:.2g} %: the air acts on no body so little"

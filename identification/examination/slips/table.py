@@ -27,7 +27,13 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 
 #: Looked for in the records as they come.
-RECORD_SLIPS: tuple[RecordSlip, ...] = (RepeatedRecord(), WrappedAngle(), ResolutionTooCoarse(), ConstantTail(), StuckReading())
+RECORD_SLIPS: tuple[RecordSlip, ...] = (
+    RepeatedRecord(),
+    WrappedAngle(),
+    ResolutionTooCoarse(),
+    ConstantTail(),
+    StuckReading(),
+)
 
 #: Looked for in what is measured; after the first refusal no further one is looked for.
 STATEMENT_SLIPS: tuple[StatementSlip, ...] = (

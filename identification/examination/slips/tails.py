@@ -18,7 +18,9 @@ _STUCK = 0.6  # of a cycle
 _MOVING = 0.1  # of the record's range: the swings on both sides of a stuck stretch
 _STANDS = 0.01  # of the record's largest excursion: the reading stands while it stays as near its last value,
 _NOISE = 5.0  # or within as many standard deviations of its last fiftieth
-_LEAST_CYCLES = 0.75  # of standing: at a turning point a swing stays within a hundredth for a twentieth of a cycle
+_LEAST_CYCLES = (
+    0.75  # of standing: at a turning point a swing stays within a hundredth for a twentieth of a cycle
+)
 _LEAST_KEPT = 2.0  # cycles of motion before it, whose last swings are compared
 #: Dry friction takes the same from every swing and stops the body from a swing of at most one such step; viscous
 #: damping takes a share. A swing of more than three steps does not stop by itself.
@@ -45,7 +47,9 @@ class StuckReading(RecordSlip):
                     f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading keeps one value while the body "
                     f"moves ({where.size} samples); they are left out"
                 )
-                remarks.append(Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable"))
+                remarks.append(
+                    Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")
+                )
                 run = replace(run, record=Record(time[~stuck], yaw[~stuck]))
             runs.append(run)
         return (replace(campaign, runs=tuple(runs)) if remarks else campaign), tuple(remarks)
