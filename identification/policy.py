@@ -59,12 +59,12 @@ SPEED_DEPARTURE = 0.03
 """The same of a wind speed: calibration, an offset, the stream's unevenness. Judgement."""
 
 SLIP_AGREES = 0.1
-"""Rate at which runs with right labels, of departures as large as the two above, would be said not to agree. Another
-label is offered only where all agree better."""
+"""Rate at which runs with right labels, of departures as large as the two above, would be said not to agree.
+Another label is offered only where all agree better."""
 
 SCATTER_OF_STIFFNESS = 0.002
-"""Relative scatter of ωn² between runs of equal statements, beside its change along the run: springs are clamped anew to
-a few parts in ten thousand, and the amplitude of the release may move it. Judgement."""
+"""Relative scatter of ωn² between runs of equal statements, beside its change along the run: springs are clamped
+anew to a few parts in ten thousand, and the amplitude of the release may move it. Judgement."""
 
 SCATTER_OF_DAMPING = 0.02
 """Relative scatter of the decay rate between runs of equal statements: bearings come back to a per cent or two."""
@@ -85,8 +85,8 @@ FINER_THAN_STATED = 0.03
 """Noise over the resolution: rounding alone makes 0.29, so that a tenth of it contradicts the resolution."""
 
 OTHER_SPRING = 1.2
-"""Ratio of ωn² of runs of equal statements and swings that only another spring makes: scatter and wear stay below a few
-per cent. Judgement."""
+"""Ratio of ωn² of runs of equal statements and swings that only another spring makes: scatter and wear stay below
+a few per cent. Judgement."""
 
 OTHER_WIND = (1.02, 1.3)
 """Ratios of ωn² and of the decay rate, both at once, that only another wind speed makes. Judgement."""
@@ -95,8 +95,8 @@ NOISE_RATIO = 0.15
 """Tolerance of the ratio of two runs' noise, where one sensor made both."""
 
 LEAST_DRIFT = 5e-4
-"""Change of a clock's rate along a run that is called a drift: quartz keeps 1e-4, and a rig's temperature moves a spring
-by a few times that."""
+"""Change of a clock's rate along a run that is called a drift: quartz keeps 1e-4, and a rig's temperature moves a
+spring by a few times that."""
 
 RELEASE_AS_STATED = (0.5, 1.5)
 """A record's first angle over the stated release angle, where it begins at the release: the angle is nominal, and

@@ -86,9 +86,9 @@ def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
     Records are mended, and statements that they contradict are refused or noted, by the slips of
-    `identification.examination.slips.table`. Rounded time stamps are replaced by the clock behind them. Samples before
-    the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are cut to
-    their linear growth, or left out. Runs whose zeros differ get one each.
+    `identification.examination.slips.table`. Rounded time stamps are replaced by the clock behind them. Samples
+    before the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are
+    cut to their linear growth, or left out. Runs whose zeros differ get one each.
 
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.

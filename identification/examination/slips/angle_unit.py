@@ -21,7 +21,7 @@ class AngleInDegrees(StatementSlip):
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare amplitudes, and where they differ much the noise."""
-        if len(seen.swings) < 2 or seen.campaign.sensor.plausible is False:  # noqa: PLR2004
+        if len(seen.swings) < 2 or seen.campaign.sensor.plausible is False:
             return ()
         amplitudes = np.array([swing.amplitude for swing in seen.swings])
         least = float(amplitudes.min())
@@ -34,5 +34,5 @@ class AngleInDegrees(StatementSlip):
         if not np.all(np.abs(ratio / _DEGREES - 1.0) < policy.NOISE_RATIO):
             return ()
         ids = tuple(s.run.id for s, one in zip(seen.swings, large, strict=True) if one)
-        what = f"amplitude and noise are larger than those of the other runs, the noise by {np.median(ratio):.3g}: degrees"
+        what = f"amplitude and noise exceed those of the other runs, by {np.median(ratio):.3g} times: degrees"
         return (Remark(Outcome.REFUSED, ids, what, "name the column yaw_deg, or convert it to radians"),)

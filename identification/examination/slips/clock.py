@@ -1,7 +1,7 @@
-"""A clock that drifts along the runs: all frequencies change with time, by the same share and whatever the amplitude.
+"""A clock that drifts along the runs: all frequencies change with time by one share, whatever the amplitude.
 
-An effect changes the frequency with the amplitude, which falls at another rate in runs of other damping. The phase of each
-run against its own mean frequency shows which of the two it is. Where all runs are damped alike, none can.
+An effect changes the frequency with the amplitude, which falls at another rate in runs of other damping. The phase
+of each run against its own mean frequency shows which of the two it is. Where all runs are damped alike, none can.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ class _Phase:
 
 @dataclass(frozen=True)
 class DriftingClock(StatementSlip):
-    """All runs, or a single one, change their frequency linearly with time, which no amplitude explains. Refused."""
+    """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
         phases = [phase for swing in seen.swings if (phase := _phase(swing)) is not None]
         still = {swing.run.id for swing in seen.swings if not swing.run.wind_on}
         # one decay does not tell time from amplitude, and without still air the wind speed may drift
-        if len(phases) < 2 or not any(phase.run in still for phase in phases):  # noqa: PLR2004
+        if len(phases) < 2 or not any(phase.run in still for phase in phases):
             return ()
         whole = tuple(range(len(phases)))
-        for places in (whole, *((place,) for place in whole if len(phases) > 2)):  # noqa: PLR2004
+        for places in (whole, *((place,) for place in whole if len(phases) > 2)):
             drift, std, squares, freedom = _fit(phases, places, by_amplitude=False)
             if abs(drift) < policy.LEAST_DRIFT or abs(drift) < policy.REFUSAL_DEVIATIONS * std:
                 continue
@@ -69,7 +69,7 @@ class DriftingClock(StatementSlip):
             ids = tuple(phases[place].run for place in places)
             who = "every run" if places == whole else "the run"
             what = (
-                f"the frequency changes by {100.0 * drift:+.2g} % along {who}, linearly with time and whatever the amplitude: "
+                f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, whatever the amplitude: "
                 f"the clock of the logger drifts{'' if still.intersection(ids) else ', or the wind speed'}"
             )
             return (
@@ -87,7 +87,7 @@ def _phase(swing: Swing) -> _Phase | None:
     interval, period = float(time[-1]) / (time.size - 1), 2.0 * np.pi / omega
     width = round(_WINDOW * period / interval)
     count = time.size // max(width // 2, 1) - 1
-    if width < 8 or count < _FEWEST:  # noqa: PLR2004 - samples in a window
+    if width < 8 or count < _FEWEST:
         return None
     window = np.hanning(width + 1)[:-1]
     starts = np.arange(count) * (width // 2)

@@ -1,7 +1,7 @@
 """A sensor that does not pass a constant: AC-coupled, with a high-pass filter before the logger.
 
-Its reading of a release is an oscillation that leads by the angle arctan(1/ωτ), and a centre that decays as exp(-t/τ) to
-zero. Creep of a spring moves the centre too, without the lead; a drift does not end at zero.
+Its reading of a release is an oscillation that leads by the angle arctan(1/ωτ), and a centre that decays as
+exp(-t/τ) to zero. Creep of a spring moves the centre too, without the lead; a drift does not end at zero.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class CoupledSensor(StatementSlip):
             return ()
         constant = float(np.median([one.constant for one in found]))
         what = (
-            f"the centre of the motion decays to zero with a time constant of about {constant:.2g} s and the reading leads "
-            "as by a high-pass filter of that constant: the sensor or the logger is AC-coupled"
+            f"the centre of the motion decays to zero with a time constant of about {constant:.2g} s, and the "
+            "reading leads as by a high-pass filter of that constant: the sensor or the logger is AC-coupled"
         )
         remedy = "record with DC coupling, or leave the runs out"
         return (Remark(Outcome.REFUSED, tuple(one.run for one in found), what, remedy),)
@@ -104,7 +104,7 @@ def _decaying(swing: Swing) -> _Decaying | None:
 
 
 def _fit(time: Array, yaw: Array, decay: Decay, tau: float) -> tuple[float, Decay, Array, Array]:
-    """Sum of squares, corrected poles, (angle, rate, corrections, centre, zero), and the inverse of the normal matrix."""
+    """Sum of squares, corrected poles, solution in the order of the columns, and the normal matrix's inverse."""
     for _ in range(_SWEEPS):
         unit, sine, slope, ramp, one = response_rows(time, decay, constant=True)
         matrix = np.column_stack([unit, sine, slope, ramp, np.exp(-time / tau), one])

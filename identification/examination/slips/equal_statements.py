@@ -42,8 +42,8 @@ class EqualStatementsDiffer(StatementSlip):
         if not ids:
             return ()
         what = (
-            f"they state equal springs and winds, and differ by {100.0 * np.expm1(largest[0]):.2g} % in omega_n^2 and "
-            f"{100.0 * np.expm1(largest[1]):.2g} % in damping or more"
+            f"they state equal springs and winds, and differ by {100.0 * np.expm1(largest[0]):.2g} % or more in "
+            f"omega_n^2 and {100.0 * np.expm1(largest[1]):.2g} % or more in damping"
         )
         remedy = "correct spring_stiffness or wind_speed of these runs, which may be copied from one another"
         return (Remark(Outcome.REFUSED, tuple(ids), what, remedy),)

@@ -1,8 +1,8 @@
 """The straight lines that runs with right labels obey, with wide tolerances for everything but a slip.
 
-Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the departure of a spring, by its
-calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. It is told from an effect by
-tolerances that hold every effect, and by a value that agrees where the stated one contradicts them grossly.
+Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the departure of a spring, by
+its calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. It is told from
+an effect by tolerances that hold every effect, and by a value that agrees where the stated one is grossly off.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from identification import policy
 from identification.examination.self_excited import Swing
 from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Array
-
 
 _PASSES = 4
 _MOST_AIR = 3.0  # air's stiffness over the whole, a standard deviation: more is less likely, and not excluded
@@ -65,7 +64,7 @@ class Statements:
 
     @property
     def seen(self) -> Array:
-        """k by the true times, shape (n,), 1/s²."""
+        """K by the true times, shape (n,), 1/s²."""
         return np.asarray(self.recorded * self.clock**2)
 
     @property
@@ -122,8 +121,8 @@ def agreement(
     usual = float(np.median(seen / labels.spring))
     least = np.full(springs, np.inf)
     np.minimum.at(least, place, seen)
-    # rows of the runs, of the springs, and of n; columns g and n; the stiffness of each spring per unit inertia, which
-    # is the third kind of unknown, is eliminated
+    # rows of the runs, of the springs, and of n; columns g and n. The stiffness of each spring per unit inertia,
+    # the third kind of unknown, is eliminated.
     group = np.concatenate((place, np.arange(springs), [springs]))
     of_spring = np.concatenate((np.ones(count), -np.ones(springs), [0.0]))
     columns = np.zeros((count + springs + 1, 2))
@@ -167,7 +166,7 @@ def agreement(
 
 
 def _settings(values: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Values that differ by more than the least difference of two springs, and the place of each run's among them."""
+    """Values that differ by more than two springs must, and the place of each run's value among them."""
     order = np.argsort(values)
     new = np.diff(values[order]) > policy.LEAST_SPRING_SPREAD * values[order][1:]
     group = np.concatenate(([0], np.cumsum(new)))

@@ -1,7 +1,7 @@
 """Readings whose sign is inverted: by the zero they swing about, and by the side of the release.
 
-A mirrored decay is a decay. Only what is not symmetric shows it: a sensor's zero, which a mirrored run has on the other
-side, and the release angle, where it is stated.
+A mirrored decay is a decay. Only what is not symmetric shows it: a sensor's zero, which a mirrored run has on the
+other side, and the release angle, where it is stated.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _NEAR = 0.25  # of the zero's size: how far the zeros may scatter with right sig
 
 @dataclass(frozen=True)
 class MirroredRun(StatementSlip):
-    """Some runs swing about the zero of the others with its sign inverted. Refused: as it is, it looks like an effect."""
+    """Some runs swing about the zero of the others with its sign inverted. Refused: it looks like an effect."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare the zeros of all runs with those of some signs inverted."""
@@ -54,8 +54,8 @@ class MirroredRun(StatementSlip):
         ids = names + rest if halves else names
         who = "half of the runs (" + ", ".join(names) + ")" if halves else "the reading"
         what = (
-            f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {seen.campaign.sensor.unit} and the "
-            f"others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
+            f"{who} {'swing' if halves else 'swings'} about {_signed(swings, odd)} {seen.campaign.sensor.unit} and "
+            f"the others about {_signed(swings, ~odd)}: the sign of the sensor is inverted between them"
         )
         return (
             Remark(
@@ -86,7 +86,7 @@ def _of_wind(swings: tuple[Swing, ...], odd: NDArray[np.bool_]) -> bool:
 
 @dataclass(frozen=True)
 class ReleaseOnTheOtherSide(StatementSlip):
-    """A stated release angle whose sign is not that of the record's first swing. Asked about: the answer is the same."""
+    """A stated release angle whose sign is not that of the record. Asked about: no answer depends on it."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare sides where the record begins at its turning point, and the angle is stated."""

@@ -208,7 +208,7 @@ Trials = Callable[[Statements, Sequence[int]], Iterator[_Trial]]
 
 @dataclass(frozen=True)
 class WrongLabel(StatementSlip):
-    """One run's label contradicts the others grossly and agrees if a common slip is undone. Refused, with its name."""
+    """One run's label contradicts the others grossly, and agrees if a common slip is undone. Refused."""
 
     labels: tuple[Label, ...] = LABELS
 
@@ -224,7 +224,7 @@ class WrongLabel(StatementSlip):
 
 @dataclass(frozen=True)
 class WrongLabels(StatementSlip):
-    """Labels of two runs or two settings are exchanged, or a slip is in two runs or a whole setting. Refused, with names."""
+    """Labels of two runs or settings are exchanged, or one slip is in two runs or a whole setting. Refused."""
 
     labels: tuple[Label, ...] = LABELS
 
@@ -251,7 +251,7 @@ class WrongLabels(StatementSlip):
                     yield from _relabelled(statements, label, at)
         for key in ("spring", "speed"):
             for one, two in itertools.combinations(_settings(statements, key), 2):
-                if len(one) + len(two) > 2:  # noqa: PLR2004 - not a pair
+                if len(one) + len(two) > 2:
                     yield from _exchanged(statements, (key,), one, two)
 
 

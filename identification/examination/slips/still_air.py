@@ -16,7 +16,7 @@ from identification.status import Outcome, Remark
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What the wind changes, of wind-on runs against wind-off runs of their spring, relative to the wind-off value."""
+    """What the wind changes in a run against the wind-off runs of its spring, relative to these."""
 
     swing: Swing
     stiffness: float
@@ -54,7 +54,7 @@ def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
 
 @dataclass(frozen=True)
 class WindNotSeen(StatementSlip):
-    """No wind-on run differs from the wind-off runs of its spring, though the records would show it. Asked about."""
+    """No wind-on run differs from the wind-off runs of its spring, which the records would show. Asked about."""
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Compare frequency and decay rate with the wind on and off."""
@@ -106,8 +106,8 @@ class WindExchanged(StatementSlip):
         if gain <= float(chdtri(1, policy.MISFIT_RATE)) or not exchanged.good:
             return ()
         what = (
-            "as stated the wind reduces the damping and the springs disagree; they agree if the wind speeds of the runs "
-            "with the wind on and off are exchanged"
+            "as stated the wind reduces the damping and the springs disagree; they agree if the wind speeds of "
+            "the runs with the wind on and off are exchanged"
         )
         ids = tuple(swing.run.id for swing in swings)
         return (Remark(Outcome.REFUSED, ids, what, "correct wind_speed or the file names of these runs"),)

@@ -1,4 +1,4 @@
-"""A reading that stands while the body must still be moving: a padded file, a stopped logger, a body held by hand."""
+"""A reading that stands while the body must still move: a padded file, a stopped logger, a body held by hand."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class StuckReading(RecordSlip):
                 time, yaw = run.record.time_s, run.record.yaw_rad
                 where = np.flatnonzero(stuck)
                 what = (
-                    f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading keeps one value while the body "
-                    f"moves ({where.size} samples); they are left out"
+                    f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading keeps one value while "
+                    f"the body moves ({where.size} samples); they are left out"
                 )
                 remarks.append(
                     Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")

@@ -1,7 +1,7 @@
 """Records that are the same measurement twice: equal, or changed a little on the way.
 
-Two honest runs have nearly the same motion and never the same noise. The sixth difference of a record holds its noise
-alone; two records of one measurement have the same one, whatever was rounded, cut, scaled or added by less than it.
+Two honest runs have nearly the same motion and never the same noise. The sixth difference of a record holds its
+noise alone. Two records of one measurement have the same one, if less than it was added, rounded, cut or scaled.
 """
 
 from __future__ import annotations

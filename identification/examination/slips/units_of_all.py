@@ -49,8 +49,9 @@ class YawMomentTooLarge(StatementSlip):
         if abs(value) - policy.MISFIT_DEVIATIONS * std <= policy.GREATEST_YAW_MOMENT:
             return ()
         what = (
-            f"the frequencies give Cn_beta = {value:.3g} 1/rad, and no body has more than {policy.GREATEST_YAW_MOMENT:g}: "
-            "a value is in a wrong unit (spring_stiffness in N mm/rad or N cm/rad, wind_speed, air_density or a size)"
+            f"the frequencies give Cn_beta = {value:.3g} 1/rad, and no body has more than "
+            f"{policy.GREATEST_YAW_MOMENT:g}: a value is in a wrong unit (spring_stiffness in N mm/rad or N cm/rad"
+            ", wind_speed, air_density or a size)"
         )
         return (Remark(Outcome.NOTED, tuple(windy), what, f"give them in SI units, {_KEEP}"),)
 
@@ -77,8 +78,8 @@ class InertiaOfNoBody(StatementSlip):
         likely = [words for words, factor in _OF_DENSITY.items() if low <= density / factor <= high]
         looks = f"; it looks like {' or '.join(likely)}" if likely else ""
         what = (
-            f"the frequencies give Izz = {inertia:.3g} kg m2, which a body of the stated frontal_area and reference_length "
-            f"has at a density of {density:.2g} kg/m3{looks}"
+            f"the frequencies give Izz = {inertia:.3g} kg m2, which a body of the stated frontal_area and "
+            f"reference_length has at a density of {density:.2g} kg/m3{looks}"
         )
         remedy = f"check the units of spring_stiffness, time_s, frontal_area and reference_length, {_KEEP}"
         return (Remark(Outcome.NOTED, tuple(s.run.id for s in still), what, remedy),)

@@ -1,7 +1,7 @@
 """Four runs of a rig in closed form, and everyday slips that spoil what is stated of them or how they are recorded.
 
-Nothing here is shared with the simulators or the estimators. A slip takes the honest campaign and returns the spoiled
-one. The truth is in the constants.
+Nothing here is shared with the simulators or the estimators. A slip takes the honest campaign and returns the
+spoiled one. The truth is in the constants.
 """
 
 from __future__ import annotations

@@ -75,7 +75,8 @@ def test_a_repeated_record_does_not_shrink_the_deviations():
                    release=True),
             id="both sides",
         ),
-        pytest.param(honest([Condition(k * (1.0 + 0.05 * (k > 20.0)), v) for k in SPRINGS for v in SPEEDS]), id="5 %"),
+        pytest.param(honest([Condition(k + 2.0 * (k > 20.0), v) for k in SPRINGS for v in SPEEDS]), id="5 %"
+        ),
         pytest.param(
             honest([Condition(k, v * (1.0 + 0.01 * (-1) ** i)) for i, k in enumerate(SPRINGS * 3) for v in SPEEDS]),
             id="speeds scatter",
@@ -142,7 +143,7 @@ def test_zeros_of_their_own_do_not_mirror_a_run():
 
 
 def test_the_examination_is_cheap():
-    """Twelve runs of ten seconds at 1 kHz, in seconds of the processor; a third of a second on the machine it was made on."""
+    """Twelve runs of ten seconds at 1 kHz, in seconds of the processor, with room for a slower one."""
     data = repeated()
     runs = tuple(
         replace(
