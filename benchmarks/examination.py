@@ -1,6 +1,6 @@
 """How often the examination questions campaigns that have no slip, by slip, and the processor's time it takes.
 
-Run as ``python -m benchmarks.examination FOLDER ...``, with folders of campaigns without a slip, such as blind sets.
+Run as ``python -m benchmarks.examination FOLDER ...``, with folders of campaigns that have no slip, as blind sets are.
 What is noted of a spring or an inertia that does not fit counts separately: these may be effects.
 """
 
@@ -18,7 +18,8 @@ from identification.examination.slips.table import RECORD_SLIPS, STATEMENT_SLIPS
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 
-_NOT_SLIPS = {SpringOffTheLine.__name__, InertiaOffTheSprings.__name__}
+NOT_SLIPS = {SpringOffTheLine.__name__, InertiaOffTheSprings.__name__}
+"""Slips that may as well be effects."""
 
 
 @dataclass
@@ -56,7 +57,7 @@ def main() -> None:
     for folder in parser.parse_args().folders:
         for path in sorted(folder.rglob("campaign.toml")):
             count.add(read_campaign(path.parent), str(path.parent))
-    slips = {name: places for name, places in count.questioned.items() if name not in _NOT_SLIPS}
+    slips = {name: places for name, places in count.questioned.items() if name not in NOT_SLIPS}
     falsely = Counter(place for places in slips.values() for place in places)
     print(f"{count.campaigns} campaigns, {len(falsely)} questioned, {max(count.seconds):.2f} s at most")
     for name, places in count.questioned.items():
