@@ -1,6 +1,6 @@
 """How often the examination questions campaigns that have no slip, by slip, and the processor's time it takes.
 
-Run as ``python -m benchmarks.examination FOLDER ...``, with folders of campaigns that have no slip, as blind sets are.
+Run as ``python -m benchmarks.examination FOLDER ...``, with folders of campaigns without a slip, as blind sets are.
 What is noted of a spring or an inertia that does not fit counts separately: these may be effects.
 """
 
