@@ -217,7 +217,7 @@ CONTRADICTIONS = {
     ),
     "wind on and off exchanged": (TWO_SPRINGS, lambda run: {"wind_speed": 24.0 - run.wind_speed}),
 }
-#: Where the air does not damp, damping does not say which runs have the wind on, so that an exchange is not refused.
+#: Where the air does not damp, damping does not say which runs have the wind on: an exchange is not refused.
 TRUTHS = {"wind on and off exchanged": replace(Truth(), cn_r=0.0)}
 SOFTER = {16.12: 16.12, 21.02: 21.02, 44.84: 40.36}
 

@@ -45,10 +45,10 @@ class RepeatedRecord(RecordSlip):
                 continue
             if _conditions(earlier) == _conditions(run):
                 remedy = "remove the run, or correct its file name"
-                what = f"{said.format(earlier.id)}, so counted once"
+                what = f"{said} run {earlier.id}, so counted once"
                 left[run.id] = Remark(Outcome.LEFT_OUT, (run.id,), what, remedy)
             else:
-                what = f"{said.format(earlier.id)} with different springs or wind speeds"
+                what = f"{said.removesuffix(' as')} with different springs or wind speeds"
                 remedy = "correct the file names, or remove one of the runs"
                 remarks[pair] = Remark(Outcome.REFUSED, pair, what, remedy)
         runs = tuple(run for run in campaign.runs if run.id not in left)
@@ -65,7 +65,7 @@ def _equal(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
     for run in campaign.runs:
         earlier = first.setdefault(run.record.yaw_rad.tobytes(), run)
         if earlier is not run:
-            yield earlier, run, "the same samples as run {}"
+            yield earlier, run, "the same samples as"
 
 
 def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
@@ -85,7 +85,7 @@ def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
                 found = _thinned_correlation(run, other, size)
             if abs(found) > _SAME:
                 first, second = sorted((run, other), key=lambda one: place[one.id])
-                yield first, second, f"the noise of run {{}} (correlation {found:.2f}), hence the same record"
+                yield first, second, f"the same record, by its noise (correlation {found:.2f}), as"
         near.append((run, spectrum, noise.size))
 
 

@@ -153,7 +153,7 @@ TABLE: dict[str, Case] = {
         honest(), reading(padded(1.0 / 3.0, None), "r3"), "the reading stands at", ("r3",), refused=False
     ),
     "repeated with noise of 1e-9": Case(
-        honest(), _with_noise(1e-9), "hence the same record, so counted once", ("again",), refused=False
+        honest(), _with_noise(1e-9), "so counted once", ("again",), refused=False
     ),
     "repeated and rounded": Case(
         honest(), twice(lambda t, y: (t, np.round(y, 4))), "so counted once", ("again",), refused=False
@@ -252,7 +252,7 @@ FURTHER: dict[str, Case] = {
     "repeated under another wind": Case(
         honest(),
         twice(lambda t, y: (t, np.round(y, 4)), wind_speed=20.0, air_density=1.2),
-        "hence the same",
+        "the same record, by its noise",
         ("again",),
     ),
     "repeated and thinned": Case(
