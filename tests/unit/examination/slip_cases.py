@@ -263,7 +263,7 @@ FURTHER: dict[str, Case] = {
     ),
     "wraps at a whole turn": Case(
         honest(),
-        reading(lambda y: (y - 0.05) % (2.0 * np.pi), "r4"),
+        reading(lambda y: y % (2.0 * np.pi), "r4"),
         "jumps by whole turns",
         ("r4",),
         refused=False,
