@@ -78,11 +78,11 @@ class Agreement:
     """How well statements and frequencies agree.
 
     Args:
-        squares: weighted sum of squared residuals, in tolerances.
+        squares: sum of squared residuals over tolerances, dimensionless.
         away: residual of each run in tolerances, shape (n,).
         inverse_inertia: g, 1/(kg m²).
         air: n, of k, 1/(kg m²) per m³.
-        air_std: its standard deviation.
+        air_std: standard deviation of n, 1/(kg m²) per m³.
     """
 
     squares: float
@@ -112,8 +112,8 @@ def agreement(
     """Fit g, n and the stiffness of each spring to statements.
 
     Args:
-        departure: relative tolerance of a spring.
-        of_speed: relative tolerance of a wind speed.
+        departure: relative tolerance of a spring, dimensionless.
+        of_speed: relative tolerance of a wind speed, dimensionless.
     """
     settings, place = _settings(labels.spring)
     seen, pressure, springs = labels.seen, labels.pressure, settings.size

@@ -52,7 +52,8 @@ class Label(ABC):
         """Values that may have been meant by a stated one, each with words for how it came about.
 
         Args:
-            others: stated in the other runs.
+            value: as stated, in the unit of the label.
+            others: values of the other runs, in that unit.
         """
 
 
