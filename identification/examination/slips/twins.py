@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.examination.slips.base import RecordSlip
@@ -18,6 +19,7 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array
 
+Spectrum = NDArray[np.complex128]
 _ORDER = 6  # of the difference: the motion of ten samples per cycle is reduced to a twentieth of its size
 _BLOCK = 50  # differences that are scaled to one size: ringing after the release must not outweigh the noise
 _LEAST = 500  # differences in common: noise alone correlates by 0.3 at the best of all shifts then
@@ -75,7 +77,7 @@ def _alike(campaign: Campaign) -> Iterator[tuple[Run, Run, str]]:
     reach = max(1, _MOST_PAIRS // max(len(free), 1))
     size = next_fast_len(2 * max((run.record.yaw_rad.size for run in free), default=1), real=True)
     place = {run.id: number for number, run in enumerate(campaign.runs)}
-    near: deque[tuple[Run, Array, int]] = deque(maxlen=reach)
+    near: deque[tuple[Run, Spectrum, int]] = deque(maxlen=reach)
     for run in order:
         noise = _noise(run.record.yaw_rad)
         spectrum = rfft(noise, size)
@@ -113,7 +115,7 @@ def _noise(yaw: Array) -> Array:
     return np.asarray(np.where(quiet, 0.0, blocks / np.where(quiet, 1.0, sizes)).ravel())
 
 
-def _correlation(one: Array, other: Array, samples: int, size: int) -> float:
+def _correlation(one: Spectrum, other: Spectrum, samples: int, size: int) -> float:
     """The correlation of two spectra's series at the best shift; 0 where it is as large elsewhere."""
     series = irfft(one * np.conj(other), size) / max(samples, 1)
     best = int(np.argmax(np.abs(series)))
