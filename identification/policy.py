@@ -51,6 +51,66 @@ LEAST_SPRING_RESOLUTION = 10.0
 """Rise of ωn² over the springs, in its standard deviations, that a wind-off line needs. Noise in the abscissa
 attenuates the gradient by the inverse square: here 1 %, a tenth of its standard deviation."""
 
+SPRING_DEPARTURE = 0.25
+"""Relative departure of a spring from its statement that an effect may cause: calibration, gravity, a flexible rod.
+A slip is looked for beyond it. Judgement."""
+
+SPEED_DEPARTURE = 0.03
+"""The same of a wind speed: calibration, an offset, the stream's unevenness. Judgement."""
+
+SLIP_AGREES = 0.1
+"""Rate at which runs with right labels, of departures as large as the two above, would be said not to agree.
+Another label is offered only where all agree better."""
+
+SCATTER_OF_STIFFNESS = 0.002
+"""Relative scatter of ωn² between runs of equal statements, beside its change along the run: springs are clamped
+anew to a few parts in ten thousand, and the amplitude of the release may move it. Judgement."""
+
+SCATTER_OF_DAMPING = 0.02
+"""Relative scatter of the decay rate between runs of equal statements: bearings come back to a per cent or two."""
+
+LEAST_OF_WIND = 0.005
+"""Relative change of ωn² by the wind that a campaign is made to measure, at least. Judgement."""
+
+LEAST_DAMPING_OF_WIND = 0.1
+"""The same of the decay rate: air that passes a body adds to its damping. Judgement."""
+
+ZERO_STEADINESS = 0.03
+"""Share of a sensor's zero by which the zeros of runs may differ where they are called one zero of two signs."""
+
+LEAST_STEPS = 4.0
+"""Steps of the resolution in a swing, at least: a coarser sensor would not have been chosen. Judgement."""
+
+FINER_THAN_STATED = 0.03
+"""Noise over the resolution: rounding alone makes 0.29, so that a tenth of it contradicts the resolution."""
+
+OTHER_SPRING = 1.2
+"""Ratio of ωn² of runs of equal statements and swings that only another spring makes: scatter and wear stay below
+a few per cent. Judgement."""
+
+OTHER_WIND = (1.02, 1.3)
+"""Ratios of ωn² and of the decay rate, both at once, that only another wind speed makes. Judgement."""
+
+NOISE_RATIO = 0.15
+"""Tolerance of the ratio of two runs' noise, where one sensor made both."""
+
+LEAST_DRIFT = 5e-4
+"""Change of a clock's rate along a run that is called a drift: quartz keeps 1e-4, and a rig's temperature moves a
+spring by a few times that."""
+
+RELEASE_AS_STATED = (0.5, 1.5)
+"""A record's first angle over the stated release angle, where it begins at the release: the angle is nominal, and
+the body is let go by hand. Judgement."""
+
+CLEAR_RELEASE = 0.8
+"""Share of the amplitude at which a record must begin for the side of its release to be known."""
+
+GREATEST_YAW_MOMENT = 10.0
+"""|Cnβ|, 1/rad. With the frontal area and the length of the body it is 0.1 to 2 for vehicles and slender bodies."""
+
+BODY_DENSITIES = (5.0, 30_000.0)
+"""kg/m³: a body as light as four times its air, or denser than lead, is more likely a slip of units."""
+
 NOISE_TOLERANCE = 0.05
 """Relative uncertainty of a stated or measured noise level, as on data sheets."""
 

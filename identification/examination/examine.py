@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from identification.campaign.derivatives import loads
 from identification.estimate import Estimate, Quantity
 from identification.examination.free_motion import find_release, with_zeros, without_rest
-from identification.examination.labels import exchanged_labels, inertia_off_the_springs, springs_off_the_line
-from identification.examination.self_excited import growing_runs, self_excited_runs, swing_of
+from identification.examination.self_excited import self_excited_runs, swing_of
+from identification.examination.slips.base import Seen
+from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
-from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
@@ -26,34 +27,6 @@ _TIMER_DECIMALS = 10  # steps of the decimals that a timer's must exceed, or any
 _SWEEPS = 8
 _NO_GAP = 1.75  # usual steps: a longer one may be a gap
 _MOST_MISSING = 1e3  # ticks per sample: beyond it the stamps are not those of one clock
-
-
-def without_repeats(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
-    """Leave out runs that hold the samples of an earlier one, with a remark for each.
-
-    The same samples under different conditions are refused: one of the two statements is wrong.
-    """
-    first: dict[bytes, Run] = {}
-    remarks = []
-    for run in campaign.runs:
-        earlier = first.setdefault(run.record.yaw_rad.tobytes(), run)
-        if earlier is run:
-            continue
-        if _conditions(earlier) == _conditions(run):
-            what = f"the same samples as run {earlier.id}, so counted once"
-            remedy = "remove the run, or correct its file name"
-            remarks.append(Remark(Outcome.LEFT_OUT, (run.id,), what, remedy))
-        else:
-            what = "the same samples with different springs or wind speeds"
-            remedy = "correct the file names, or remove one of the runs"
-            remarks.append(Remark(Outcome.REFUSED, (earlier.id, run.id), what, remedy))
-    if not remarks:
-        return campaign, ()
-    return replace(campaign, runs=tuple(first.values())), tuple(remarks)
-
-
-def _conditions(run: Run) -> tuple[float | None, ...]:
-    return run.spring_stiffness, run.wind_speed, run.air_density if run.wind_on else None
 
 
 def noted_readings(campaign: Campaign) -> tuple[Remark, ...]:
@@ -112,39 +85,52 @@ def _in_unit(quantity: Quantity | None, unit: str) -> Quantity | None:
 def examine(campaign: Campaign) -> Examined:
     """Check a campaign's records against one another and against what is stated of them.
 
-    Repeated records are counted once. Rounded time stamps are replaced by the clock behind them. Samples before
-    the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are cut to
-    their linear growth, or left out. Runs whose zeros differ get one each. Motion that grows with the wind off,
-    and springs or wind speeds assigned to the wrong runs, are refused. Springs that do not fit the frequencies,
-    and an inertia that does not fit the springs, are noted.
+    Records are mended, and statements that they contradict are refused or noted, by the slips of
+    `identification.examination.slips.table`. Rounded time stamps are replaced by the clock behind them. Samples
+    before the release, and most of a long rest beside the centre, are cut off. Wind-on runs in a limit cycle are
+    cut to their linear growth, or left out. Runs whose zeros differ get one each.
 
     Raises:
         TunnelError: when a wind-on run states no air density, or a stated value is out of range.
     """
+    kept, remarks, seen = measured(campaign)
+    return Examined(kept, (*remarks, *(() if seen is None else found_in(seen))))
+
+
+def measured(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...], Seen | None]:
+    """Mend the records of a campaign, and measure its free decays.
+
+    Returns:
+        The campaign, what was done with it, and what its free decays show; None where all runs are driven, or the
+        records are refused.
+
+    Raises:
+        TunnelError: as `examine`.
+    """
     for run in campaign.runs:
         loads(run, campaign.rig)
-    kept, repeats = without_repeats(campaign)
-    if any(remark.outcome is Outcome.REFUSED for remark in repeats):
-        return Examined(campaign, repeats)
+    kept, faults = mended(campaign)
+    refused = tuple(remark for remark in faults if remark.outcome is Outcome.REFUSED)
+    if refused:
+        return campaign, refused, None
     noted = noted_readings(kept)
     kept, clocks = with_clocks(kept)
     # Driven runs neither begin with a release nor end at rest, and what sustains them is known.
     driven, order = [run for run in kept.runs if run.drive is not None], [run.id for run in kept.runs]
     if driven and len(driven) == len(order):
-        return Examined(kept, (*repeats, *noted, *clocks))
+        return kept, (*faults, *noted, *clocks), None
     if driven:
         kept = replace(kept, runs=tuple(run for run in kept.runs if run.drive is None))
     kept, releases = from_releases(kept)
     kept, rests = without_rest(kept)
     kept, excited = self_excited_runs(kept)
     kept, zeros = with_zeros(kept)
-    swings = [swing for run in kept.runs if (swing := swing_of(run)) is not None]
-    faults = growing_runs(swings) or exchanged_labels(swings)
-    faults = faults or (*springs_off_the_line(swings), *inertia_off_the_springs(swings, kept))
+    swings = tuple(swing for run in kept.runs if (swing := swing_of(run)) is not None)
+    seen = Seen(kept, campaign, swings)
     if driven:
         found = {run.id: run for run in (*kept.runs, *driven)}
         kept = replace(kept, runs=tuple(found[name] for name in order if name in found))
-    return Examined(kept, (*repeats, *noted, *clocks, *releases, *rests, *excited, *zeros, *faults))
+    return kept, (*faults, *noted, *clocks, *releases, *rests, *excited, *zeros), seen
 
 
 def from_releases(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:

@@ -37,7 +37,11 @@ class Swing:
             depends on the amplitude is not known better than that.
         rate: a = ζωn, 1/s; negative where the motion grows.
         rate_std: its standard deviation, 1/s.
+        zero: the sensor's zero, rad.
+        zero_std: its standard deviation, rad.
+        time: since the start of the record, thinned, shape (n,), s.
         motion: reading less the sensor's zero, thinned, shape (n,), rad.
+        amplitude: of the fitted decay at the start of the record, rad.
     """
 
     run: Run
@@ -45,7 +49,11 @@ class Swing:
     stiffness_std: float
     rate: float
     rate_std: float
+    zero: float
+    zero_std: float
+    time: Array
     motion: Array
+    amplitude: float
 
 
 def swing_of(run: Run) -> Swing | None:
@@ -86,7 +94,11 @@ def swing_of(run: Run) -> Swing | None:
         stiffness_std=float(np.hypot(stiffness_std, change)),
         rate=found.decay.rate,
         rate_std=float(rate_std),
+        zero=zero,
+        zero_std=float(np.sqrt(variance / residual.size)),
+        time=reading.time,
         motion=reading.yaw - zero,
+        amplitude=envelope_amplitude(found.decay, fitted[0].angle, fitted[0].rate),
     )
 
 

@@ -217,13 +217,16 @@ CONTRADICTIONS = {
     ),
     "wind on and off exchanged": (TWO_SPRINGS, lambda run: {"wind_speed": 24.0 - run.wind_speed}),
 }
+#: Where the air does not damp, damping does not say which runs have the wind on: an exchange is not refused.
+TRUTHS = {"wind on and off exchanged": replace(Truth(), cn_r=0.0)}
 SOFTER = {16.12: 16.12, 21.02: 21.02, 44.84: 40.36}
 
 
 @cache
 def contradictory(case):
     settings, change = CONTRADICTIONS[case]
-    data = campaign(settings, noise=5e-4, rng=np.random.default_rng(5), duration=6.0, rate=500.0)
+    rng, truth = np.random.default_rng(5), TRUTHS.get(case)
+    data = campaign(settings, truth=truth, noise=5e-4, rng=rng, duration=6.0, rate=500.0)
     return replace(data, runs=tuple(replace(run, **change(run)) for run in data.runs))
 
 
@@ -236,7 +239,7 @@ def test_a_contradiction_that_is_said_widens_the_intervals(name, case):
         assert estimate.parameters == ()
         return
     for quantity in NAMES:
-        found, truth = getattr(estimate, quantity), getattr(Truth(), quantity)
+        found, truth = getattr(estimate, quantity), getattr(TRUTHS.get(case, Truth()), quantity)
         assert abs(found.value - truth) < 2.58 * found.std + accuracy(name) * abs(truth)  # 99 %
         if found.interval is not None:
             assert found.interval[0] < truth < found.interval[1]

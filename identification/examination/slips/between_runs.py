@@ -1,0 +1,46 @@
+"""Statements of several runs against one another: motion that grows, labels exchanged, springs and inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from identification.examination.labels import exchanged_labels, inertia_off_the_springs, springs_off_the_line
+from identification.examination.self_excited import growing_runs
+from identification.examination.slips.base import Seen, StatementSlip
+from identification.status import Remark
+
+
+@dataclass(frozen=True)
+class MotionGrows(StatementSlip):
+    """Motion that grows with the wind off. Refused."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """As `growing_runs`."""
+        return growing_runs(seen.swings)
+
+
+@dataclass(frozen=True)
+class LabelsExchanged(StatementSlip):
+    """Springs or wind speeds of two runs, or of all runs of two settings, are exchanged. Refused."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """As `exchanged_labels`."""
+        return exchanged_labels(seen.swings)
+
+
+@dataclass(frozen=True)
+class SpringOffTheLine(StatementSlip):
+    """A spring that is not as stiff as stated, by the others. Noted."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """As `springs_off_the_line`."""
+        return springs_off_the_line(seen.swings)
+
+
+@dataclass(frozen=True)
+class InertiaOffTheSprings(StatementSlip):
+    """A stated inertia that the springs contradict. Noted."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """As `inertia_off_the_springs`."""
+        return inertia_off_the_springs(seen.swings, seen.campaign)

@@ -1,0 +1,135 @@
+"""A clock that drifts along the runs: all frequencies change with time by one share, whatever the amplitude.
+
+An effect changes the frequency with the amplitude, which falls at another rate in runs of other damping. The phase
+of each run against its own mean frequency shows which of the two it is. Where all runs are damped alike, none can.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri, fdtri
+
+from identification import policy
+from identification.examination.self_excited import Swing
+from identification.examination.slips.base import Seen, StatementSlip
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.record import Array
+
+_WINDOW = 2.0  # cycles: a Hann window of two cycles removes the zero and twice the frequency
+_FEWEST = 6  # phases of a run
+_PHASE = 1e-3  # rad: what the window leaves of zero and damping
+_LEAST_AMPLITUDE = 0.05  # of the first: later phases say little
+#: Powers of the amplitude by which effects change a frequency: free play, an asymmetric spring, a cubic one.
+_POWERS = (-1.0, 1.0, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Phase:
+    """The phase of a run against a constant frequency, at the middle of windows, and what may change it.
+
+    Args:
+        phase: shape (n,), rad.
+        std: shape (n,), rad.
+        drift: phase by a clock whose rate changes by 1 over the run, shape (n,), rad.
+        amplitude: phases by amplitudes to the powers, shape (n, powers), rad.
+        free: constant and slope, shape (n, 2).
+    """
+
+    run: str
+    phase: Array
+    std: Array
+    drift: Array
+    amplitude: Array
+    free: Array
+
+
+@dataclass(frozen=True)
+class DriftingClock(StatementSlip):
+    """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
+        phases = [phase for swing in seen.swings if (phase := _phase(swing)) is not None]
+        still = {swing.run.id for swing in seen.swings if not swing.run.wind_on}
+        # one decay does not tell time from amplitude, and without still air the wind speed may drift
+        if len(phases) < 2 or not any(phase.run in still for phase in phases):
+            return ()
+        whole = tuple(range(len(phases)))
+        for places in (whole, *((place,) for place in whole if len(phases) > 2)):
+            drift, std, squares, freedom = _fit(phases, places, by_amplitude=False)
+            if abs(drift) < policy.LEAST_DRIFT or abs(drift) < policy.REFUSAL_DEVIATIONS * std:
+                continue
+            good = squares <= float(chdtri(freedom, policy.MISFIT_RATE))
+            _, _, other, left = _fit(phases, (), by_amplitude=True)
+            ratio = (other / left) / max(squares / freedom, 1.0)
+            if not good or ratio <= float(fdtri(left, freedom, 1.0 - policy.REFUSAL_RATE)):
+                continue
+            ids = tuple(phases[place].run for place in places)
+            who = "every run" if places == whole else "the run"
+            what = (
+                f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, whatever the amplitude: "
+                f"the clock of the logger drifts{'' if still.intersection(ids) else ', or the wind speed'}"
+            )
+            return (
+                Remark(Outcome.REFUSED, ids, what, "correct time_s by a reference, or leave the runs out"),
+            )
+        return ()
+
+
+def _phase(swing: Swing) -> _Phase | None:
+    """Demodulate a run; None where it has too few cycles."""
+    omega = float(np.sqrt(max(swing.stiffness - swing.rate**2, 0.0)))
+    if omega == 0.0 or swing.run.drive is not None:
+        return None
+    time, motion = swing.time, swing.motion
+    interval, period = float(time[-1]) / (time.size - 1), 2.0 * np.pi / omega
+    width = round(_WINDOW * period / interval)
+    count = time.size // max(width // 2, 1) - 1
+    if width < 8 or count < _FEWEST:
+        return None
+    window = np.hanning(width + 1)[:-1]
+    starts = np.arange(count) * (width // 2)
+    starts = starts[starts + width <= time.size]
+    turned = motion * np.exp(-1j * omega * time)
+    values = np.array([window @ turned[at : at + width] for at in starts]) * 2.0 / window.sum()
+    size = np.abs(values)
+    keep = size > _LEAST_AMPLITUDE * size[0]
+    if keep.sum() < _FEWEST:
+        return None
+    middle, values, size = time[starts + width // 2][keep], values[keep], size[keep]
+    phase = np.unwrap(np.angle(values))
+    rough = motion[1:-1] - 0.5 * (motion[:-2] + motion[2:]) / np.cos(omega * interval)
+    noise = float(np.median(np.abs(rough))) / 0.6745 / np.sqrt(1.5)
+    std = np.hypot(_PHASE, noise * np.sqrt(3.0 / width) / size)
+    relative = middle - middle[0]
+    integrals = [np.concatenate(([0.0], np.cumsum(0.5 * np.diff(relative) * (p[1:] + p[:-1])))) for p in
+                 ((size / size[0]) ** power for power in _POWERS)]  # fmt: skip
+    length = float(time[-1])
+    return _Phase(
+        swing.run.id, phase, std, omega * middle * (middle - length) / (2.0 * length),
+        omega * np.column_stack(integrals) * np.array([abs(swing.amplitude) ** p for p in _POWERS]),
+        np.column_stack((np.ones(middle.size), relative)),
+    )  # fmt: skip
+
+
+def _fit(
+    phases: list[_Phase], drifting: tuple[int, ...], *, by_amplitude: bool
+) -> tuple[float, float, float, int]:
+    """Common drift of some runs and its standard deviation, sum of squares, degrees of freedom."""
+    rows, targets = [], []
+    for place, one in enumerate(phases):
+        projected = np.linalg.qr(one.free / one.std[:, None])[0]
+        columns = [one.drift * float(place in drifting)] if drifting else []
+        if by_amplitude:
+            columns += list(one.amplitude.T)
+        block, target = np.column_stack(columns) / one.std[:, None], one.phase / one.std
+        rows.append(block - projected @ (projected.T @ block))
+        targets.append(target - projected @ (projected.T @ target))
+    matrix, target = np.vstack(rows), np.concatenate(targets)
+    sizes = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    solution = np.linalg.lstsq(matrix / sizes, target, rcond=1e-10)[0]
+    residual = target - matrix / sizes @ solution
+    freedom = target.size - 2 * len(phases) - matrix.shape[1]
+    return float(solution[0] / sizes[0]), float(1.0 / sizes[0]), float(residual @ residual), max(freedom, 1)

@@ -1,0 +1,175 @@
+"""The straight lines that runs with right labels obey, with wide tolerances for everything but a slip.
+
+Every run has k = ωn² = g Kr (1 + d) − n ½ρV² with g = 1/Izz: n is common, and d is the departure of a spring, by
+its calibration, gravity, a flexible rod or a nonlinearity. A slip is a discrete change of Kr or V. It is told from
+an effect by tolerances that hold every effect, and by a value that agrees where the stated one is grossly off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from identification import policy
+from identification.examination.self_excited import Swing
+from tunnel_sim.vocabulary.campaign import Run
+from tunnel_sim.vocabulary.record import Array
+
+_PASSES = 4
+_MOST_AIR = 3.0  # air's stiffness over the whole, a standard deviation: more is less likely, and not excluded
+_LEAST = 1e-3  # of the usual g, where a fit to wrong labels gives less
+
+
+@dataclass(frozen=True, eq=False)
+class Statements:
+    """Stated conditions and measured frequencies, run by run.
+
+    Args:
+        spring: Kr, shape (n,), N m/rad.
+        speed: V, shape (n,), m/s.
+        density: ρ, shape (n,), kg/m³; of runs that state none the median of the others, 1.2 where none states any.
+        clock: stamped times over true ones, shape (n,); 1 as stated.
+        recorded: k = ωn² by the stamped times, shape (n,), 1/s².
+        std: relative standard deviation of k, with its change along the run, shape (n,).
+    """
+
+    runs: tuple[Run, ...]
+    spring: Array
+    speed: Array
+    density: Array
+    clock: Array
+    recorded: Array
+    std: Array
+
+    @classmethod
+    def of(cls, swings: Sequence[Swing]) -> Statements:
+        """Of the runs that state a spring; where none does, all are taken to have one spring of 1 N m/rad."""
+        known = [s for s in swings if s.run.spring_stiffness] or list(swings)
+        runs = tuple(s.run for s in known)
+        stated = [run.air_density for run in runs if run.air_density is not None]
+        usual = float(np.median(stated)) if stated else 1.2
+        return cls(
+            runs,
+            np.array([run.spring_stiffness or 1.0 for run in runs]),
+            np.array([run.wind_speed for run in runs]),
+            np.array([usual if run.air_density is None else run.air_density for run in runs]),
+            np.ones(len(known)),
+            np.array([s.stiffness for s in known]),
+            np.array([s.stiffness_std / s.stiffness for s in known]),
+        )
+
+    @property
+    def seen(self) -> Array:
+        """K by the true times, shape (n,), 1/s²."""
+        return np.asarray(self.recorded * self.clock**2)
+
+    @property
+    def pressure(self) -> Array:
+        """½ρV², shape (n,), Pa."""
+        return np.asarray(0.5 * self.density * self.speed**2)
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How well statements and frequencies agree.
+
+    Args:
+        squares: sum of squared residuals over tolerances, dimensionless.
+        away: residual of each run in tolerances, shape (n,).
+        inverse_inertia: g, 1/(kg m²).
+        air: n, of k, 1/(kg m²) per m³.
+        air_std: standard deviation of n, 1/(kg m²) per m³.
+    """
+
+    squares: float
+    freedom: int
+    away: Array
+    inverse_inertia: float
+    air: float
+    air_std: float
+
+    @property
+    def gross(self) -> bool:
+        """Whether the statements contradict the frequencies beyond chance and beyond every effect."""
+        return self.freedom > 0 and self.squares > float(chdtri(self.freedom, policy.REFUSAL_RATE))
+
+    @property
+    def good(self) -> bool:
+        """Whether the statements agree well: the tolerances are so wide that right labels leave little of them."""
+        return self.squares <= float(chdtri(max(self.freedom, 1), policy.SLIP_AGREES))
+
+
+def agreement(
+    labels: Statements,
+    *,
+    departure: float = policy.SPRING_DEPARTURE,
+    of_speed: float = policy.SPEED_DEPARTURE,
+) -> Agreement:
+    """Fit g, n and the stiffness of each spring to statements.
+
+    Args:
+        departure: relative tolerance of a spring, dimensionless.
+        of_speed: relative tolerance of a wind speed, dimensionless.
+    """
+    settings, place = _settings(labels.spring)
+    seen, pressure, springs = labels.seen, labels.pressure, settings.size
+    count, windy = seen.size, bool(np.any(labels.speed > 0.0))
+    usual = float(np.median(seen / labels.spring))
+    least = np.full(springs, np.inf)
+    np.minimum.at(least, place, seen)
+    # rows of the runs, of the springs, and of n; columns g and n. The stiffness of each spring per unit inertia,
+    # the third kind of unknown, is eliminated.
+    group = np.concatenate((place, np.arange(springs), [springs]))
+    of_spring = np.concatenate((np.ones(count), -np.ones(springs), [0.0]))
+    columns = np.zeros((count + springs + 1, 2))
+    columns[:count, 1] = -pressure
+    columns[count:-1, 0] = settings
+    columns[-1, 1] = pressure.max() / (_MOST_AIR * float(np.median(seen)))
+    target = np.concatenate((seen, np.zeros(springs + 1)))
+    inverse_inertia, air, stiffness = usual, 0.0, least
+    for _ in range(_PASSES):  # the tolerances scale with what is fitted
+        of_runs = np.sqrt(
+            (labels.std**2 + policy.SCATTER_OF_STIFFNESS**2) * seen**2
+            + (2.0 * of_speed * air * pressure) ** 2
+        )
+        of_springs = departure * np.minimum(max(inverse_inertia, _LEAST * usual) * settings, stiffness)
+        std = np.concatenate((of_runs, of_springs, [1.0]))
+        indicator = of_spring / std
+        squares = np.bincount(group, indicator**2) + np.r_[np.zeros(springs), 1.0]
+
+        def on_springs(values: Array, unit: Array = indicator, over: Array = squares) -> Array:
+            return np.asarray(np.bincount(group, unit * values) / over)
+
+        scaled, weighted = target / std, columns / std[:, None]
+        of_target = on_springs(scaled)
+        of_columns = np.column_stack([on_springs(column) for column in weighted.T])
+        scaled = scaled - indicator * of_target[group]
+        weighted = weighted - indicator[:, None] * of_columns[group]
+        sizes = np.maximum(np.linalg.norm(weighted, axis=0), 1e-150)
+        solution = np.linalg.lstsq(weighted / sizes, scaled, rcond=1e-12)[0] / sizes
+        away = scaled - weighted @ solution
+        inverse_inertia, air = (float(value) for value in solution)
+        stiffness = np.maximum((of_target - of_columns @ solution)[:springs], least)
+    variance = np.linalg.pinv((weighted / sizes).T @ (weighted / sizes), rcond=1e-14, hermitian=True)
+    return Agreement(
+        squares=float(away @ away),
+        freedom=count - 1 - int(windy),
+        away=np.abs(away[:count]),
+        inverse_inertia=inverse_inertia,
+        air=air,
+        air_std=float(np.sqrt(variance[1, 1]) / sizes[1]) if windy else 0.0,
+    )
+
+
+def _settings(values: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Values that differ by more than two springs must, and the place of each run's value among them."""
+    order = np.argsort(values)
+    new = np.diff(values[order]) > policy.LEAST_SPRING_SPREAD * values[order][1:]
+    group = np.concatenate(([0], np.cumsum(new)))
+    place = np.empty(values.size, dtype=np.intp)
+    place[order] = group
+    return np.array([values[place == i].mean() for i in range(int(group[-1]) + 1)]), place

@@ -1,0 +1,344 @@
+"""A wind speed or a spring of single runs that contradicts the other runs, and the value that would agree.
+
+What can go wrong with one label is a `Label`. The table `LABELS` lists them; a new one is a class and a line in it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from scipy.special import chdtri
+
+from identification import policy
+from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.fits import Statements, agreement
+from identification.status import Outcome, Remark
+
+Key = Literal["spring", "speed", "density", "clock"]
+#: Names of the labels, and the units of those that are numbers of their own.
+_NAMES: Mapping[Key, str] = {
+    "spring": "spring_stiffness", "speed": "wind_speed", "density": "air_density", "clock": "time_s",
+}  # fmt: skip
+_UNITS: Mapping[Key, str] = {"spring": "N m/rad", "speed": "m/s", "density": "kg/m3"}
+_FEWEST = 3  # runs: two determine g and n
+_MOST_SUSPECTS = 12  # runs that agree worst, whose labels are tried
+_MOST_PAIRED = 40  # runs of which all pairs with a suspect are tried
+_MOST_SAID = 3
+_TIE = 1.0  # squared tolerances: slips that agree about equally well are all named
+_DECIMAL = {
+    "with its decimal point one place to the right": 10.0,
+    "with its decimal point one place to the left": 0.1,
+}
+
+
+class Label(ABC):
+    """A slip in one label: which values may have been meant.
+
+    Attributes:
+        key: which label.
+        repeats: whether the same slip may be in several runs at once, as that of a unit is.
+    """
+
+    key: ClassVar[Key]
+    repeats: ClassVar[bool] = True
+
+    @abstractmethod
+    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
+        """Values that may have been meant by a stated one, each with words for how it came about.
+
+        Args:
+            value: as stated, in the unit of the label.
+            others: values of the other runs, in that unit.
+        """
+
+
+@dataclass(frozen=True)
+class InAnotherUnit(Label):
+    """The value in another unit, or its decimal point elsewhere.
+
+    Args:
+        factors: the stated value over the one meant, by words that follow "as".
+    """
+
+    factors: Mapping[str, float] = field(default_factory=dict)
+
+    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
+        """The value over each factor; 0 has no unit."""
+        for words, factor in self.factors.items():
+            if value > 0.0:
+                yield value / factor, words
+
+
+@dataclass(frozen=True)
+class SpeedInAnotherUnit(InAnotherUnit):
+    """A speed in km/h, knots, mph or ft/s, or converted from km/h twice."""
+
+    key: ClassVar[Key] = "speed"
+    factors: Mapping[str, float] = field(
+        default_factory=lambda: {"in km/h": 3.6, "in knots": 1.9438, "in mph": 2.2369, "in ft/s": 3.2808,
+                                 "in m/s, the others in km/h": 1.0 / 3.6}
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SpeedDecimal(InAnotherUnit):
+    """A speed whose decimal point is one place off."""
+
+    key: ClassVar[Key] = "speed"
+    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
+
+
+@dataclass(frozen=True)
+class SpringInAnotherUnit(InAnotherUnit):
+    """A stiffness in N mm/rad, N cm/rad, N m/deg, kgf m/rad or lbf in/rad."""
+
+    key: ClassVar[Key] = "spring"
+    factors: Mapping[str, float] = field(
+        default_factory=lambda: {"in N mm/rad": 1e3, "in N cm/rad": 1e2, "in N m/deg": 1.0 / 57.2958,
+                                 "in kgf m/rad": 1.0 / 9.80665, "in lbf in/rad": 8.8507}
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SpringDecimal(InAnotherUnit):
+    """A stiffness whose decimal point is one place off."""
+
+    key: ClassVar[Key] = "spring"
+    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
+
+
+@dataclass(frozen=True)
+class DensityDecimal(InAnotherUnit):
+    """An air density whose decimal point is one place off."""
+
+    key: ClassVar[Key] = "density"
+    factors: Mapping[str, float] = field(default_factory=lambda: _DECIMAL)
+
+
+@dataclass(frozen=True)
+class TimeInAnotherUnit(Label):
+    """Times in minutes or milliseconds, or of a run that was sampled at another rate than the others."""
+
+    key: ClassVar[Key] = "clock"
+
+    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
+        """The stamped times over true ones."""
+        yield value / 60.0, "in minutes"
+        yield value * 1e3, "in milliseconds"
+        for rate in (2.0, 4.0, 5.0, 10.0):
+            yield value * rate, f"of a run sampled {rate:g} times as fast as stated"
+            yield value / rate, f"of a run sampled {rate:g} times as slowly as stated"
+
+
+@dataclass(frozen=True)
+class OfAnotherRun(Label):
+    """A label that belongs to another run of the campaign."""
+
+    repeats: ClassVar[bool] = False
+
+    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:
+        """Each value of the others that differs clearly."""
+        for other in dict.fromkeys(others):
+            if other > 0.0 and abs(other - value) > policy.LEAST_SPRING_SPREAD * max(other, value):
+                yield other, "as in other runs"
+
+
+@dataclass(frozen=True)
+class SpeedOfAnotherRun(OfAnotherRun):
+    """The wind speed of another setting."""
+
+    key: ClassVar[Key] = "speed"
+
+
+@dataclass(frozen=True)
+class SpringOfAnotherRun(OfAnotherRun):
+    """The stiffness of another spring."""
+
+    key: ClassVar[Key] = "spring"
+
+
+@dataclass(frozen=True)
+class WindOff(Label):
+    """A speed stated, and the wind off."""
+
+    key: ClassVar[Key] = "speed"
+    repeats: ClassVar[bool] = False
+
+    def meant(self, value: float, others: Sequence[float]) -> Iterator[tuple[float, str]]:  # noqa: ARG002
+        """No wind."""
+        if value > 0.0:
+            yield 0.0, "with the wind off"
+
+
+LABELS: tuple[Label, ...] = (
+    SpeedInAnotherUnit(),
+    SpeedDecimal(),
+    SpeedOfAnotherRun(),
+    WindOff(),
+    SpringOfAnotherRun(),
+    SpringDecimal(),
+    SpringInAnotherUnit(),
+    DensityDecimal(),
+    TimeInAnotherUnit(),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Other labels for some runs.
+
+    Args:
+        familiar: whether the values are those of other runs, or no wind.
+        said: words for the change.
+    """
+
+    places: tuple[int, ...]
+    names: tuple[str, ...]
+    labels: Statements
+    familiar: bool
+    said: str
+
+
+Trials = Callable[[Statements, Sequence[int]], Iterator[_Trial]]
+
+
+@dataclass(frozen=True)
+class WrongLabel(StatementSlip):
+    """One run's label contradicts the others grossly, and agrees if a common slip is undone. Refused."""
+
+    labels: tuple[Label, ...] = LABELS
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Try every label of every run."""
+        return _found(seen, self._trials)
+
+    def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+        for label in self.labels:
+            for place in suspects:
+                yield from _relabelled(statements, label, (place,))
+
+
+@dataclass(frozen=True)
+class WrongLabels(StatementSlip):
+    """Labels of two runs or settings are exchanged, or one slip is in two runs or a whole setting. Refused."""
+
+    labels: tuple[Label, ...] = LABELS
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Try all exchanges, and every label of every setting and of every pair."""
+        return _found(seen, self._trials)
+
+    def _trials(self, statements: Statements, suspects: Sequence[int]) -> Iterator[_Trial]:
+        count = len(statements.runs)
+        for keys in (("spring",), ("speed",), ("spring", "speed")):
+            for i, j in itertools.combinations(range(count) if count <= _MOST_PAIRED else suspects, 2):
+                if i in suspects or j in suspects:
+                    yield from _exchanged(statements, keys, (i,), (j,))
+        for label in self.labels:
+            settings = _settings(statements, label.key)
+            yield from (
+                trial
+                for at in settings
+                if 1 < len(at) < count
+                for trial in _relabelled(statements, label, at)
+            )
+            for at in itertools.combinations(suspects, 2) if label.repeats else ():
+                if at not in settings:
+                    yield from _relabelled(statements, label, at)
+        for key in ("spring", "speed"):
+            for one, two in itertools.combinations(_settings(statements, key), 2):
+                if len(one) + len(two) > 2:
+                    yield from _exchanged(statements, (key,), one, two)
+
+
+def _settings(statements: Statements, key: str) -> list[tuple[int, ...]]:
+    """The runs of each stated value."""
+    values = getattr(statements, key)
+    return [tuple(np.flatnonzero(values == value).tolist()) for value in np.unique(values)]
+
+
+def _found(seen: Seen, trials: Trials) -> tuple[Remark, ...]:
+    """A refusal that names the runs; none where the statements may be right, or no slip agrees."""
+    swings = [swing for swing in seen.swings if swing.run.spring_stiffness]
+    if len(swings) < _FEWEST:
+        return ()
+    statements = Statements.of(swings)
+    stated = agreement(statements)
+    suspects = np.argsort(-stated.away)[:_MOST_SUSPECTS]
+    if not stated.gross:
+        suspects = suspects[stated.away[suspects] > policy.MISFIT_DEVIATIONS]
+    tried = (
+        list(trials(statements, sorted(suspects.tolist()))) if suspects.size and stated.freedom > 0 else []
+    )
+    gain = float(chdtri(1, policy.REFUSAL_RATE))  # of one more label that is fitted
+    mended = []
+    for trial in tried:
+        found = agreement(trial.labels)
+        if found.good and (stated.gross or stated.squares - found.squares > gain):
+            mended.append((trial, found.squares))
+    if not mended:
+        return ()
+    limit = min(squares for _, squares in mended) + _TIE
+    mended = [(trial, squares) for trial, squares in mended if squares <= limit]
+    best: dict[tuple[int, ...], _Trial] = {}
+    for trial, _ in sorted(
+        mended, key=lambda pair: not pair[0].familiar
+    ):  # of equals, the first in the table
+        if trial.familiar or trial.places not in best:
+            best.setdefault(trial.places, trial)
+    shown = sorted(best.values(), key=lambda trial: len(trial.places))[:_MOST_SAID]
+    said = ", or with ".join(trial.said for trial in shown)
+    ids = tuple(dict.fromkeys(statements.runs[i].id for trial in shown for i in trial.places))
+    what = f"what is stated contradicts the frequencies of the other runs, which agree with {said}"
+    names = " or ".join(dict.fromkeys(name for trial in shown for name in trial.names))
+    return (Remark(Outcome.REFUSED, ids, what, f"correct {names}, or leave the run out"),)
+
+
+def _relabelled(statements: Statements, label: Label, places: tuple[int, ...]) -> Iterator[_Trial]:
+    """The campaign with the values that may have been meant in some runs, by the same way of slipping in each."""
+    values = getattr(statements, label.key)
+    others = [float(value) for i, value in enumerate(values.tolist()) if i not in places]
+    ids = ", ".join(statements.runs[i].id for i in places)
+    name, unit = _NAMES[label.key], _UNITS.get(label.key)
+    for options in zip(*(list(label.meant(float(values[i]), others)) for i in places), strict=False):
+        if len({words for _, words in options}) > 1:
+            continue
+        changed = values.copy()
+        changed[list(places)] = [value for value, _ in options]
+        familiar = unit is None or all(
+            value == 0.0 or any(abs(value - o) <= policy.LEAST_SPRING_SPREAD * o for o in others)
+            for value, _ in options
+        )
+        words = options[0][1]
+        said = f"{name} of {ids} {words}"
+        if unit is not None:
+            before, after = (
+                " and ".join(dict.fromkeys(f"{value:.4g}" for value in some))
+                for some in (values[list(places)].tolist(), [value for value, _ in options])
+            )
+            said = f"{name} = {before} of {ids} as {after} {unit} ({words})"
+        yield _Trial(places, (name,), replace(statements, **{label.key: changed}), familiar, said)
+
+
+def _exchanged(
+    statements: Statements, keys: Sequence[str], one: tuple[int, ...], two: tuple[int, ...]
+) -> Iterator[_Trial]:
+    """The campaign with the labels of two sets of runs exchanged, if all of them differ."""
+    changes = {}
+    for key in keys:
+        values = getattr(statements, key)
+        low, high = sorted((values[one[0]], values[two[0]]))
+        if high - low <= policy.SAME_PRESSURE * high:
+            return
+        changed = values.copy()
+        changed[list(one)], changed[list(two)] = values[two[0]], values[one[0]]
+        changes[key] = changed
+    sides = (", ".join(statements.runs[i].id for i in side) for side in (one, two))
+    names = tuple(_NAMES[key] for key in _NAMES if key in keys)
+    said = f"{' and '.join(names)} of {' and '.join(sides)} exchanged"
+    yield _Trial(tuple(sorted((*one, *two))), names, replace(statements, **changes), True, said)

@@ -1,0 +1,113 @@
+"""Wind that is stated and not seen, and labels of wind and no wind that are exchanged throughout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtri
+
+from identification import policy
+from identification.examination.self_excited import Swing
+from identification.examination.slips.base import Seen, StatementSlip
+from identification.examination.slips.fits import Statements, agreement
+from identification.status import Outcome, Remark
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """What the wind changes in a run against the wind-off runs of its spring, relative to these."""
+
+    swing: Swing
+    stiffness: float
+    stiffness_std: float
+    damping: float
+    damping_std: float
+
+
+def _changes(swings: tuple[Swing, ...]) -> list[_Change]:
+    found = []
+    for swing in swings:
+        same = [
+            s for s in swings if not s.run.wind_on and s.run.spring_stiffness == swing.run.spring_stiffness
+        ]
+        if not swing.run.wind_on or not same:
+            continue
+        k, a = np.mean([s.stiffness for s in same]), np.mean([s.rate for s in same])
+        k_std, a_std = (
+            np.linalg.norm(v) / len(same)
+            for v in ([s.stiffness_std for s in same], [s.rate_std for s in same])
+        )
+        if not a > 0.0:
+            continue
+        found.append(
+            _Change(
+                swing,
+                stiffness=float(swing.stiffness / k - 1.0),
+                stiffness_std=float(np.hypot(swing.stiffness_std, k_std) / k),
+                damping=float(swing.rate / a - 1.0),
+                damping_std=float(np.hypot(swing.rate_std, a_std) / a),
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class WindNotSeen(StatementSlip):
+    """No wind-on run differs from the wind-off runs of its spring, which the records would show. Asked about."""
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Compare frequency and decay rate with the wind on and off."""
+        changes = _changes(seen.swings)
+        if not changes:
+            return ()
+        for change in changes:
+            damping_std = float(np.hypot(change.damping_std, policy.SCATTER_OF_DAMPING))
+            if abs(change.stiffness) + policy.MISFIT_DEVIATIONS * change.stiffness_std > policy.LEAST_OF_WIND:
+                return ()
+            if abs(change.damping) > policy.MISFIT_DEVIATIONS * damping_std:
+                return ()
+            if policy.MISFIT_DEVIATIONS * damping_std > policy.LEAST_DAMPING_OF_WIND:
+                return ()
+        largest = (
+            max(abs(change.stiffness) for change in changes),
+            max(abs(change.damping) for change in changes),
+        )
+        what = (
+            f"with the wind on frequency and damping are those with the wind off, to {50.0 * largest[0]:.2g} % and "
+            f"{100.0 * largest[1]:.2g} %: the air acts on no body so little"
+        )
+        ids = tuple(change.swing.run.id for change in changes)
+        return (Remark(Outcome.NOTED, ids, what, "check whether the fan was on, and wind_speed"),)
+
+
+@dataclass(frozen=True)
+class WindExchanged(StatementSlip):
+    """All labels of wind on and off are exchanged: the wind seems to reduce the damping, and the springs disagree.
+
+    Refused where the springs agree after an exchange: either sign alone may be an effect.
+    """
+
+    def find(self, seen: Seen) -> tuple[Remark, ...]:
+        """Exchange wind on and off in all runs, where there is one speed."""
+        swings = tuple(s for s in seen.swings if s.run.spring_stiffness)
+        speeds = {s.run.wind_speed for s in swings if s.run.wind_on}
+        changes = _changes(swings)
+        if len(speeds) != 1 or len({c.swing.run.spring_stiffness for c in changes}) == 1:
+            return ()
+        less = [-c.damping / float(np.hypot(c.damping_std, policy.SCATTER_OF_DAMPING)) for c in changes]
+        if min(less, default=0.0) < policy.REFUSAL_DEVIATIONS:
+            return ()
+        labels = Statements.of(swings)
+        tight = {"departure": policy.SPRING_TOLERANCE, "of_speed": policy.SPRING_TOLERANCE}
+        stated = agreement(labels, **tight)
+        exchanged = agreement(replace(labels, speed=speeds.pop() - labels.speed), **tight)
+        gain = stated.squares - exchanged.squares
+        if gain <= float(chdtri(1, policy.MISFIT_RATE)) or not exchanged.good:
+            return ()
+        what = (
+            "as stated the wind reduces the damping and the springs disagree; they agree if the wind speeds of "
+            "the runs with the wind on and off are exchanged"
+        )
+        ids = tuple(swing.run.id for swing in swings)
+        return (Remark(Outcome.REFUSED, ids, what, "correct wind_speed or the file names of these runs"),)

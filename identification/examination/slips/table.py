@@ -1,0 +1,83 @@
+"""The slips that are looked for, in their order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.examination.slips.angle_unit import AngleInDegrees
+from identification.examination.slips.base import RecordSlip, Seen, StatementSlip
+from identification.examination.slips.between_runs import (
+    InertiaOffTheSprings,
+    LabelsExchanged,
+    MotionGrows,
+    SpringOffTheLine,
+)
+from identification.examination.slips.clock import DriftingClock
+from identification.examination.slips.coupling import CoupledSensor
+from identification.examination.slips.equal_statements import EqualStatementsDiffer
+from identification.examination.slips.mirrored import MirroredRun, ReleaseOnTheOtherSide
+from identification.examination.slips.resolution import ResolutionTooCoarse
+from identification.examination.slips.run_labels import WrongLabel, WrongLabels
+from identification.examination.slips.still_air import WindExchanged, WindNotSeen
+from identification.examination.slips.tails import ConstantTail, StuckReading
+from identification.examination.slips.twins import RepeatedRecord
+from identification.examination.slips.units_of_all import InertiaOfNoBody, YawMomentTooLarge
+from identification.examination.slips.wraps import WrappedAngle
+from identification.status import Outcome, Remark
+from tunnel_sim.vocabulary.campaign import Campaign
+
+#: Looked for in the records as they come.
+RECORD_SLIPS: tuple[RecordSlip, ...] = (
+    RepeatedRecord(),
+    WrappedAngle(),
+    ResolutionTooCoarse(),
+    ConstantTail(),
+    StuckReading(),
+)
+
+#: Looked for in what is measured; after the first refusal no further one is looked for.
+STATEMENT_SLIPS: tuple[StatementSlip, ...] = (
+    MotionGrows(),
+    WrongLabel(),
+    WrongLabels(),
+    LabelsExchanged(),
+    EqualStatementsDiffer(),
+    WindExchanged(),
+    AngleInDegrees(),
+    CoupledSensor(),
+    DriftingClock(),
+    MirroredRun(),
+    WindNotSeen(),
+    YawMomentTooLarge(),
+    SpringOffTheLine(),
+    InertiaOffTheSprings(),
+    InertiaOfNoBody(),
+    ReleaseOnTheOtherSide(),
+)
+
+
+def mended(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
+    """A campaign without the faults of its records, and what was done; as far as the first refusal."""
+    remarks: tuple[Remark, ...] = ()
+    with np.errstate(all="ignore"):  # readings may have any size; the methods refuse what cannot be squared
+        for slip in RECORD_SLIPS:
+            campaign, said = slip.mend(campaign)
+            remarks += said
+            if any(remark.outcome is Outcome.REFUSED for remark in said):
+                break
+    return campaign, remarks
+
+
+def found_in(seen: Seen) -> tuple[Remark, ...]:
+    """Remarks on the statements that the measured oscillations contradict; a refusal alone."""
+    remarks: tuple[Remark, ...] = ()
+    with np.errstate(all="ignore"):
+        for slip in STATEMENT_SLIPS:
+            try:
+                said = slip.find(seen)
+            except np.linalg.LinAlgError:  # values so far apart that they cannot be compared
+                continue
+            remarks += said
+            if any(remark.outcome is Outcome.REFUSED for remark in said):
+                return said
+    return remarks

@@ -1,0 +1,34 @@
+"""Effects and honest circumstances are not taken for slips."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.examination import NOT_SLIPS, questioned_by
+from tests.unit.gap_campaigns import campaign
+from tunnel_reference.draw import Mixture
+from tunnel_reference.make import as_campaign, draw_set, simulate_set
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+
+_RANDOM = {"buffeting"}  # its moment is drawn by the simulator; it is among the drawn campaigns
+_EFFECTS = [kind for kind in ALL_EFFECTS if kind.name not in _RANDOM]
+
+
+@pytest.mark.parametrize("kind", _EFFECTS, ids=lambda kind: kind.name)
+def test_no_effect_is_taken_for_a_slip(kind: type[Effect]):
+    assert set(questioned_by(campaign(kind(*kind.example)))) <= NOT_SLIPS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("driven", [False, True])
+def test_drawn_campaigns_are_not_questioned(driven: bool):
+    """Campaigns of the reference simulator, of other scales, with few runs, coloured noise and uneven stamps.
+
+    The target is 1 in 100; the whole count is in decision 0031.
+    """
+    mixture = Mixture(variety=0.6, driven=driven)
+    draws = draw_set(
+        16, 31, {"none": 1.0} if driven else {"none": 1.0, "outside": 1.0, "single": 1.0}, mixture
+    )
+    found = [questioned_by(as_campaign(one, "drawn")) for one in simulate_set(draws)]
+    assert all(set(slips) <= NOT_SLIPS for slips in found)
