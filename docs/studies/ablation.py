@@ -45,6 +45,7 @@ WEIGHING = (
     "SET_PRICE",
     "FORM_PRICE",
     "MODEL_ERROR",
+    "FORM_ERROR",
     "LEAK",
     "NEEDLESS_CHI2",
     "CHANCE_STDS",
