@@ -83,7 +83,8 @@ def identify(
             statuses=by_severity({*estimate.statuses, *why.values()}),
             remarks=(*examined.remarks, *estimate.remarks),
         )
-    if (pair := pair_remark(left, estimate.runs)) is not None:
+    contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # which names the springs
+    if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")

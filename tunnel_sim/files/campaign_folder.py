@@ -112,14 +112,12 @@ def parse_document(document: dict[str, Any], path: Path) -> CampaignDocument:
     seen: dict[str, str] = {}
     for run in parsed.runs:
         where = run_place(path, run.id)
-        earlier = seen.setdefault(unicodedata.normalize("NFC", run.id), run.id)
-        if earlier is not run.id:
-            how = (
-                "is used twice"
-                if earlier == run.id
-                else "is used twice, with its accents encoded differently"
-            )
-            raise TunnelError(f"the id '{run.id}' {how}", where=where, remedy="give every run its own id")
+        normal = unicodedata.normalize("NFC", run.id)
+        if normal in seen:
+            how = "" if seen[normal] == run.id else ", with its accents encoded differently"
+            what = f"the id '{run.id}' is used twice{how}"
+            raise TunnelError(what, where=where, remedy="give every run its own id")
+        seen[normal] = run.id
         scales = run.spring_stiffness, parsed.rig.frontal_area, parsed.rig.reference_length
         if run.air_density is None and needs_density(run.wind_speed, *scales):
             what = f"wind-on (wind_speed = {run.wind_speed:g} m/s) without air_density"

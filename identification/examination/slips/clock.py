@@ -68,13 +68,13 @@ class DriftingClock(StatementSlip):
                 continue
             ids = tuple(phases[place].run for place in places)
             who = "every run" if places == whole else "the run"
+            air = "" if still.intersection(ids) else ", or the wind speed"
             what = (
                 f"the frequency changes by {100.0 * drift:+.2g} % along {who} with time, whatever the amplitude: "
-                f"the clock of the logger drifts{'' if still.intersection(ids) else ', or the wind speed'}"
+                f"the clock of the logger drifts, or the stiffness of a spring that warms up{air}"
             )
-            return (
-                Remark(Outcome.REFUSED, ids, what, "correct time_s by a reference, or leave the runs out"),
-            )
+            remedy = "correct time_s by a reference, let the spring settle, or leave the runs out"
+            return (Remark(Outcome.REFUSED, ids, what, remedy),)
         return ()
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from tests.unit.bench.served import Bench, bench, tab
-from tests.unit.bench.test_refusals import FULL_DISK
+from tests.unit.bench.test_bench_refusals import FULL_DISK
 from tests.unit.browser import CONTRASTS, IN_A_BROWSER, LEAST_CONTRAST, chromium
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.importing.import_files import decay

@@ -104,7 +104,7 @@ def test_an_excess_is_measured_against_the_noise_of_a_perfect_model(
 
 def _left(excess: float, block: int, chance: float = 0.01, **given: object) -> Study:
     """A study whose nominal fit leaves an excess in noise variances of a sample, of readings in blocks."""
-    data = SimpleNamespace(runs=(SimpleNamespace(block=block),))
+    data = SimpleNamespace(runs=(SimpleNamespace(block=block),), mean_block=block)
     fitted = SimpleNamespace(excess=excess * block, chance=chance, problem=SimpleNamespace(data=data))
     noise = SimpleNamespace(variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL})
     found = {"nominal": fitted, "noise": noise, "coarse": False, "step": 0.0, "hum": None}

@@ -81,7 +81,7 @@ def test_unstated_noise_is_had_from_the_residual():
 
 
 def drifting_stiffness(data, share):
-    """Each reading with its phase running ahead as the amplitude decays: a gap of the linear model."""
+    """Each reading with its phase running ahead: a gap of the linear model, which the examination would refuse."""
     return with_records(
         data, lambda clock, yaw: np.interp(clock * (1.0 + share * clock / clock[-1]), clock, yaw)
     )
@@ -100,7 +100,7 @@ def test_a_departing_model_is_flagged_and_the_intervals_widened(stated, honest):
     curved = with_records(
         drifting_stiffness(clean, -2e-3), lambda clock, yaw: yaw + 5e-4 * rng.standard_normal(clock.size)
     )
-    estimate = identify(curved)
+    estimate = OutputError().estimate(curved)
     assert Status.MODEL_DEPARTS in estimate.statuses
     assert estimate.noise.slow_ratio > 2.0
     assert estimate.cn_beta.std > 1.4 * honest.cn_beta.std
@@ -115,8 +115,8 @@ def test_a_departing_model_with_a_zero_in_every_run_is_as_uncertain_as_with_one(
     curved = drifting_stiffness(campaign(noise=5e-4, rng=np.random.default_rng(6)), -2e-3)
     shift = np.random.default_rng(7)
     moved = with_records(curved, lambda _, yaw: yaw + 0.01 * shift.standard_normal())
-    one = identify(curved)
-    each = identify(replace(moved, sensor=replace(moved.sensor, zero="per_run")))
+    one = OutputError().estimate(curved)
+    each = OutputError().estimate(replace(moved, sensor=replace(moved.sensor, zero="per_run")))
     assert Status.MODEL_DEPARTS in each.statuses
     assert each.sensor_zero is None
     for name in ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping"):

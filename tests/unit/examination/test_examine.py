@@ -87,7 +87,8 @@ def test_exchanges_that_cannot_be_distinguished_are_all_named():
     data = stated(data, "k16-v20", wind_speed=0.0)
     remark = refused(data)
     assert set(remark.runs) == {one.id for one in data.runs}
-    assert "k16-v0 and k16-v20, or k35-v0 and k35-v20" in remark.what
+    assert "wind_speed of k16-v0 and k16-v20 exchanged" in remark.what
+    assert "or with wind_speed of k35-v0 and k35-v20 exchanged" in remark.what
 
 
 @pytest.mark.parametrize(("spring", "said"), [(16.0, "16"), slow(35.0, "35"), (68.0, "68")])
