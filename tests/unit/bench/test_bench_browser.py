@@ -274,10 +274,11 @@ def test_nobody_else_is_answered(served: Bench, headers: dict[str, str]) -> None
 
 
 def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Bench) -> None:
-    session = Session(served.folder, "two")
+    shutil.copytree(served.folder / "two", served.folder / "typed")  # in which one record has two conditions
+    session = Session(served.folder, "typed")
     with tab(browser, served) as one:
         page = one.page
-        one.open("/two/conditions")
+        one.open("/typed/conditions")
         for key, text in (("wind_speed", "12"), ("spring_stiffness", "16")):
             page.dblclick(f"[row-id=a] [col-id={key}]")
             page.keyboard.press("Control+a")
@@ -286,7 +287,7 @@ def test_conditions_are_typed_pasted_checked_and_saved(browser: Any, served: Ben
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
         page.wait_for_selector("text=run 'a': wind-on without air_density")
         assert page.get_by_text("3 Identify").get_attribute("aria-disabled") == "true"
-        one.open("/two/conditions")  # what is wrong is kept too
+        one.open("/typed/conditions")  # what is wrong is kept too
         page.wait_for_selector("[row-id=a] [col-id=air_density].wrong")
         page.evaluate("navigator.clipboard.writeText('16.12\\t1.2\\n44,84\\t1.3')")
         page.click("[row-id=a] [col-id=spring_stiffness]")
