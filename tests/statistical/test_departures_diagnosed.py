@@ -7,6 +7,7 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.search.investigate import nominal_study
+from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference.departures import DEPARTURES, draw_departures
 from tunnel_reference.draw import CampaignDraw, EffectDraw, Mixture, draw_campaign, draw_conditions
@@ -19,9 +20,11 @@ TOGETHER = (
     "both_sides densities_differ speeds_unpaired other_springs noise_differs durations_differ zeros_differ"
 )
 BROKEN = [*((name,) for name in DEPARTURES), tuple(TOGETHER.split()), ("rates_differ", "durations_differ")]
+QUICK = (tuple(TOGETHER.split()), ("rates_differ", "durations_differ"))  # most departures at once
+CASES = [pytest.param(names) if names in QUICK else slow(names) for names in BROKEN]
 
 
-@pytest.mark.parametrize("names", BROKEN, ids="+".join)
+@pytest.mark.parametrize("names", CASES, ids=lambda names: "+".join(names))
 def test_a_campaign_without_a_gap_has_none(names):
     base = rig(
         (21.02, 67.98, 21.02, 67.98),
@@ -51,7 +54,11 @@ def test_a_single_cause_is_named(names, cause):
 
 
 @pytest.mark.parametrize("form", range(5))
-@pytest.mark.parametrize("names", [(), ("sample_rate",), ("rates_differ", "durations_differ")], ids="+".join)
+@pytest.mark.parametrize(
+    "names",
+    [pytest.param(()), slow(("sample_rate",)), slow(("rates_differ", "durations_differ"))],
+    ids=lambda names: "+".join(names),
+)
 def test_a_hum_of_every_form_is_found_and_removed(names, form):
     """Of either mains, wandering, swelling, or of an even multiple alone, and folded by the sample rate."""
     shape = forms_of("mains_hum")[form]

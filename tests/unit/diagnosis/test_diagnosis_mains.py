@@ -10,6 +10,7 @@ from diagnosis.likelihood.mains_lines import mains_line, mains_lines
 from diagnosis.noise.mains import find_hum, hum_remarks, refine_frequency, remove_hum
 from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import nominal_study
+from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 from tests.unit.gap_campaigns import nominal
@@ -161,7 +162,7 @@ def noise_only(base, rng):
     return replace(base, residuals=[rng.standard_normal(one.size) for one in base.residuals])
 
 
-@pytest.mark.parametrize(("runs", "rate"), [(1, 250.0), (1, 90.0), (6, 250.0)])
+@pytest.mark.parametrize(("runs", "rate"), [slow(1, 250.0), slow(1, 90.0), (6, 250.0)])
 def test_white_noise_is_a_hum_no_oftener_than_stated(runs, rate):
     """Of a thousand campaigns one may have a line beyond chance, all frequencies and multiples together."""
     data = decays(rate=rate, duration=8.0)

@@ -38,6 +38,7 @@ def test_two_springs_off_are_unknown_and_said_in_words(two_off):
     assert len(named) == 2
 
 
+@pytest.mark.slow
 def test_without_the_alternative_two_springs_off_take_false_names(two_off, monkeypatch):
     monkeypatch.setattr(investigate, "two_springs", lambda *_: [])
     assert set(diagnose(two_off, kinds=KINDS).causes) == {"gravity_stiffness", "spring_miscalibration"}
