@@ -116,7 +116,7 @@ class DiagnosisDocument(Document):
     noise: Table = Field(description="std and stated_std in rad, source, reason")
     hidden: list[Table] = Field(
         default_factory=list,
-        description="effects that could hide: the largest size that the runs do not exclude, and the moves it makes",
+        description="effects that could hide: the largest size that the runs do not exclude, and its moves",
     )
     blind_spots: list[str] = Field(description="what these runs cannot show")
     cautions: list[str] = Field(description="caveats")
