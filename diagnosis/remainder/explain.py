@@ -16,7 +16,7 @@ from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns
 from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
 from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places
+from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.remainder.formula import choose, propose
 from diagnosis.search.investigate import Study
@@ -48,7 +48,8 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     left, similarity = study.chosen if decided else study.nominal, study.similarity
     if not study.causes or not significant or study.random_answer(study.fitted) is not None:
         return None
-    if left.excess <= 0.0:
+    # a run of a few blocks has no row of an eighth of a cycle
+    if left.excess <= 0.0 or any(path.residual.size == 0 for path in paths(left)):
         return None
     unexplained = Unexplained(left)
     windy = any(path.speed > 0.0 for path in unexplained.paths)
