@@ -117,8 +117,8 @@ SET_PRICE, FORM_PRICE = 3.0, 1.0
 #: been given a false sensor nonlinearity at 7e-4.
 MODEL_ERROR = 1e-3
 #: Misfit of a channel that needs no cause, as a share of the gap, up to `MODEL_ERROR` of the motion. Judgement: the
-#: form of a real effect departs from the textbook by about a tenth of what it does. With 0.05, 0.1 and 0.3 the same
-#: 19 of 20 small causes come first, and the open records do not depend on it (0007).
+#: form of a real effect departs from the textbook by about a tenth of what it does. It was chosen with 20 small
+#: causes and the open records in sight, of which neither tells 0.05 from 0.3; another 20 test it (0007).
 FORM_ERROR = 0.1
 #: Share of the misfit in other channels that counts in a channel: an error of the phase, squared, is one of the
 #: amplitude. Tuned, together with the number of the odds below, with all open records in sight (0007).

@@ -52,6 +52,16 @@ def study_of(name, value, conditions=RUNS, **extra):
     return investigate(as_campaign(read_and_fit(draw, motion), name or "plain"), ())
 
 
+def test_a_run_of_too_few_blocks_for_a_row_says_nothing_of_what_could_be_closed(detent):
+    study, _ = detent
+    first, *others = study.nominal.problem.data.runs
+    short = study.nominal.problem.data.with_runs((first.part(0, 4), *others))
+    fitted = fit(replace(study.nominal.problem, data=short), study.nominal.point)
+    assert fitted.excess > 0.0
+    assert min(path.residual.size for path in paths(fitted)) == 0
+    assert closable(replace(study, nominal=fitted), significant=True, decided=False) is None
+
+
 @pytest.fixture(scope="module")
 def detent():
     study = study_of("magnetic_detent", 0.01, width=0.05)
