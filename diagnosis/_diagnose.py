@@ -13,17 +13,12 @@ from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
-from diagnosis.answer.verdict import choice_words, spring_words
-from diagnosis.closure import UNPATCHED, PatchedModel
-from diagnosis.diagnosable import (
-    BY_MOMENT,
-    NOT_SOUGHT,
-    choose,
-    gain_words,
-    refuse_undiagnosable,
-)
-from diagnosis.noise.gap import noise_remarks
-from diagnosis.noise.mains import hum_remarks
+from diagnosis.answer.verdict import springs_off
+from diagnosis.diagnosable import choose, gain_words, refuse_undiagnosable
+from diagnosis.facts.found import Fact, as_stated
+from diagnosis.facts.patch import PatchedModel
+from diagnosis.noise.gap import noise_noted
+from diagnosis.noise.mains import hum_noted
 from diagnosis.own_joint import investigate_joint, lead_words, recorded, with_law
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
@@ -37,9 +32,6 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
-
-
-_NOT_SOLVED = "How much of what remains could be closed was not found: its equations cannot be solved."
 
 
 def diagnose(
@@ -78,51 +70,59 @@ def diagnose(
                 raise
             raise refused_limit_cycles(chosen.remarks) from error
         say("how far it closes")  # where it is, and the answer without what no effect explains
-        where, maps = localise(study)
+        where, maps, said = localise(study)
         patched: PatchedModel | None = None
-        unpatched: tuple[str, ...] = ()
+        unpatched: tuple[Fact, ...] = ()
         if model is not None:
             from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
 
             try:
                 patched = patched_model(study, model)
             except TunnelError as error:
-                unpatched = (f"{UNPATCHED}: {error.what}.",)
-        by_moment = (BY_MOMENT,) if study.by_moment else ()
-        left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
-        left_out += lead_words(study.campaign.law, study.similarity)
-        assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
+                unpatched = (Fact("unpatched", {"reason": error.what}),)
+        by_moment = (Fact("by moment"),) if study.by_moment else ()
+        gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
+        lead = map(as_stated, lead_words(study.campaign.law, study.similarity))
+        left_out = (*chosen.left_out, *by_moment, *gain, *unpatched, *lead)
+        assembled = assemble(study, where, maps, said, left_out, patched, chosen.kinds)
+        noted = (
+            *noise_noted(study.noise, study.trend, study.test),
+            *hum_noted(study.campaign, study.hum, study.similarity),
+        )
         sized = replace(
             assembled,
-            remarks=(
-                *chosen.remarks,
-                *noise_remarks(study.noise, study.trend, study.test),
-                *hum_remarks(study.campaign, study.hum, study.similarity),
-            ),
+            remarks=chosen.remarks,
             sizes=cause_sizes(study) if study.named else (),
+            found=replace(assembled.found, noted=noted),
             data=chosen.examined,
         )
         answer = in_own_units(sized, study.similarity)
         if chosen.limit_cycles:
-            return limit_cycle_answer(answer, chosen.remarks)
+            return limit_cycle_answer(answer, chosen.remarks).in_words()
+        caution: tuple[Fact, ...] = ()
         if chosen.campaign.driven:  # the remainder's laws are sought along free decays
-            answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
+            caution = (Fact("remainder not sought"),)
         else:
             say("what no effect explains")
             decided = answer.decision.decided  # of an undecided diagnosis the whole gap remains
             significant = not decided or (answer.rest is not None and answer.rest.significant)
             try:
                 with np.errstate(over="raise"):  # a fitted model that runs away
-                    found = closable(study, significant=significant, decided=decided)
-                answer = replace(answer, closable=found)
+                    left = closable(study, significant=significant, decided=decided)
+                answer = replace(answer, closable=left)
             except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
-                answer = replace(answer, cautions=(*answer.cautions, _NOT_SOLVED))
+                caution = (Fact("remainder not solved"),)
         # below one half a set of effects comes first, though each of them may be less probable than none
         odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
         likeliest = max(odds, key=odds.__getitem__, default="")
-        modes = second_modes(chosen.campaign) if likeliest in UNKNOWN else ()
-        springs = () if answer.decision.decided and likeliest not in UNKNOWN else spring_words(study)
-        return replace(answer, verdict=" ".join((*modes, answer.verdict, *choice_words(study), *springs)))
+        explained = answer.decision.decided and likeliest not in UNKNOWN
+        found = replace(
+            answer.found,
+            second_modes=second_modes(chosen.campaign) if likeliest in UNKNOWN else (),
+            springs_off=None if explained else springs_off(study),
+            cautions=(*answer.found.cautions, *caution),
+        )
+        return replace(answer, found=found).in_words()
 
 
 def read_model(

@@ -1,14 +1,15 @@
-"""The answer in plain words: the verdict, caveats with their remedies, and what remains of the gap."""
+"""What is judged of an answer: caveats, what nearly explains a gap, springs that may be off, and what remains."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc
 
-from diagnosis.closure import Move, Remainder, of_swing, rms_shown
+from diagnosis.facts.found import Fact, Nearly, SpringError, SpringsOff
+from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.run_data import Data
@@ -24,13 +25,10 @@ from diagnosis.policy import (
     MOST,
     NOISE_CONTRADICTED,
 )
-from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
-from diagnosis.result import Confirmation, GapSummary, Hidden, ParameterEstimate, RunGap
+from diagnosis.result import Confirmation, Hidden, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
 from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN
-from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
-from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
 
 Estimates = Mapping[str, ParameterEstimate]
@@ -38,7 +36,7 @@ Estimates = Mapping[str, ParameterEstimate]
 
 def cautions(
     campaign: Campaign, noise: Noise, runs: Sequence[RunGap], confirmation: Confirmation, *, named: bool
-) -> tuple[str, ...]:
+) -> tuple[Fact, ...]:
     """The caveats of an answer.
 
     Args:
@@ -48,171 +46,61 @@ def cautions(
     """
     found = []
     if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
-        found.append(
-            "No run states spring_stiffness, so all runs are assumed to have the same spring, and moments are "
-            "per unit inertia. State it, or leave out the runs with another spring: a different spring looks like "
-            "a gap."
-        )
+        found.append(Fact("one spring assumed"))
     std = noise.estimated**0.5
     ratio = std / noise.stated_variance**0.5 if noise.stated_variance else 1.0
-    said = f"The records' noise is {ratio:.3g} times what noise_std and resolution state"
     if noise.source == "floor":
-        found.append(
-            f"The records contain almost no noise ({std:.1g} rad). The accuracy of the fits, "
-            f"{noise.used**0.5:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to "
-            f"simulated records."
-        )
+        found.append(Fact("floor", {"records_rad": std, "fits_rad": noise.used**0.5}))
     elif ratio <= 1.0 / NOISE_CONTRADICTED:
-        found.append(
-            f"{said}. The answer is based on the noise found in the records; correct noise_std or leave it out."
-        )
+        found.append(Fact("less noise than stated", {"ratio": ratio}))
     elif ratio >= NOISE_CONTRADICTED:
-        found.append(
-            f"{said}, and noise above the stated level counts as a gap. If the sensor really is as noisy as that, "
-            f"correct noise_std or leave it out."
-        )
+        found.append(Fact("more noise than stated", {"ratio": ratio}))
     if confirmation.failure:
-        found.append(
-            f"The MuJoCo model could not follow the fitted motion ({confirmation.failure}), so all figures come "
-            f"from the fits' own integrator. Do not rely on the fitted parameters."
-        )
+        found.append(Fact("not followed", {"failure": confirmation.failure}))
     elif not confirmation.agrees:
-        found.append(
-            f"The fits' own integrator differs from the MuJoCo model by {confirmation.rms_difference:.1e} rad "
-            f"(root mean square over {confirmation.run}), more than a tenth of the noise "
-            f"({confirmation.tolerance:.1e} rad). The gap before and after comes from MuJoCo. The parameters and "
-            f"probabilities come from the fits, and may be wrong by as much."
-        )
+        figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
+        found.append(Fact("not confirmed", figures | {"run": confirmation.run}))
     windy = any(run.wind_on for run in campaign.runs)
     if len(campaign.runs) < FEW_RUNS:
-        motion, others = "decay", "with other springs and release angles"
-        if campaign.driven:
-            motion, others = "motion", "with other inputs"
-        if windy:
-            others = "with other springs, wind speeds and release angles"
-        number = "is one run" if len(campaign.runs) == 1 else f"are {len(campaign.runs)} runs"
-        found.append(
-            f"There {number} only: causes are distinguished by the form of the {motion} alone. Add runs {others}."
-        )
+        kind = {"driven": campaign.driven, "windy": windy}
+        found.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]
     if named and len(fitted) == len(runs):
-        found.append(
-            "No run could be held out of the fit, so the share closed is that of the fitted runs. The gap as the "
-            "causes are added is predicted for stretches of time left out. Repeat every "
-            f"{'spring, with the wind off and on' if windy else 'run'}: a run left out tests more than a stretch."
-        )
+        found.append(Fact("none held out", {"windy": windy}))
     elif named and fitted:
-        found.append(
-            f"Not held out of the fit, since no other run has the same spring or wind: {', '.join(fitted)}. "
-            f"Their gap with the causes added is that of the fit; repeat these runs."
-        )
+        found.append(Fact("some not held out", {"runs": fitted}))
     return tuple(found)
 
 
-_CHANNEL_WORDS = {
-    "stiffness": "the restoring moment",
-    "damping": "the damping",
-    "forcing": "an imposed moment",
-    "sensor": "the angle sensor",
-    "calibration": "a stated value",
-}
-
-
-def verdict(
-    causes: Sequence[str],
-    found: Decision,
-    gap: GapSummary,
-    *,
-    rest: Remainder,
-    both_winds: bool,
-    beside: str = "",
-) -> str:
-    """The answer in one paragraph.
-
-    Args:
-        both_winds: whether the campaign has runs with the wind off and runs with the wind on.
-        beside: a sentence on what nearly explains the gap (`nearly_words`), or on what it matters
-            (`immaterial_words`); empty: none.
-    """
-    if not causes:
-        return (
-            f"No gap: the nominal model explains the runs down to their noise "
-            f"(mean squared residual over noise variance, minus one: {gap.excess_before:+.3f})."
-        )
-    excess = gap.excess_before
-    size = f"{f'{excess:.2f}' if excess < 10.0 else significant(excess, 4)} times the noise power"
-    if gap.misfit is not None:
-        size = f"{rms_shown(gap.misfit, excess)} root mean square, {of_swing(gap.misfit, excess)}, {size}"
-    if not found.decided:
-        said = f"There is a gap ({size}), and its cause is undecided."
-        with_first = f"With the first of them added, {share(gap.closed)} of the gap closes {gap.closed_on}."
-        return " ".join((said, undecided_words(found), *(() if tuple(causes) == UNKNOWN else (with_first,))))
-    if tuple(causes) == UNKNOWN:
-        said = "no effect is named as its cause" if beside else "no effect of the vocabulary explains it"
-        return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", beside, rest.words)))
-    several, sources = len(causes) > 1, []
-    for name in causes:  # what each acts on and, where the campaign can show it, whether it needs the wind
-        kind = effect_class(name)
-        wind = (
-            f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}" if both_winds else ""
-        )
-        sources.append(f"{_CHANNEL_WORDS[kind.channel]}{wind}{f' ({plain(name)})' if several else ''}")
-    return (
-        f"The gap ({size}) comes {'only in part ' if rest.material else ''}"
-        f"from {plain(*causes)} (probability {probability(found.credible[0][1])}): "
-        f"{'; '.join(sources)}. With {'them' if several else 'it'} added, {share(gap.closed)} of the gap "
-        f"closes {gap.closed_on}. {' '.join(filter(None, (rest.words, beside)))}"
-    )
-
-
-_IN_CHANNEL = {
-    "damping": "the damping along the runs",
-    "frequency": "the frequency along the runs",
-    "damping of runs": "the damping of single runs",
-    "frequency of runs": "the frequency of single runs",
-    "zero": "the zero",
-    "harmonics": "the harmonics",
-}
-
-
-def nearly_words(study: Study) -> str:
-    """The effects that explain most of a gap without being named, and why they are not; empty where none do."""
+def nearly(study: Study) -> Nearly | None:
+    """The effects that explain most of a gap without being named; None where none do."""
     sets = [answer for answer in study.weighed if answer.effects != UNKNOWN]
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
     if study.causes != UNKNOWN or first is None or first.share > 1.0 - MOST:
-        return ""
-    names = plain(*first.effects).capitalize()
-    said = f"{names} would explain {share(1.0 - first.share)} of it"
+        return None
+    found = Nearly(first.effects, 1.0 - first.share, first.probability)
     if study.test.noisy and first.probability == 0.0:
-        return f"{said}, but the noise misbehaves and may be all of a gap as small as this."
-    said = f"{said} (probability {probability(first.probability)})"
+        return replace(found, noisy=True)
     alike = [a for a in sets if a is not first and a.share <= first.share + AS_MUCH]
     rival = max(alike, key=lambda answer: answer.probability, default=None)
     if rival is not None and rival.probability >= GREATER_PART * first.probability:
-        return f"{said}, and {plain(*rival.effects)} as much ({probability(rival.probability)})."
+        return replace(found, rival=rival.effects, rival_probability=rival.probability)
     fitted = study.hypothesis(first.effects)
-    if fitted is not None:
-        chance = CHANCE_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
-        left = [
-            _IN_CHANNEL[name] for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c
-        ]
-        if left:
-            return f"{said}, but leaves a significant misfit of {' and '.join(left)}."
-    return f"{said}: too little to name it."
+    if fitted is None:
+        return found
+    chance = CHANCE_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
+    left = [name for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c]
+    return replace(found, misfit=tuple(left))
 
 
-def immaterial_words(before: Estimates, after: Estimates) -> str:
-    """That the causes change no coefficient materially, in a sentence; empty where they do."""
+def immaterial(before: Estimates, after: Estimates) -> dict[str, float]:
+    """By coefficient, the share by which the causes change it; empty where they change one materially."""
     known = {name: given for name, given in after.items() if given.std and given.value and name in before}
     moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
     limits = {name: min(MATERIAL_SHARE * abs(given.value), given.std or 0.0) for name, given in known.items()}
-    if not known or any(moves[name] > limit for name, limit in limits.items()):
-        return ""
-
-    def size(name: str) -> str:
-        return f"less than {_rounded_up(100.0 * moves[name] / abs(known[name].value))} %"
-
-    return f"The gap is immaterial: its causes change {_each(list(known), size)}."
+    if any(moves[name] > limit for name, limit in limits.items()):
+        return {}
+    return {name: moves[name] / abs(given.value) for name, given in known.items()}
 
 
 BLIND_SPOTS = (
@@ -260,46 +148,30 @@ def blind_spots(data: Data) -> tuple[str, ...]:
     return (*found, *BLIND_SPOTS, *last)
 
 
-def spring_words(study: Study) -> tuple[str, ...]:
-    """The likeliest pair of springs that are off, in a sentence; none where none closes most of the gap."""
+def springs_off(study: Study) -> SpringsOff | None:
+    """The likeliest pair of springs that are off; None where none closes most of the gap."""
     best = min(study.outside, key=lambda pair: pair.fit.total, default=None)
     if best is None or best.fit.excess > (1.0 - MOST) * study.nominal.excess:
-        return ()
-    chosen, inflate = dict(best.fit.problem.fixed), float(np.sqrt(1.0 + max(best.fit.excess, 0.0)))
-    springs = []
-    for name in (ONE_SPRING.name, AnotherSpring.name):
-        stated = chosen[f"{name}.{ONE_SPRING.chosen_spring()}"]
-        springs.append(_spring_error(study, best.fit, name, stated, inflate))
-    beside = [name for name in best.names if name not in (ONE_SPRING.name, AnotherSpring.name)]
-    others = f" beside {plain(*beside)}" if beside else ""
-    return (
-        f"Two springs that are not as stiff as stated would explain the gap{others}, such as "
-        f"{' and '.join(springs)}: measure their stiffness again.",
+        return None
+    both = (ONE_SPRING.name, AnotherSpring.name)
+    springs = tuple(_spring_error(study, best.fit, name) for name in both)
+    return SpringsOff(springs, tuple(name for name in best.names if name not in both))
+
+
+def spring_choices(study: Study) -> tuple[SpringError, ...]:
+    """The springs of which one may be off, where the runs cannot tell which."""
+    return tuple(
+        replace(_spring_error(study, one.hypothesis.fit, ONE_SPRING.name), probability=one.probability)
+        for one in study.choices.get(study.fitted, ())
     )
 
 
-def choice_words(study: Study) -> tuple[str, ...]:
-    """Which of the springs may be off, in a sentence, where the runs cannot tell; else none."""
-    found = []
-    for choice in study.choices.get(study.fitted, ()):
-        fit = choice.hypothesis.fit
-        inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
-        stated = dict(fit.problem.fixed)[f"{ONE_SPRING.name}.{ONE_SPRING.chosen_spring()}"]
-        off = _spring_error(study, fit, ONE_SPRING.name, stated, inflate)
-        found.append(f"{off} ({probability(choice.probability)})")
-    if not found:
-        return ()
-    return (
-        f"These runs cannot tell which spring is off: {' or '.join(found)}. The coefficients are averaged over "
-        "these choices: add runs with a third spring, or measure the stiffness of the springs again.",
-    )
-
-
-def _spring_error(study: Study, fit: Fit, name: str, stated: float, inflate: float) -> str:
-    """A spring and its error, such as ``16.12 N m/rad by −1.96 ± 0.01 %``."""
-    stiffness = study.similarity.own(stated, "N m/rad")
-    error, std = (100.0 * of(f"{name}.error") for of in (fit.value, fit.std))
-    return f"{stiffness:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, inflate * std)} %"
+def _spring_error(study: Study, fit: Fit, name: str) -> SpringError:
+    """The spring that an effect is off, and its error."""
+    stated = dict(fit.problem.fixed)[f"{name}.{ONE_SPRING.chosen_spring()}"]
+    inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
+    error, std = (of(f"{name}.error") for of in (fit.value, fit.std))
+    return SpringError(study.similarity.own(stated, "N m/rad"), error, inflate * std)
 
 
 def remainder(
@@ -331,53 +203,17 @@ def remainder(
     shown = further is not None and by_effect < FALSE_ALARM_RATE <= p_value
     p_value = min(p_value, by_effect)
     beyond_chance = p_value < FALSE_ALARM_RATE
-    moves, material = {}, []
+    moves = {}
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None
-        moves[name] = Move(moved[name], relative, given.std, given.unit)
         # by its standard deviation, or by 1 %, where the runs determine it
         far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
-        material += [name] if beyond_chance and far else []
-    left = f"what remains ({noise_powers(excess)})" if study.named else "it"
-    known = [name for name, move in moves.items() if move.std is not None]
-    if not study.causes:
-        words = "No gap: nothing remains beyond the noise."
-    elif not beyond_chance:
-        words = f"Explained; {left} is within the noise."
-    elif material:
-        moved_words = _each(material, lambda name: _sized(moves[name].value, stated[name]))
-        start = f"Not all is explained: {left}" if study.named else "It"
-        words = f"{start} could move {moved_words}. Do not trust the coefficients beyond the intervals given."
-    elif not known:
-        start = f"Explained; {left}" if study.named else "It"
-        words = f"{start} concerns no coefficient that these runs determine."
-    else:
-        bounds = _each(
-            known,
-            lambda name: f"less than {_sized(max(moves[name].value, moves[name].std or 0.0), stated[name])}",
-        )
-        words = (
-            f"Explained; {left} moves {bounds}." if study.named else f"It hardly matters: it moves {bounds}."
-        )
-    if shown and further is not None:
-        words += f" {plain(further.effect).capitalize()} is significant beside it and too small to be named."
-    return Remainder(beyond_chance, excess, p_value, bool(material), moves, words)
-
-
-def _each(names: list[str], size: Callable[[str], str]) -> str:
-    return " and ".join(f"{COEFFICIENTS.get(name, name)} by {size(name)}" for name in names)
-
-
-def _sized(size: float, given: ParameterEstimate) -> str:
-    """A change of a coefficient as its share, rounded up; in its unit where the coefficient itself is uncertain."""
-    if given.std is not None and given.std < abs(given.value):
-        return f"{_rounded_up(100.0 * size / abs(given.value))} %"
-    return f"{_rounded_up(size)} {'' if given.unit == '1' else unit_mark(given.unit)}".strip()
-
-
-def _rounded_up(value: float) -> str:
-    """Two significant digits, never below the value."""
-    if value <= 0.0:
-        return "0"
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
+        moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
+    return Remainder(
+        significant=beyond_chance,
+        excess=excess,
+        p_value=p_value,
+        material=any(move.material for move in moves.values()),
+        moves=moves,
+        further=further.effect if shown and further is not None else "",
+    )

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis import policy
+from diagnosis.facts.found import Fact, Noted
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited
@@ -21,7 +22,6 @@ from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
 from diagnosis.noise.colour import alike_in_all_runs, noise_colour, whitened, zero_wanders
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
-from identification.status import Outcome, Remark
 from tunnel_sim.effects import the_effect
 from tunnel_sim.vocabulary.record import Array
 
@@ -389,32 +389,24 @@ def _by_band(fit: Fit, residuals: Sequence[Array]) -> list[tuple[Array, Array]]:
     return [(power[where == index], place[where == index]) for index in range(len(BANDS))]
 
 
-def noise_remarks(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Remark, ...]:
+def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Noted, ...]:
     """What the user should know of the noise.
 
     Args:
         trend: of the noise with the motion.
 
     Returns:
-        Remarks where the noise is coloured, where the sampling is too slow to compare it with the motion, and where
-        the readings' steps may be all of the gap.
+        Where the readings' steps may be all of the gap, where the noise is coloured, and where the sampling is too
+        slow to compare it with the motion.
     """
     found = []
-    runs = tuple(noise.variance)
     if test.within_step:
-        what = (
-            "the model departs from the readings by less than their steps, whose error may follow the motion"
-        )
-        found.append(Remark(Outcome.NOTED, runs, what, "read the angle more finely to see smaller gaps"))
+        found.append(Fact("within step"))
     if noise.colour is not None:
         span = noise.colour.frequency[-1] / noise.colour.frequency[0]
         ratio = np.exp(np.ptp(noise.colour.level))
-        what = (
-            f"the sensor's noise is coloured: {noise.std:.3g} rad in all, and its power per hertz varies by a "
-            f"factor of {ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs"
-        )
-        found.append(Remark(Outcome.NOTED, runs, what, "the diagnosis allows for it, and it is not a cause"))
+        figures = {"std_rad": noise.std, "power_ratio": float(ratio), "frequency_ratio": float(span)}
+        found.append(Fact("coloured", figures))
     if not trend.judged:
-        what = "sampled too slowly to test whether the noise follows the motion or comes in bursts"
-        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to test it"))
-    return tuple(found)
+        found.append(Fact("not judged"))
+    return tuple(Noted(tuple(noise.variance), one) for one in found)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.special import gammaincinv, ndtri
 
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.nondimensional import frequency
 from diagnosis.likelihood.prepare import BLOCK_INTERVAL
 from diagnosis.likelihood.run_data import Data
@@ -39,6 +40,7 @@ class Noise:
         stated_variance: of one sample as the campaign states it, rad²; None where it does not.
         source: of the variance used: ``stated``, ``estimated`` or ``floor``. The floor is the accuracy of the
             fits, where the records contain less noise than that.
+        reason: for that source.
         estimate: the records' own variance, mean over the runs, rad²; None: the one used.
         relative: standard deviation of that estimate, a share of it.
         colour: of the noise of block means, relative to white noise of the variance used; None where it is white.
@@ -48,7 +50,7 @@ class Noise:
     variance: dict[str, float]
     stated_variance: float | None
     source: str
-    reason: str
+    reason: Fact
     estimate: float | None = None
     relative: float = 0.0
     colour: Colour | None = None
@@ -95,7 +97,7 @@ class Noise:
             for run in data.runs
         ]
         whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
-        reason = f"it is coloured, {np.sqrt(whole):.3g} rad in all"
+        reason = Fact("coloured", {"std_rad": float(np.sqrt(whole))})
         return replace(self, source="estimated", reason=reason, estimate=whole, colour=colour)
 
     @property
@@ -276,25 +278,23 @@ def campaign_noise(campaign: Campaign) -> Noise:
     fewer = sum(floors[run] > value for run, value in estimates.items())
     if fewer:
         used = {run: max(value, floors[run]) for run, value in estimates.items()}
-        reason = (
-            f"the records contain {np.sqrt(pooled):.1g} rad, in {fewer} of {len(used)} runs less than the accuracy "
-            "of the fits, which stands in for it"
-        )
+        reason = Fact("floor", {"std_rad": float(np.sqrt(pooled)), "fewer": fewer, "runs": len(used)})
         return Noise(used, stated, "floor", reason, pooled, measured=measured)
     apart, agrees = (-float(ndtri(0.5 * FALSE_ALARM_RATE / tests)) for tests in (variances.size, 1))
     uniform = bool(np.all(np.abs(variances / pooled - 1.0) < apart * relative))
     used = dict.fromkeys(estimates, pooled) if uniform else estimates
-    found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
+    std = float(np.sqrt(pooled))
+    level = {"std_rad": std, "uncertainty_rad": 0.5 * uncertainty * std}
     source = "estimated"
     if stated is None:
-        reason = "the campaign states no noise"
+        reason = Fact("not stated")
     elif uniform and abs(pooled / stated - 1.0) < agrees * uncertainty:
         used, source = dict.fromkeys(estimates, stated), "stated"
-        reason = f"the records agree: {found}"
+        reason = Fact("agrees", level)
     else:
-        span = f"{np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
-        said = f"they contain {found}" if uniform else f"their noise differs by run, {span}"
-        reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
+        span = {"least_rad": float(np.sqrt(variances.min())), "most_rad": float(np.sqrt(variances.max()))}
+        beside = {"stated_rad": float(np.sqrt(stated))}
+        reason = Fact("contradicts", beside | level) if uniform else Fact("differs by run", beside | span)
     return Noise(used, stated, source, reason, pooled, uncertainty, measured=measured)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis import policy
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
@@ -27,7 +28,7 @@ class Finding:
     """
 
     value: str | None
-    reason: str
+    reason: Fact
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,29 +88,26 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     runs, shown = nominal.problem.data.runs, found.maps.runs
     off = tuple(run.id for run in runs if not run.wind_on)
     if len(off) == len(runs):
-        return Finding("always", "it is there with the wind off")
-    undetermined = "whether it needs wind cannot be determined"
+        return Finding("always", Fact("wind off"))
     if not off:
-        return Finding(None, f"{undetermined}, since the wind is on in every run")
+        return Finding(None, Fact("wind on in every run"))
     if min(run.p_value for run in shown) * len(runs) > policy.LOCAL_FALSE_ALARM_RATE:
-        return Finding(None, f"{undetermined}, since no single run shows it")
+        return Finding(None, Fact("no single run"))
     most = max(shown, key=lambda run: run.share)
     if len(shown) >= 3 and most.share > policy.MOST and most.id not in off:
-        return Finding(None, f"{undetermined} from one run alone ({most.id})")
+        return Finding(None, Fact("one run", {"run": most.id}))
     # without coefficients and a gain that these runs lack
     data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
-        return Finding(None, f"{undetermined}, since the wind-off runs could not be fitted alone")
+        return Finding(None, Fact("wind-off runs not fitted"))
     excesses = run_excesses(campaign, alone)
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
-    count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
-    show = f"{count}, fitted alone, show{'s' * (len(off) == 1)}"
     if min(tests) * len(tests) < policy.LOCAL_FALSE_ALARM_RATE:
-        return Finding("always", f"{show} it too")
-    return Finding("wind_on", f"{show} no gap")
+        return Finding("always", Fact("wind-off runs show it", {"runs": len(off)}))
+    return Finding("wind_on", Fact("wind-off runs show none", {"runs": len(off)}))
 
 
 def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | None:
@@ -135,9 +133,7 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     """What the gap acts on, from features of the residual; the condition is the one inferred."""
     blow = blow_interval(found)
     if blow is not None:
-        return Finding(
-            "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
-        )
+        return Finding("forcing", Fact("blow", {"from_s": blow[0], "to_s": blow[1]}))
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
@@ -147,31 +143,29 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Finding(
             "forcing" if similar < policy.FASTEST_MOMENT else "sensor",
-            f"it is a spectral line near {hertz:.3g} Hz",
+            Fact("spectral line", {"frequency_hz": hertz}),
         )
     if excess.get("above", 0.0) > policy.GREATER_PART * whole:
-        return Finding("sensor", "most of it is faster than the rig can move")
+        return Finding("sensor", Fact("too fast"))
     if excess.get("0", 0.0) > policy.GREATER_PART * whole:
         if excess.get("2f0", 0.0) > policy.WORTH_NAMING * whole:
-            return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
+            return Finding("stiffness", Fact("shifted centre and harmonic"))
         if condition == "wind_on":
-            return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
-        return Finding("sensor", "most of it is a slow shift of the centre")
+            return Finding("forcing", Fact("shifted centre with wind"))
+        return Finding("sensor", Fact("shifted centre"))
     if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > policy.GREATER_PART * whole:
-        return Finding(
-            "sensor", "it contains harmonics of the motion, without a shift of frequency or damping"
-        )
+        return Finding("sensor", Fact("harmonics"))
     apart = _between_runs(nominal, found)
     if apart is not None:
         return apart
     if all(run.drive is not None for run in nominal.problem.data.runs):
-        return Finding(None, "every run is driven, so that no decay shows it")
+        return Finding(None, Fact("every run driven"))
     frequency, damping = drift(list(found.maps.backbones))
     if frequency > policy.CLEARLY_MORE * max(damping, 0.0) and frequency > 0.0:
-        return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
+        return Finding("stiffness", Fact("frequency along the decay"))
     if damping > policy.CLEARLY_MORE * max(frequency, 0.0) and damping > 0.0:
-        return Finding("damping", "the damping shifts along the decay more than the frequency does")
-    return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
+        return Finding("damping", Fact("damping along the decay"))
+    return Finding(None, Fact("both along the decay"))
 
 
 def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
@@ -189,9 +183,5 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
-        return Finding(
-            None,
-            "each run alone is linear, but the runs' frequencies do not agree with one model: a stated value is "
-            "wrong, or a stiffness is missing",
-        )
-    return Finding("damping", "each run alone is linear, but the runs' damping does not agree with one model")
+        return Finding(None, Fact("frequency between runs"))
+    return Finding("damping", Fact("damping between runs"))
