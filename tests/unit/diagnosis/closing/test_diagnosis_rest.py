@@ -77,7 +77,13 @@ def cut(base, part):
 
 def judged(study, moved, std, excess=0.4):
     stated = {"cn_beta": ParameterEstimate(0.5, std, "1/rad")}
-    return remainder(study, stated, {"cn_beta": moved}, excess)
+    found = remainder(study, stated, {"cn_beta": moved}, excess)
+    document = {
+        "causes": list(study.causes),
+        "rest": as_json(found),
+        "coefficients": {"after": as_json(stated)},
+    }
+    return replace(found, words=rest_words(document))
 
 
 def unknown(data, base):
