@@ -96,7 +96,9 @@ class Case:
         """
         if self.nominal is None:
             return [(self.causes, 1.0)]
-        found = decide.weigh([s for s in self.sets if withheld not in s.effects], self.nominal)
+        found = decide.weigh(
+            [s for s in self.sets if withheld not in s.effects], self.nominal, Settings().weighing
+        )
         return [
             (UNKNOWN if a.effects == UNKNOWN else tuple(sorted({*self.read_off, *a.effects})), a.probability)
             for a in found
