@@ -250,7 +250,8 @@ def _test(
     """The study up to the test of the gap: noise, hum and nominal fit."""
     allowed = {kind.name for kind in kinds}
     with clock.step("noise"):
-        noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
+        noise = campaign_noise(campaign, settings.noise)
+        trend, step = noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
         least = settings.read_off.coarse_step
         coarse = COARSE_STEP.name in allowed and stated is not None and step > least * stated
@@ -268,8 +269,8 @@ def _test(
             frequency = refine_frequency(campaign, line, motion)
             for _ in range(2):  # as a hum may count as noise at first
                 variance = float(np.mean(list(noise.variance.values())))
-                cleaned, hum = remove_hum(campaign, frequency, variance, motion)
-                noise = campaign_noise(cleaned)
+                cleaned, hum = remove_hum(campaign, frequency, variance, settings.read_off, motion)
+                noise = campaign_noise(cleaned, settings.noise)
             nominal = fit_nominal(prepare(cleaned, noise.variance, similarity, settings=settings))
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
         missed = misses_motion(nominal) and not campaign.driven
@@ -306,7 +307,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = _compared(found, found.nominal, clock)
     found, weighed = _resolved(found, found.nominal)
     best = _best(found, weighed) if found.campaign.unrestrained else None
-    if best is not None and best.fit.chance < 1.0:
+    if best is not None and best.fit.chance < found.settings.search.moment_chance:
         again = _weigh_by_moment(found, weighed, fitted, clock)
         if again is not None:
             return again
@@ -506,4 +507,4 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
     block, weighing = found.nominal.problem.data.mean_block, found.settings.weighing
     small = found.test.noisy and found.nominal.excess < weighing.noise_explains * block
     closed = any(w.effects != UNKNOWN and w.share < 1.0 - weighing.noise_excused for w in weighed)
-    return found.nominal.chance > 1.0 or (small and not closed)
+    return found.nominal.chance > weighing.shares_chance or (small and not closed)

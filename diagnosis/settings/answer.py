@@ -43,6 +43,9 @@ class WhereSettings:
         "Share of the excess in one run from which it cannot tell whether the gap needs wind.",
         "judgement",
     )
+    one_run_of: int = setting(
+        3, "Fewest runs among which one may have most of the excess.", "judgement", unit="runs"
+    )
     interval: float = setting(0.8, "Share of the excess in a stated interval.", "judgement")
     blow_share: float = setting(
         0.5, "Share of the missing moment's energy in the time of a blow.", "convention", "Most of it."
@@ -219,6 +222,11 @@ class AnswerSettings:
         "Standard deviation over a parameter's value and usual size from which it is not determined.",
         "judgement",
         "Even its order of magnitude is then unknown.",
+    )
+    patched_misses: float = setting(
+        0.02,
+        "Share of a moment's greatest value that a polynomial in the patched model may miss.",
+        "judgement",
     )
     integrator_tolerance: float = setting(
         0.1,

@@ -121,6 +121,12 @@ class SearchSettings:
         "Half its size: a cause is the greater part of the gap. The EMPS axis, at 0.115, was in "
         "sight and does not test it.",
     )
+    moment_chance: float = setting(
+        1.0,
+        "Standard deviation of a share of what the best set leaves, below which sets are weighed by the moment.",
+        "convention",
+        "As large as the share itself.",
+    )
     resolved_stds: float = setting(
         2.0,
         "Distance of an effect's size from zero in half of the records from which that half shows it.",
@@ -344,6 +350,12 @@ class WeighingSettings:
         "judgement",
         "As much again as the noise itself.",
         unit="noise variances of a sample",
+    )
+    shares_chance: float = setting(
+        1.0,
+        "Standard deviation of a share of the gap above which the shares that sets leave are chance.",
+        "convention",
+        "As large as the gap itself.",
     )
     noise_excused: float = setting(
         0.8,

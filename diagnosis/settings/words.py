@@ -74,6 +74,11 @@ class RemainderSettings:
         " is tried.",
         "judgement",
     )
+    first_start: float = setting(
+        0.02,
+        "Share of the excess that a fitted formula may leave for no other start to be tried.",
+        "judgement",
+    )
     most_terms: int = setting(3, "Terms of a formula at most.", "judgement", unit="terms")
 
 

@@ -35,6 +35,7 @@ from diagnosis.policy import DECIDED_FROM
 from diagnosis.search import investigate as investigation
 from diagnosis.search import weigh as decide
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
+from diagnosis.settings import Settings
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
