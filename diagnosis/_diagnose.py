@@ -24,6 +24,7 @@ from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import as_campaign
@@ -40,6 +41,7 @@ def diagnose(
     kinds: Sequence[type[Effect]] | None = None,
     progress: Progress | None = None,
     model: JointModel | None = None,
+    settings: Settings = Settings(),
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
@@ -48,6 +50,7 @@ def diagnose(
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
         model: a model of one's own, from `read_model`, which is then the nominal model.
+        settings: every number that decides.
 
     Returns:
         The answer, for the runs that one model can be fitted to; its cautions name the others.
@@ -62,9 +65,9 @@ def diagnose(
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
     with answering_with(kinds):
-        chosen = choose(campaign, kinds)
+        chosen = choose(campaign, kinds, settings.selection)
         try:  # noise, nominal fit, where, search
-            study = investigate_joint(chosen.campaign, chosen.kinds, progress)
+            study = investigate_joint(chosen.campaign, chosen.kinds, progress, settings)
         except TunnelError as error:
             if not chosen.limit_cycles:
                 raise
@@ -118,7 +121,7 @@ def diagnose(
         explained = answer.decision.decided and likeliest not in UNKNOWN
         found = replace(
             answer.found,
-            second_modes=second_modes(chosen.campaign) if likeliest in UNKNOWN else (),
+            second_modes=second_modes(chosen.campaign, settings.words) if likeliest in UNKNOWN else (),
             springs_off=None if explained else springs_off(study),
             cautions=(*answer.found.cautions, *caution),
         )

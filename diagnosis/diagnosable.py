@@ -14,7 +14,7 @@ from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import free_frequency, response_to_input
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
-from diagnosis.policy import CLEARLY_MORE, SAME_SPRING
+from diagnosis.settings import SelectionSettings
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
@@ -83,7 +83,7 @@ class Chosen:
     limit_cycles: bool
 
 
-def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
+def choose(campaign: Campaign, kinds: Sequence[type[Effect]], settings: SelectionSettings) -> Chosen:
     """Choose the runs of a campaign that are diagnosed together, and the effects to answer with.
 
     Raises:
@@ -92,7 +92,7 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
     found = diagnosable(campaign)
     if not found.limit_cycles:
         refuse_motionless(found.campaign)
-    compared, left_out = comparable_runs(found.campaign)
+    compared, left_out = comparable_runs(found.campaign, settings)
     if compared.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
@@ -106,7 +106,7 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Chosen:
     return Chosen(found.campaign, compared, known, found.remarks, left_out, found.limit_cycles)
 
 
-def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
+def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[Fact, ...]]:
     """Leave out the runs that cannot be fitted together with the others, and say which and why.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
@@ -121,7 +121,7 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
         other, why = (bare, "stiffness not stated") if kept is stated else (stated, "stiffness stated")
         left_out.append(Fact(why, {"runs": [run.id for run in other]}))
     if kept is bare:
-        same = _of_one_spring(bare, derivative)
+        same = _of_one_spring(bare, derivative, settings.same_spring)
         if len(same) < len(bare):
             left_out.append(Fact("other springs", {"runs": [run.id for run in bare if run not in same]}))
         kept = same
@@ -134,10 +134,10 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[Fact, ...]]:
         for run in kept
         if run.wind_on
         and run.spring_stiffness in still
-        and free_frequency(run, derivative) > CLEARLY_MORE * median(still[run.spring_stiffness])
+        and free_frequency(run, derivative) > settings.other_mode * median(still[run.spring_stiffness])
     ]
     if elsewhere:
-        figures = {"ratio": CLEARLY_MORE, "runs": [run.id for run in elsewhere]}
+        figures = {"ratio": settings.other_mode, "runs": [run.id for run in elsewhere]}
         left_out.append(Fact("another mode", figures))
         kept = [run for run in kept if run not in elsewhere]
     order = {run.id for run in kept}
@@ -148,11 +148,11 @@ def _ids(runs: Sequence[Run]) -> str:
     return ", ".join(run.id for run in runs)
 
 
-def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
+def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[Run]:
     """The largest group of runs that may have one spring.
 
     The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
-    same at each speed.
+    same at each speed. Frequencies at one speed within a ``ratio`` are those of one spring.
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     for run in runs:
@@ -163,7 +163,7 @@ def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
         ranked = sorted(alike, key=lambda pair: pair[0])
         found = [[ranked[0][1]]]
         for (last, _), (now, run) in itertools.pairwise(ranked):
-            if now > SAME_SPRING * last:
+            if now > ratio * last:
                 found.append([])
             found[-1].append(run)
         groups.append(found)

@@ -11,9 +11,9 @@ import numpy as np
 from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.likelihood.nondimensional import Similarity, frequency
 from diagnosis.likelihood.problem import Point
-from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import Progress, Study, investigate
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import Drive
@@ -135,7 +135,9 @@ def lead_words(law: JointLaw | None, similarity: Similarity) -> tuple[str, ...]:
     )
 
 
-def investigate_joint(campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None) -> Study:
+def investigate_joint(
+    campaign: Campaign, kinds: Sequence[type[Effect]], progress: Progress | None, settings: Settings
+) -> Study:
     """The study of a campaign; with the lead of the motion where it explains more with no more causes.
 
     In integrators of first order the position of a step is already moved by the rate at its end, so that all motion
@@ -148,13 +150,13 @@ def investigate_joint(campaign: Campaign, kinds: Sequence[type[Effect]], progres
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    found, law = investigate(campaign, kinds, progress), campaign.law
+    found, law = investigate(campaign, kinds, progress, settings), campaign.law
     if law is None or not (law.step and campaign.driven and found.test.detected):
         return found
     lead = found.similarity.own(_lead(found), "s")
     if lead == 0.0:
         return found
-    again = investigate(replace(campaign, law=replace(law, lead=lead)), kinds, progress)
+    again = investigate(replace(campaign, law=replace(law, lead=lead)), kinds, progress, settings)
     unexplained = again.causes == UNKNOWN and found.causes != ()
     fewer = found.causes == UNKNOWN or len(again.causes) <= len(found.causes)
     return again if fewer and not unexplained else found
@@ -183,4 +185,5 @@ def _lead(study: Study) -> float:
     best = float(leads[np.argmin(totals)])
     if curve[0] > 0.0:
         best = float(np.clip(-0.5 * curve[1] / curve[0], 0.0, leads[-1]))
-    return best if totals[0] - float(np.polyval(curve, best)) > chdtri(1.0, FALSE_ALARM_RATE) else 0.0
+    least = chdtri(1.0, study.settings.read_off.lead_rate)
+    return best if totals[0] - float(np.polyval(curve, best)) > least else 0.0

@@ -15,6 +15,7 @@ from diagnosis.facts.decision import Decision, decision
 from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Closable, Remainder
+from diagnosis.settings import settings_of
 from diagnosis.words.lines import diagnosis_brief, diagnosis_parts
 from diagnosis.words.written import sentences
 from identification.estimate import as_pandas, wide_frame
@@ -331,7 +332,8 @@ class Diagnosis:
     @property
     def decision(self) -> Decision:
         """Whether the answer is decided, and what the likely answers have in common."""
-        return decision([(c.effect, c.probability) for c in self.candidates], self.gap.closed)
+        chosen = settings_of({"provenance": self.provenance}).answer
+        return decision([(c.effect, c.probability) for c in self.candidates], chosen, self.gap.closed)
 
     def in_words(self) -> Diagnosis:
         """The answer with its text fields, and the remarks on the noise after those of the examination."""

@@ -19,7 +19,6 @@ from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, immaterial, nearly, remainder, spring_choices
 from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
-from diagnosis.policy import MOST, WORTH_NAMING
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
 from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, main_effect
@@ -35,7 +34,7 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
 
     The place is that of the residuals alone. The causes only have to agree with it.
     """
-    place = located(study)
+    place, chosen = located(study), study.settings.where
     found = place.survey
     answer = None if study.chosen is study.nominal else study.chosen
     maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
@@ -49,11 +48,11 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(found, MOST) or found.maps.time.interval(),
-        amplitude_rad=found.maps.amplitude.interval(),
+        time_s=blow_interval(found, chosen.interval, chosen) or found.maps.time.interval(chosen.interval),
+        amplitude_rad=found.maps.amplitude.interval(chosen.interval),
         frequency_hz=found.frequency_interval,
     )
-    return where, maps, described(where, place, [effect_class(name) for name in compared])
+    return where, maps, described(where, place, [effect_class(name) for name in compared], study.settings)
 
 
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
@@ -76,7 +75,7 @@ def assemble(
         patched: the model given with the causes written into it; the share closed is then its own.
         kinds: the effects that may act unnamed beside those of an answer.
     """
-    base = excess_base(study)
+    base, settings = excess_base(study), study.settings
     chosen = study.chosen
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
@@ -111,7 +110,7 @@ def assemble(
         answer.effects
         for answer in study.weighed[1:]
         if study.named
-        and answer.probability >= WORTH_NAMING
+        and answer.probability >= settings.answer.rivals_from
         and answer.effects != UNKNOWN
         and not set(study.fitted) <= set(answer.effects)
     ]
@@ -136,8 +135,11 @@ def assemble(
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity),
         blind_spots=blind_spots(data),
         seconds=seconds,
-        provenance={"versions": {name: version(name) for name in _PACKAGES}},
-        inclusion=inclusion(weighed, study.read_off),
+        provenance={
+            "versions": {name: version(name) for name in _PACKAGES},
+            "settings": settings.differences(),
+        },
+        inclusion=inclusion(weighed, study.read_off, settings.gap),
         waterfall=steps,
         rest=left,
         model=patched,
@@ -146,12 +148,14 @@ def assemble(
             nowhere=said if isinstance(said, Nowhere) else None,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
             nearly=nearly(study),
-            immaterial=immaterial(before, after) if study.named else {},
+            immaterial=immaterial(before, after, settings.words) if study.named else {},
             choices=spring_choices(study),
             noise=noise.reason,
             cautions=(
                 *left_out,
-                *cautions(study.campaign, noise, gap.runs, shown.confirmation, named=study.named),
+                *cautions(
+                    study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
+                ),
                 *((Fact("cut"),) if study.cut else ()),
                 *(
                     Fact("unresolved", {"effects": names})

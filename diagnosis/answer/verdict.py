@@ -15,27 +15,24 @@ from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.policy import (
-    AS_MUCH,
-    CHANCE_STDS,
-    FALSE_ALARM_RATE,
-    FEW_RUNS,
-    GREATER_PART,
-    MATERIAL_SHARE,
-    MOST,
-    NOISE_CONTRADICTED,
-)
 from diagnosis.result import Confirmation, Hidden, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
 from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings, WordsSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 
 Estimates = Mapping[str, ParameterEstimate]
 
 
 def cautions(
-    campaign: Campaign, noise: Noise, runs: Sequence[RunGap], confirmation: Confirmation, *, named: bool
+    campaign: Campaign,
+    noise: Noise,
+    runs: Sequence[RunGap],
+    confirmation: Confirmation,
+    *,
+    named: bool,
+    settings: Settings,
 ) -> tuple[Fact, ...]:
     """The caveats of an answer.
 
@@ -44,24 +41,25 @@ def cautions(
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
     """
-    found = []
+    found, chosen = [], settings.words
     if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
         found.append(Fact("one spring assumed"))
     std = noise.estimated**0.5
     ratio = std / noise.stated_variance**0.5 if noise.stated_variance else 1.0
     if noise.source == "floor":
         found.append(Fact("floor", {"records_rad": std, "fits_rad": noise.used**0.5}))
-    elif ratio <= 1.0 / NOISE_CONTRADICTED:
+    elif ratio <= 1.0 / chosen.noise_contradicted:
         found.append(Fact("less noise than stated", {"ratio": ratio}))
-    elif ratio >= NOISE_CONTRADICTED:
+    elif ratio >= chosen.noise_contradicted:
         found.append(Fact("more noise than stated", {"ratio": ratio}))
     if confirmation.failure:
         found.append(Fact("not followed", {"failure": confirmation.failure}))
     elif not confirmation.agrees:
         figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
-        found.append(Fact("not confirmed", figures | {"run": confirmation.run}))
+        beside = {"run": confirmation.run, "tolerance": settings.answer.integrator_tolerance}
+        found.append(Fact("not confirmed", figures | beside))
     windy = any(run.wind_on for run in campaign.runs)
-    if len(campaign.runs) < FEW_RUNS:
+    if len(campaign.runs) < chosen.few_runs:
         kind = {"driven": campaign.driven, "windy": windy}
         found.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]
@@ -74,30 +72,32 @@ def cautions(
 
 def nearly(study: Study) -> Nearly | None:
     """The effects that explain most of a gap without being named; None where none do."""
-    sets = [answer for answer in study.weighed if answer.effects != UNKNOWN]
+    sets, chosen = [answer for answer in study.weighed if answer.effects != UNKNOWN], study.settings.words
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
-    if study.causes != UNKNOWN or first is None or first.share > 1.0 - MOST:
+    if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
         return None
     found = Nearly(first.effects, 1.0 - first.share, first.probability)
     if study.test.noisy and first.probability == 0.0:
         return replace(found, noisy=True)
-    alike = [a for a in sets if a is not first and a.share <= first.share + AS_MUCH]
+    alike = [a for a in sets if a is not first and a.share <= first.share + chosen.nearly_alike]
     rival = max(alike, key=lambda answer: answer.probability, default=None)
-    if rival is not None and rival.probability >= GREATER_PART * first.probability:
+    if rival is not None and rival.probability >= chosen.nearly_rival * first.probability:
         return replace(found, rival=rival.effects, rival_probability=rival.probability)
     fitted = study.hypothesis(first.effects)
     if fitted is None:
         return found
-    chance = CHANCE_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
+    chance = chosen.nearly_misfit_stds * np.sqrt(2.0 * misfit(study.nominal).count)
     left = [name for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c]
     return replace(found, misfit=tuple(left))
 
 
-def immaterial(before: Estimates, after: Estimates) -> dict[str, float]:
+def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> dict[str, float]:
     """By coefficient, the share by which the causes change it; empty where they change one materially."""
     known = {name: given for name, given in after.items() if given.std and given.value and name in before}
     moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
-    limits = {name: min(MATERIAL_SHARE * abs(given.value), given.std or 0.0) for name, given in known.items()}
+    limits = {
+        name: min(chosen.immaterial * abs(given.value), given.std or 0.0) for name, given in known.items()
+    }
     if any(moves[name] > limit for name, limit in limits.items()):
         return {}
     return {name: moves[name] / abs(given.value) for name, given in known.items()}
@@ -151,7 +151,8 @@ def blind_spots(data: Data) -> tuple[str, ...]:
 def springs_off(study: Study) -> SpringsOff | None:
     """The likeliest pair of springs that are off; None where none closes most of the gap."""
     best = min(study.outside, key=lambda pair: pair.fit.total, default=None)
-    if best is None or best.fit.excess > (1.0 - MOST) * study.nominal.excess:
+    least = study.settings.words.two_springs_explain
+    if best is None or best.fit.excess > (1.0 - least) * study.nominal.excess:
         return None
     both = (ONE_SPRING.name, AnotherSpring.name)
     springs = tuple(_spring_error(study, best.fit, name) for name in both)
@@ -187,7 +188,7 @@ def remainder(
         excess: left on readings held out of the fit, in noise variances of a sample.
         hidden: the effects that could hide beside the answer.
     """
-    random = study.random_answer(study.fitted)
+    random, chosen = study.random_answer(study.fitted), study.settings.answer
     if random is not None:  # in its wind it leaves innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if not run.wind_on]
@@ -200,14 +201,15 @@ def remainder(
         p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
     further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
     by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
-    shown = further is not None and by_effect < FALSE_ALARM_RATE <= p_value
+    shown = further is not None and by_effect < chosen.remains_rate <= p_value
     p_value = min(p_value, by_effect)
-    beyond_chance = p_value < FALSE_ALARM_RATE
+    beyond_chance = p_value < chosen.remains_rate
     moves = {}
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None
-        # by its standard deviation, or by 1 %, where the runs determine it
-        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
+        # by its standard deviation, or by a share, where the runs determine it
+        least = chosen.material_share
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
         moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
     return Remainder(
         significant=beyond_chance,

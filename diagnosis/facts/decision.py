@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.policy import CREDIBLE, DECIDED_FROM, PREDICTED_FROM
+from diagnosis.settings import AnswerSettings
 from tunnel_sim.effects import known_effects
 
 
@@ -15,12 +15,11 @@ class Decision:
     """What the probabilities of the answers allow to be said.
 
     Args:
-        decided: whether the answer has at least one half of the probability, and predicts the readings held out of
-            the fit.
-        credible: the fewest answers that together have nine tenths, with their probabilities, most probable first.
-        effects: effects that nine tenths of the probability have among the causes, with their probabilities.
-        channels: channels on which nine tenths of the probability act, likewise.
-        unpredictive: the answer, where it has one half of the probability and does not predict them; else empty.
+        decided: whether the answer is probable enough, and predicts the readings held out of the fit.
+        credible: the fewest answers that together are credible, with their probabilities, most probable first.
+        effects: effects that the likely answers have in common, with their probabilities.
+        channels: channels on which the likely answers act in common, with their probabilities.
+        unpredictive: the answer, where it is probable enough and does not predict them; else empty.
     """
 
     decided: bool
@@ -39,7 +38,9 @@ class Decision:
         }
 
 
-def decision(answers: Sequence[tuple[str, float]], closed: float | None = None) -> Decision:
+def decision(
+    answers: Sequence[tuple[str, float]], chosen: AnswerSettings, closed: float | None = None
+) -> Decision:
     """Judge the answers by their probabilities, and the first of them by what it predicts.
 
     Args:
@@ -51,27 +52,29 @@ def decision(answers: Sequence[tuple[str, float]], closed: float | None = None) 
     for answer in sorted(answers, key=lambda given: -given[1]):
         credible.append(answer)
         together += answer[1]
-        if together >= CREDIBLE:
+        if together >= chosen.credible:
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
-    first, probable = answers[0][0], answers[0][1] >= DECIDED_FROM
+    first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
     names_effects = first not in ("none", "unknown")
-    predicts = not names_effects or closed is None or closed >= PREDICTED_FROM
+    predicts = not names_effects or closed is None or closed >= chosen.predicted_from
     return Decision(
         decided=probable and predicts,
         unpredictive=first if probable and not predicts else "",
         credible=tuple(credible),
-        effects=_common(causes),
-        channels=_common([({channel_of[name] for name in names}, value) for names, value in causes]),
+        effects=_common(causes, chosen.in_common),
+        channels=_common(
+            [({channel_of[name] for name in names}, value) for names, value in causes], chosen.in_common
+        ),
     )
 
 
-def _common(held: Iterable[tuple[set[str], float]]) -> dict[str, float]:
-    """What answers of nine tenths of the probability hold, with that probability, the most probable first."""
+def _common(held: Iterable[tuple[set[str], float]], least: float) -> dict[str, float]:
+    """What answers of ``least`` of the probability hold, with that probability, the most probable first."""
     found: dict[str, float] = {}
     for names, value in held:
         for name in sorted(names):
             found[name] = min(found.get(name, 0.0) + value, 1.0)
     ranked = sorted(found.items(), key=lambda item: -item[1])
-    return {name: value for name, value in ranked if value >= CREDIBLE}
+    return {name: value for name, value in ranked if value >= least}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from diagnosis.policy import GREATER_PART
+from diagnosis.settings import RemainderSettings
 from tunnel_sim.files.writing import as_json
 
 KINDS = (
@@ -71,10 +71,9 @@ class Ceiling:
     std: float
     held_out: str
 
-    @property
-    def determined(self) -> bool:
-        """Whether the share is known to half of what is left; of a small excess, laws may close more than all."""
-        return self.std < GREATER_PART and self.closed < 1.0 + GREATER_PART
+    def determined(self, chosen: RemainderSettings) -> bool:
+        """Whether the share is known well enough; of a small excess, laws may close more than all."""
+        return self.std < chosen.known_to and self.closed < chosen.closes_at_most
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.run_data import Data, RunData, Samples
-from diagnosis.policy import GROWN_ON
+from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
@@ -26,8 +26,6 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 BLOCK_INTERVAL = 4e-3
 _END = 50  # a run ends where its last fiftieth stands
 _STILL = 0.02  # of the largest swing, within which a body counts as at rest
-_QUIET = 5.0  # noise standard deviations of a block mean, within which it does too
-_LONG_REST = 0.1  # of a run: a rest that is cut off
 
 
 def prepare(
@@ -35,6 +33,7 @@ def prepare(
     noise_variance: dict[str, float],
     similarity: Similarity = AS_MEASURED,
     interval: float = BLOCK_INTERVAL,
+    settings: Settings = Settings(),
 ) -> Data:
     """Average a campaign's records in blocks.
 
@@ -42,6 +41,7 @@ def prepare(
         noise_variance: of one sample, rad², by run id.
         similarity: how the campaign was made from the measured one.
         interval: between the blocks, s; the nearest number of samples, at least one.
+        settings: of the diagnosis.
 
     Returns:
         The prepared data. Where any run states no stiffness, all are taken in normalised form; where a wind-on run
@@ -87,6 +87,7 @@ def prepare(
         own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held and not campaign.unrestrained,
         similarity=similarity,
         law=campaign.law,
+        settings=settings,
     )
 
 
@@ -147,8 +148,10 @@ def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
         The data with such runs cut after their last reading that differs from their end by more than the noise, and
         the ids of these runs.
     """
-    ends = [_moves_until(run, _QUIET * float(np.sqrt(run.noise_variance))) for run in data.runs]
-    rests = [end < (1.0 - _LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    chosen = data.settings.selection
+    ends = [_moves_until(run, chosen.rest_stds * float(np.sqrt(run.noise_variance))) for run in data.runs]
+    least = 1.0 - chosen.long_rest
+    rests = [end < least * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
     each = list(zip(data.runs, ends, rests, strict=True))
     runs = tuple(run.part(last=end) if rest else run for run, end, rest in each)
     return data.with_runs(runs), tuple(run.id for run, _, rest in each if rest)
@@ -227,9 +230,9 @@ def spread_out(short: Stretches, data: Data) -> Stretches:
 
     Returns:
         Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least
-        with which the runs divided by it have no more than `GROWN_ON` blocks.
+        with which the runs divided by it have no more blocks than sets are grown on.
     """
-    each = ceil(sum(run.reading.size for run in data.runs) / GROWN_ON)
+    each = ceil(sum(run.reading.size for run in data.runs) / data.settings.search.grown_on)
     long = in_stretches(data, long_stretch(short))
     kept: set[tuple[int, int]] = set()
     for run in range(len(data.runs)):

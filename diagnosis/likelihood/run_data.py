@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.whitening import WHITE, colour, colouring, response, whiten
+from diagnosis.settings import Settings
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
@@ -338,6 +339,7 @@ class Data:
         law: of the joint in a model of one's own; None: spring and damper.
         keeps_gain: whether the runs are part of a campaign with an input of unknown gain, though none of these
             may have one: the model then keeps the gain.
+        settings: of the diagnosis.
     """
 
     runs: tuple[RunData, ...]
@@ -351,6 +353,7 @@ class Data:
     similarity: Similarity = AS_MEASURED
     law: JointLaw | None = None
     keeps_gain: bool = False
+    settings: Settings = field(default_factory=Settings)
 
     @cached_property
     def unrestrained(self) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnosis import policy
 from diagnosis.facts.found import Nowhere, PlaceFound
 from diagnosis.result import Where
+from diagnosis.settings import Settings
 from diagnosis.where.excess import bands_beyond_chance
 from diagnosis.where.place import Place
 from diagnosis.where.survey import Survey
@@ -23,26 +23,26 @@ def nowhere(found: Survey, *, within_step: bool) -> Nowhere:
     return Nowhere(count, min(1.0, count * min(run.p_value for run in found.maps.runs)), within_step)
 
 
-def described(where: Where, place: Place, compared: Sequence[type[Effect]]) -> PlaceFound:
+def described(where: Where, place: Place, compared: Sequence[type[Effect]], settings: Settings) -> PlaceFound:
     """What is said of a place.
 
     Args:
         compared: causes that have to agree with it.
     """
-    maps = place.survey.maps
+    maps, chosen = place.survey.maps, settings.words
     length, greatest = float(maps.time.edges[-1]), float(maps.amplitude.edges[-1])
-    wide = {"time_s": policy.MOST * length, "amplitude_rad": policy.MOST * greatest}
+    wide = {"time_s": chosen.interval_located * length, "amplitude_rad": chosen.interval_located * greatest}
     intervals = {
         "time_s": where.time_s, "amplitude_rad": where.amplitude_rad, "frequency_hz": where.frequency_hz,
     }  # fmt: skip
-    beyond = bands_beyond_chance(maps.bands)
+    beyond = bands_beyond_chance(maps.bands, settings.where)
     whole = sum(max(band.excess, 0.0) for band in maps.bands)
-    shown = [b for b in maps.bands if b.band in beyond and b.excess > policy.WORTH_NAMING * whole]
+    shown = [b for b in maps.bands if b.band in beyond and b.excess > chosen.band_listed * whole]
     shown.sort(key=lambda band: -band.excess)
     return PlaceFound(
         runs=len(maps.runs),
         share=sum(run.share for run in maps.runs if run.id in where.runs),
-        false_alarm_rate=policy.LOCAL_FALSE_ALARM_RATE,
+        false_alarm_rate=settings.where.run_rate,
         wind={group.label: group.excess for group in maps.groups if group.by == "wind"},
         narrow=tuple(
             name

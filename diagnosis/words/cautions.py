@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from diagnosis.words.names import Document, plain
+from diagnosis.words.numbers import part
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 
@@ -20,6 +21,15 @@ _NOISE = "The records' noise is {ratio:.3g} times what noise_std and resolution 
 _LEFT_OUT = (
     "Left out, since they state {} spring_stiffness and the others {}: {{runs}}. State it for all runs, or "
 )
+
+
+def _not_confirmed(given: Figures) -> str:
+    return (
+        f"The fits' own integrator differs from the MuJoCo model by {given['rms_rad']:.1e} rad (root mean square "
+        f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:.1e} "
+        "rad). The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, and may "
+        "be wrong by as much."
+    )
 
 
 def _few_runs(given: Figures) -> str:
@@ -78,9 +88,7 @@ CAUTIONS: Mapping[str, Sentence] = {
     "is as noisy as that, correct noise_std or leave it out.",
     "not followed": "The MuJoCo model could not follow the fitted motion ({failure}), so all figures come from the "
     "fits' own integrator. Do not rely on the fitted parameters.",
-    "not confirmed": "The fits' own integrator differs from the MuJoCo model by {rms_rad:.1e} rad (root mean "
-    "square over {run}), more than a tenth of the noise ({tolerance_rad:.1e} rad). The gap before and after comes "
-    "from MuJoCo. The parameters and probabilities come from the fits, and may be wrong by as much.",
+    "not confirmed": _not_confirmed,
     "few runs": _few_runs,
     "none held out": _none_held_out,
     "some not held out": "Not held out of the fit, since no other run has the same spring or wind: {runs}. Their "

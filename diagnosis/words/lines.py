@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from diagnosis.settings import settings_of
 from diagnosis.words.names import Document, plain
 from diagnosis.words.next_steps import rival_lines
 from diagnosis.words.numbers import (
@@ -23,9 +24,6 @@ from diagnosis.words.tables import (
 )
 from identification.printing import COEFFICIENTS, TextTable, significant, unit_mark
 from identification.status import Remark
-
-LISTED = 0.01
-"""Answers and effects less probable than this are counted, or left out, where they are listed."""
 
 
 def diagnosis_parts(document: Document) -> list[str | TextTable]:
@@ -76,7 +74,8 @@ def where_line(document: Document) -> str:
 
 def listed_answers(document: Document) -> int:
     """Number of the answers that are listed: the probable ones, at least three."""
-    probable = [c for c in document["candidates"] if c["probability"] >= LISTED]
+    least = settings_of(document).words.answer_drawn
+    probable = [c for c in document["candidates"] if c["probability"] >= least]
     return max(3, len(probable))
 
 
@@ -97,9 +96,10 @@ def other_answers(document: Document) -> str:
 
 
 def inclusion_line(document: Document) -> str:
-    """The effects that may be among the causes, most probable first; empty where none reaches `LISTED`."""
+    """The effects that may be among the causes, most probable first; empty where none is probable enough."""
+    least = settings_of(document).words.effect_listed
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
-    shown = [f"{name} {probability(value)}" for name, value in found if value >= LISTED]
+    shown = [f"{name} {probability(value)}" for name, value in found if value >= least]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 

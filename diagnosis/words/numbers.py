@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 from diagnosis.facts.closure import Misfit
 from diagnosis.words.names import Document
 from identification.printing import significant, unit_mark
+
+_ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+_CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
 def probability(value: float) -> str:
@@ -16,6 +20,17 @@ def probability(value: float) -> str:
     if value >= 0.995:
         return "> 0.99"
     return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+
+
+def part(share: float) -> str:
+    """A share above 0 and below 1 as a simple fraction in words, such as ``four fifths``; others in per cent."""
+    simple = Fraction(share).limit_denominator(10)
+    if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
+        return f"{100.0 * share:.3g} %"
+    ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
+    return (
+        f"a {ordinal}".replace("a eighth", "an eighth") if count == 1 else f"{_CARDINALS[count]} {ordinal}s"
+    )
 
 
 def share(value: float) -> str:

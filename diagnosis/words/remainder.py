@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from diagnosis.facts.remainder import Ceiling
+from diagnosis.settings import settings_of
 from diagnosis.words.names import KINDS, Document, plain
 from diagnosis.words.numbers import change_up_to, noise_powers, percent
 from identification.printing import COEFFICIENTS, unit_mark, with_std
 from tunnel_sim.effects import known_effects
-
-_BESIDE = 2.0  # standard deviations
 
 
 def rest_words(document: Document) -> str:
@@ -56,11 +55,12 @@ def closable_words(document: Document) -> str:
     named = document["causes"] != ["unknown"] and document["decided"]
     left = "what the causes leave" if named else "the gap"
     ceilings = [ceiling(one) for one in found["ceilings"]]
-    determined = [one for one in ceilings if one.determined]
     if found["kind"] == "noise":
-        most = max(determined, key=lambda one: one.closed)
+        chosen = settings_of(document).remainder
+        most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
+        bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
         return (
-            f"No more than {percent(max(most.closed, 0.0) + _BESIDE * most.std)} of {left} could be closed by any "
+            f"No more than {bound} of {left} could be closed by any "
             "smooth moment or error of the reading: the rest is noise."
         )
     return " ".join([*_largest(found, ceilings, left), *_line(found["line"])])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from diagnosis.settings import settings_of
 from diagnosis.words.names import KINDS, Document, plain
 from diagnosis.words.numbers import misfit_text, percent, probability, share
 from diagnosis.words.remainder import ceiling
 from identification.printing import TextTable, coefficient_label, estimated, significant, unit_mark
 
-_SHOWN_ANSWERS = 6
-_SHOWN_PROBABILITY = 0.005
-"""More answers, and less probable ones, are counted in the table."""
-
 
 def candidates_table(document: Document) -> TextTable:
     """The answers considered and the shares that they close, most probable first; a last row counts the others."""
-    rows, given = [], document["candidates"]
-    shown = [c for c in given[:_SHOWN_ANSWERS] if c["probability"] >= _SHOWN_PROBABILITY] or given[:1]
+    rows, given, chosen = [], document["candidates"], settings_of(document).words
+    probable = [c for c in given[: chosen.answers_listed] if c["probability"] >= chosen.answer_listed]
+    shown = probable or given[:1]
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
         closed = share(candidate["closed"]) if fitted else "–"
@@ -71,11 +69,11 @@ def waterfall_table(document: Document) -> TextTable:
 
 def closable_table(document: Document) -> TextTable:
     """Share that each kind could close, in per cent; a table without rows where nothing remains beyond chance."""
-    found = document.get("closable") or {"ceilings": ()}
+    found, chosen = document.get("closable") or {"ceilings": ()}, settings_of(document).remainder
     rows = [
         (
             KINDS[one.kind],
-            percent(max(one.closed, 0.0), one.std) if one.determined else "not determined",
+            percent(max(one.closed, 0.0), one.std) if one.determined(chosen) else "not determined",
             one.held_out,
         )
         for one in map(ceiling, found["ceilings"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagnosis.settings import settings_of
 from diagnosis.words.names import CHANNELS, MISFITS, Document, plain
 from diagnosis.words.numbers import (
     misfit_of,
@@ -18,7 +19,6 @@ from diagnosis.words.numbers import (
 from identification.printing import COEFFICIENTS, with_std
 from tunnel_sim.effects import effect_class, known_effects
 
-_SHOWN = 5  # answers in words; the document lists all
 _UNKNOWN = ["unknown"]
 
 
@@ -98,6 +98,7 @@ def _answer(document: Document, rest: str) -> str:
 def undecided_words(document: Document) -> str:
     """What an undecided diagnosis does say, in sentences."""
     common, credible = document["common"], document["credible"]
+    most_named = settings_of(document).words.answers_named
     channels = {kind.name: kind.channel for kind in known_effects()}
     named = {channels[name] for name in common["effects"]}
     parts = [f"contain {plain(name)} ({probability(value)})" for name, value in common["effects"].items()]
@@ -106,12 +107,12 @@ def undecided_words(document: Document) -> str:
             parts.append(f"act on the {name} ({probability(value)})")
     said = f"The likely answers {' and '.join(parts or ['have no effect and no channel in common'])}."
     answers = []
-    for one in credible[:_SHOWN]:
+    for one in credible[:most_named]:
         effect = one["effect"]
         words = "no effect of the vocabulary" if effect == "unknown" else plain(*effect.split(" + "))
         answers.append(f"{words} ({probability(one['probability'])})")
-    if len(credible) > _SHOWN:
-        answers.append(f"{len(credible) - _SHOWN} more")
+    if len(credible) > most_named:
+        answers.append(f"{len(credible) - most_named} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
     together = probability(sum(one["probability"] for one in credible))
     if document["unpredictive"]:

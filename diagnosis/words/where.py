@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from math import degrees
 from typing import Any
 
+from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.names import BANDS, CONDITIONS, PLACES, Document, plain
+from diagnosis.words.numbers import part
 from identification.printing import p_text
 from tunnel_sim.effects import effect_class
 
-_LISTED = 12  # ids listed in a sentence at most
-_NEARLY_NOTHING = 0.02  # of the power of the other runs
 _WIND = "whether it needs wind cannot be determined"
 
 
@@ -62,9 +62,11 @@ def where_words(document: Document) -> str:
     if not found["place"]:
         return ""
     where, place = document["where"], found["place"]
-    parts = [f"{_which_runs(where, place)}."]
+    settings = settings_of(document)
+    parts = [f"{_which_runs(where, place, settings.words)}."]
     if places := _places(where, place):
-        parts.append(f"Four fifths of it lie {', '.join(places)}.")
+        most = part(settings.where.interval).capitalize()
+        parts.append(f"{most} of it lie {', '.join(places)}.")
     if place["bands"]:
         listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in place["bands"].items())
         parts.append(f"By frequency: {', '.join(listed)}.")
@@ -90,11 +92,11 @@ def _nowhere(found: Mapping[str, Any]) -> str:
     return f"{runs} consistent with the noise ({chance})."
 
 
-def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
+def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: WordsSettings) -> str:
     """Which runs show the gap, and how much more of it is with the wind on or off."""
     runs, count = where["runs"], place["runs"]
     share = f"{100.0 * place['share']:.0f} % of the gap"
-    named = f" ({', '.join(runs)})" if len(runs) <= _LISTED else ""
+    named = f" ({', '.join(runs)})" if len(runs) <= chosen.runs_listed else ""
     if not runs:
         text = (
             f"No single run is beyond chance (false-alarm rate {100.0 * place['false_alarm_rate']:.0f} % over all "
@@ -109,7 +111,7 @@ def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
     wind = place["wind"]
     if runs and len(wind) == 2:
         more, less = sorted(("on", "off"), key=lambda state: -wind[state])
-        if wind[less] < _NEARLY_NOTHING * wind[more]:
+        if wind[less] < chosen.one_wind * wind[more]:
             text += f"; nearly all of it with the wind {more}"
         else:
             ratio = wind[more] / wind[less]

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from diagnosis import result
-from diagnosis.facts.closure import ON_RUNS
 from diagnosis.blind.cases import case
 from diagnosis.blind.score import Score, calibration
+from diagnosis.facts.closure import ON_RUNS
 from identification.statistics import Proportion
 from tunnel_lab.report import blind
 

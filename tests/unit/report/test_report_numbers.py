@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from diagnosis.facts.decision import decision
+from diagnosis.settings import Settings
 from diagnosis.words.causes import size_words
 from diagnosis.words.lines import other_answers
-from diagnosis.words.next_steps import next_steps
+from diagnosis.words.next_steps import next_steps, run_words
 from diagnosis.words.numbers import noise_powers, probability
 from diagnosis.words.tables import candidates_table
-from diagnosis.words.verdict import headline
-from diagnosis.facts.decision import decision
-from diagnosis.words.next_steps import run_words
-from diagnosis.words.verdict import undecided_words
+from diagnosis.words.verdict import headline, undecided_words
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import page as report_page
@@ -121,9 +120,9 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
 ) -> None:
     given = copy.deepcopy(given)
     given["candidates"][0]["probability"] = value
-    assert undecided_words(decision([("quadratic_damping", value)]).to_json_dict()).endswith(
-        f": quadratic damping ({text})."
-    )
+    assert undecided_words(
+        decision([("quadratic_damping", value)], Settings().answer).to_json_dict()
+    ).endswith(f": quadratic damping ({text}).")
     assert view.facts(given)[-1].value == text
     assert view.candidate_rows(given)[0]["probability"] == text
     assert candidates_table(given).rows[0][1] == text
