@@ -27,8 +27,8 @@ def _not_confirmed(given: Figures) -> str:
     return (
         f"The fits' own integrator differs from the MuJoCo model by {given['rms_rad']:.1e} rad (root mean square "
         f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:.1e} "
-        "rad). The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, and may "
-        "be wrong by as much."
+        "rad). The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, "
+        "and may be wrong by as much."
     )
 
 

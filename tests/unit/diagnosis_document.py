@@ -87,7 +87,8 @@ def document() -> dict[str, Any]:
             "p_value": 1.9e-5,
             "material": False,
             "moves": {
-                "cn_beta": {"value": 0.00043, "relative": 0.000898, "std": 0.0013, "unit": "1/rad", "material": False},
+                "cn_beta": {"value": 0.00043, "relative": 0.000898, "std": 0.0013, "unit": "1/rad",
+                            "material": False},
                 "cn_r": {"value": 0.00053, "relative": 0.00206, "std": 0.0118, "unit": "1/rad", "material": False},
             },
             "words": "",

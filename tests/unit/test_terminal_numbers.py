@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from rich.table import Table
 
+from diagnosis.words import tables
 from diagnosis.words.lines import closing_lines, inclusion_line
 from diagnosis.words.next_steps import rival_lines, run_words
 from diagnosis.words.numbers import probability, share
 from diagnosis.words.tables import (
     candidates_table,
-    coefficients_table,
     gap_table,
     parameters_table,
     waterfall_table,
@@ -117,7 +117,7 @@ def both(excess: float) -> list[float]:
 
 def test_coefficients_that_are_not_determined(given: Document) -> None:
     given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
-    cells = rows(coefficients_table(given))[1]
+    cells = rows(tables.coefficients_table(given))[1]
     assert cells[2:] == ["not determined by these runs", "–"]
 
 
@@ -160,15 +160,15 @@ def test_a_gap_without_a_name_has_nothing_after(given: Document) -> None:
 
 def test_coefficients(given: Document) -> None:
     before, after = given["coefficients"]["before"], given["coefficients"]["after"]
-    for cells, name in zip(rows(coefficients_table(given)), before, strict=True):
+    for cells, name in zip(rows(tables.coefficients_table(given)), before, strict=True):
         old, new = before[name], after[name]
         assert_shows(cells[1], [old["value"], old["std"]])
         assert_shows(cells[2], [new["value"], new["std"]])
         assert_shows(cells[3].replace("+", ""), [100 * (new["value"] - old["value"]) / abs(old["value"])])
     before["cn_r"]["value"] = 0.0
-    assert rows(coefficients_table(given))[1][3] == "+0 %"
+    assert rows(tables.coefficients_table(given))[1][3] == "+0 %"
     del after["cn_beta"]
-    assert len(rows(coefficients_table(given))) == 1
+    assert len(rows(tables.coefficients_table(given))) == 1
 
 
 def test_the_run_to_make(given: Document) -> None:

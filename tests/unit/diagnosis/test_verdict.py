@@ -215,7 +215,6 @@ def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
     assert found.decided is decided
     said_so = "Free play fits best, but does not predict readings held out of the fit." in undecided_words(
         found.to_json_dict()
-    ).words
     )
     assert said_so is not decided
     assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, 0.0).decided
@@ -259,7 +258,10 @@ NEARLY = {
         ({}, " (probability 0.30): too little to name it."),
         ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (0.20)."),
         ({"noisy": True}, " of it, but the noise misbehaves and may be all of a gap as small as this."),
-        ({"misfit": ["zero", "harmonics"]}, ", but leaves a significant misfit of the zero and the harmonics."),
+        (
+            {"misfit": ["zero", "harmonics"]},
+            ", but leaves a significant misfit of the zero and the harmonics.",
+        ),
     ],
 )
 def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(changes, words):
@@ -287,7 +289,9 @@ def test_a_second_mode_is_said_before_the_gap():
     second = {"amplitude_rad": 0.02, "frequency_hz": 2.9, "decay_per_s": 0.2}
     mode = {"run": "swing", "main": main, "second": second, "closes": 0.98}
     text = said("unknown", second_modes=[mode])
-    assert text.startswith("swing contains a second mode: 0.02 rad at 2.9 Hz, which decays at 0.2 1/s, beside 0.3")
+    assert text.startswith(
+        "swing contains a second mode: 0.02 rad at 2.9 Hz, which decays at 0.2 1/s, beside 0.3"
+    )
     assert "falls by 98 %" in text
 
 

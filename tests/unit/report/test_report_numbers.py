@@ -180,7 +180,7 @@ def test_the_causes_have_their_sizes(given: Document, page: Sections) -> None:
     text = page.texts["found"]
     assert all(words in text for words in (value, cause["does"], cause["closes"]))
     moved = size_words(given, size | {"zero_change": -0.00285, "stands_rad": 0.0})
-    assert "the middle moves by −0.16°" in moved
+    assert "the middle moves by -0.16°" in moved
     assert "rest" not in moved
     small = size | {"damping_ratio": size["damping_ratio_without"], "frequency_change": 1e-6}
     assert "damping" not in size_words(given, small)
