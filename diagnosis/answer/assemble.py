@@ -17,6 +17,7 @@ from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.answer.verdict import blind_spots, cautions, immaterial, nearly, remainder, spring_choices
+from diagnosis.facts.closure import PATCHED
 from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
@@ -89,7 +90,7 @@ def assemble(
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
     gap = held_out_totals(gap, steps)
     if patched is not None and study.named:
-        on = f"{patched.closure.on}, simulated with the patched model"
+        on = f"{patched.closure.on}, {PATCHED}"
         gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds["waterfall"] = time.perf_counter() - begun
     begun = time.perf_counter()
