@@ -208,9 +208,9 @@ def _worth_fitting(
     scale = misfit_scale(misfit(parent.fit))
     scored.sort(key=lambda item: min(log_misfit(start.predicted, scale, OF_MOTION) for start in item[1]))
     if parent.effects:
-        needed, own = [], own_gain(parent.fit.problem, parent.fit.point)
+        needed, own = [], own_gain(parent.fit.problem)
         for kind, starts in scored[: policy.GROWN_BY]:
-            by_chance = own_gain(starts[0].problem, starts[0].point) - own
+            by_chance = own_gain(starts[0].problem) - own
             if starts[0].predicted_drop > policy.NEEDLESS_CHI2 + by_chance:
                 needed.append((kind, starts))
         return needed

@@ -40,7 +40,7 @@ def two_springs(answers: Iterable[Hypothesis], found: Sequence[Hypothesis], nomi
         Fitted hypotheses that lower χ² by more than needless effects would; none with fewer than three springs.
     """
     data = nominal.problem.data
-    if data.normalised or len(data.springs) < _LEAST_SPRINGS:
+    if len(data.springs) < _LEAST_SPRINGS:
         return []
     known = {hypothesis.names: hypothesis for hypothesis in found} | {(): Hypothesis((), nominal)}
     pairs: dict[tuple[str, ...], Hypothesis] = {}

@@ -97,7 +97,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     if len(shown) >= 3 and most.share > policy.MOST and most.id not in off:
         return Finding(None, f"{undetermined} from one run alone ({most.id})")
     # without coefficients and a gain that these runs lack
-    data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
+    data = nominal.problem.data.alone(off)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
