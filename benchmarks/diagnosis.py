@@ -28,6 +28,7 @@ from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem, campaign_rig
 from diagnosis.likelihood.starting_points import StartingPoint, nominal_start, starting_points
 from diagnosis.noise.sensor_noise import campaign_noise
+from diagnosis.settings import Settings
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
@@ -218,7 +219,7 @@ def against_sysid(console: Console, wanted: int) -> None:
     """A smaller campaign: a whole diagnosis, and every candidate fitted with sysid from the same starts."""
     data = make_campaign(CAUSES["dry friction"], springs=(16.12, 44.84), duration=4.0, rate=250.0)
     causes, whole, _, _ = measured(data)
-    prepared = prepare(data, campaign_noise(data).variance)
+    prepared = prepare(data, campaign_noise(data, Settings().noise).variance)
     begin = time.perf_counter()
     nominal = fit(Problem(prepared), nominal_start(prepared))
     own_total, other_total, candidates = time.perf_counter() - begin, 0.0, 0

@@ -18,12 +18,14 @@ if TYPE_CHECKING:
         RunGap,
         Where,
     )
+    from diagnosis.settings import Settings
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "._diagnose": "diagnose read_model vocabulary",
             ".result": "Candidate Coefficients Diagnosis GapSummary ParameterEstimate RunGap Where",
+            ".settings": "Settings",
         },
     )
 
@@ -34,6 +36,7 @@ __all__ = [
     "GapSummary",
     "ParameterEstimate",
     "RunGap",
+    "Settings",
     "Where",
     "diagnose",
     "read_model",

@@ -31,6 +31,7 @@ from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress
 from diagnosis.search.lead import investigate_with_lead
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import as_campaign
@@ -50,6 +51,7 @@ def diagnose(
     kinds: Sequence[type[Effect]] | None = None,
     progress: Progress | None = None,
     model: JointModel | None = None,
+    settings: Settings = Settings(),
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
@@ -58,6 +60,7 @@ def diagnose(
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
         model: a model of one's own, from `read_model`, which is then the nominal model.
+        settings: every number that decides.
 
     Returns:
         The answer, for the runs that one model can be fitted to; its cautions name the others.
@@ -74,9 +77,9 @@ def diagnose(
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
     with answering_with(kinds):
-        chosen = choose(campaign, kinds, own)
+        chosen = choose(campaign, kinds, settings.selection, own)
         try:  # noise, nominal fit, where, search
-            study = investigate_with_lead(chosen.campaign, chosen.kinds, progress, chosen.model)
+            study = investigate_with_lead(chosen.campaign, chosen.kinds, progress, chosen.model, settings)
         except TunnelError as error:
             if not chosen.limit_cycles:
                 raise
@@ -124,7 +127,7 @@ def diagnose(
         # below one half a set of effects comes first, though each of them may be less probable than none
         odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
         likeliest = max(odds, key=odds.__getitem__, default="")
-        modes = second_modes(chosen.campaign) if likeliest in UNKNOWN else ()
+        modes = second_modes(chosen.campaign, settings.words) if likeliest in UNKNOWN else ()
         springs = () if answer.decision.decided and likeliest not in UNKNOWN else spring_words(study)
         return replace(answer, verdict=" ".join((*modes, answer.verdict, *choice_words(study), *springs)))
 

@@ -21,6 +21,7 @@ from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -57,9 +58,9 @@ class ByHand:
         TunnelError: when the examination refuses the records, or the nominal model cannot be fitted.
     """
 
-    def __init__(self, campaign: Campaign) -> None:
-        comparable, _ = comparable_runs(diagnosable(campaign).campaign)
-        self._study = nominal_study(comparable, known_effects())
+    def __init__(self, campaign: Campaign, settings: Settings = Settings()) -> None:
+        comparable, _ = comparable_runs(diagnosable(campaign).campaign, settings.selection)
+        self._study = nominal_study(comparable, known_effects(), settings)
         self._base = excess_base(self._study)
         self._fits: dict[frozenset[str], Fit] = {frozenset(): self._study.nominal}
         self._whole = {frozenset[str](): self._study.nominal}

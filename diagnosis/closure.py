@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.policy import GREATER_PART
+from diagnosis.settings import RemainderSettings, settings_of
 from identification.printing import TextTable, significant, unit_mark
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.writing import as_json
@@ -182,10 +182,9 @@ class Ceiling:
     std: float
     held_out: str
 
-    @property
-    def determined(self) -> bool:
-        """Whether the share is known to half of what is left; of a small excess, laws may close more than all."""
-        return self.std < GREATER_PART and self.closed < 1.0 + GREATER_PART
+    def determined(self, chosen: RemainderSettings) -> bool:
+        """Whether the share is known well enough; of a small excess, laws may close more than all."""
+        return self.std < chosen.known_to and self.closed < chosen.closes_at_most
 
 
 @dataclass(frozen=True)
@@ -266,11 +265,11 @@ def closable_words(document: Mapping[str, Any]) -> str:
 
 def closable_table(document: Mapping[str, Any]) -> TextTable:
     """Share that each kind could close, in per cent; a table without rows where nothing remains beyond chance."""
-    found = document.get("closable") or {"ceilings": ()}
+    found, chosen = document.get("closable") or {"ceilings": ()}, settings_of(document).remainder
     rows = [
         (
             KINDS[one.kind],
-            percent(max(one.closed, 0.0), one.std) if one.determined else "not determined",
+            percent(max(one.closed, 0.0), one.std) if one.determined(chosen) else "not determined",
             one.held_out,
         )
         for one in (

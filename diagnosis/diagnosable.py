@@ -15,7 +15,7 @@ from diagnosis.likelihood.nondimensional import free_frequency, response_to_inpu
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
-from diagnosis.policy import CLEARLY_MORE, SAME_SPRING
+from diagnosis.settings import SelectionSettings
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
@@ -87,7 +87,12 @@ class Chosen:
     limit_cycles: bool
 
 
-def choose(campaign: Campaign, kinds: Sequence[type[Effect]], given: NominalModel | None = None) -> Chosen:
+def choose(
+    campaign: Campaign,
+    kinds: Sequence[type[Effect]],
+    settings: SelectionSettings,
+    given: NominalModel | None = None,
+) -> Chosen:
     """Choose the runs that are diagnosed together, their nominal model, and the effects to answer with.
 
     Args:
@@ -99,7 +104,7 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]], given: NominalMode
     found = diagnosable(campaign)
     if not found.limit_cycles:
         refuse_motionless(found.campaign, nominal_model(found.campaign, given))
-    compared, left_out = comparable_runs(found.campaign)
+    compared, left_out = comparable_runs(found.campaign, settings)
     model = nominal_model(compared, given)
     if compared.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
@@ -116,7 +121,7 @@ def choose(campaign: Campaign, kinds: Sequence[type[Effect]], given: NominalMode
     return Chosen(found.campaign, compared, model, known, found.remarks, left_out, found.limit_cycles)
 
 
-def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[str, ...]]:
     """Leave out the runs that cannot be fitted together with the others, and say in sentences which and why.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
@@ -135,7 +140,7 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
             f"separately."
         )
     if kept is bare:
-        same = _of_one_spring(bare, derivative)
+        same = _of_one_spring(bare, derivative, settings.same_spring)
         if len(same) < len(bare):
             other = [run for run in bare if run not in same]
             said.append(
@@ -153,12 +158,12 @@ def comparable_runs(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         for run in kept
         if run.wind_on
         and run.spring_stiffness in still
-        and free_frequency(run, derivative) > CLEARLY_MORE * median(still[run.spring_stiffness])
+        and free_frequency(run, derivative) > settings.other_mode * median(still[run.spring_stiffness])
     ]
     if elsewhere:
         said.append(
-            f"Left out, since they swing in another mode, {CLEARLY_MORE:g} times as fast as the same spring with "
-            f"the wind off or faster: {_ids(elsewhere)}. Diagnose these separately."
+            f"Left out, since they swing in another mode, {settings.other_mode:g} times as fast as the same spring "
+            f"with the wind off or faster: {_ids(elsewhere)}. Diagnose these separately."
         )
         kept = [run for run in kept if run not in elsewhere]
     order = {run.id for run in kept}
@@ -169,11 +174,11 @@ def _ids(runs: Sequence[Run]) -> str:
     return ", ".join(run.id for run in runs)
 
 
-def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
+def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[Run]:
     """The largest group of runs that may have one spring.
 
     The air reduces the stiffness of every spring by the same amount, so that the order of the frequencies is the
-    same at each speed.
+    same at each speed. Frequencies at one speed within a ``ratio`` are those of one spring.
     """
     by_speed: dict[float, list[tuple[float, Run]]] = defaultdict(list)
     for run in runs:
@@ -184,7 +189,7 @@ def _of_one_spring(runs: Sequence[Run], derivative: int) -> list[Run]:
         ranked = sorted(alike, key=lambda pair: pair[0])
         found = [[ranked[0][1]]]
         for (last, _), (now, run) in itertools.pairwise(ranked):
-            if now > SAME_SPRING * last:
+            if now > ratio * last:
                 found.append([])
             found[-1].append(run)
         groups.append(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from diagnosis.closure import (
@@ -16,7 +17,7 @@ from diagnosis.closure import (
     patch_table,
     rms_shown,
 )
-from diagnosis.policy import CREDIBLE, DECIDED_FROM, PREDICTED_FROM
+from diagnosis.settings import AnswerSettings, WordsSettings, settings_of
 from identification.printing import (
     COEFFICIENTS,
     TextTable,
@@ -28,11 +29,19 @@ from identification.printing import (
 from identification.status import Remark
 from tunnel_sim.effects import known_effects
 
-_SHOWN = 5  # answers in words; the document lists all
-_SHOWN_ANSWERS, _SHOWN_PROBABILITY = (
-    6,
-    0.005,
-)  # more answers, and less probable ones, are counted in the table
+_ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+_CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+def part(share: float) -> str:
+    """A share above 0 and below 1 as a simple fraction in words, such as ``four fifths``; others in per cent."""
+    simple = Fraction(share).limit_denominator(10)
+    if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
+        return f"{100.0 * share:.3g} %"
+    ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
+    return (
+        f"a {ordinal}".replace("a eighth", "an eighth") if count == 1 else f"{_CARDINALS[count]} {ordinal}s"
+    )
 
 
 def plain(*names: str) -> str:
@@ -53,12 +62,11 @@ class Decision:
     """What the probabilities of the answers allow to be said.
 
     Args:
-        decided: whether the answer has at least one half of the probability, and predicts the readings held out of
-            the fit.
-        credible: the fewest answers that together have nine tenths, with their probabilities, most probable first.
-        effects: effects that nine tenths of the probability have among the causes, with their probabilities.
-        channels: channels on which nine tenths of the probability act, likewise.
-        unpredictive: the answer, where it has one half of the probability and does not predict them; else empty.
+        decided: whether the answer is probable enough, and predicts the readings held out of the fit.
+        credible: the fewest answers that together are credible, with their probabilities, most probable first.
+        effects: effects that the likely answers have in common, with their probabilities.
+        channels: channels on which the likely answers act in common, with their probabilities.
+        unpredictive: the answer, where it is probable enough and does not predict them; else empty.
     """
 
     decided: bool
@@ -76,7 +84,9 @@ class Decision:
         }
 
 
-def decision(answers: Sequence[tuple[str, float]], closed: float | None = None) -> Decision:
+def decision(
+    answers: Sequence[tuple[str, float]], chosen: AnswerSettings, closed: float | None = None
+) -> Decision:
     """Judge the answers by their probabilities, and the first of them by what it predicts.
 
     Args:
@@ -88,33 +98,35 @@ def decision(answers: Sequence[tuple[str, float]], closed: float | None = None) 
     for answer in sorted(answers, key=lambda given: -given[1]):
         credible.append(answer)
         together += answer[1]
-        if together >= CREDIBLE:
+        if together >= chosen.credible:
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
-    first, probable = answers[0][0], answers[0][1] >= DECIDED_FROM
+    first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
     names_effects = first not in ("none", "unknown")
-    predicts = not names_effects or closed is None or closed >= PREDICTED_FROM
+    predicts = not names_effects or closed is None or closed >= chosen.predicted_from
     return Decision(
         decided=probable and predicts,
         unpredictive=first if probable and not predicts else "",
         credible=tuple(credible),
-        effects=_common(causes),
-        channels=_common([({channel_of[name] for name in names}, value) for names, value in causes]),
+        effects=_common(causes, chosen.in_common),
+        channels=_common(
+            [({channel_of[name] for name in names}, value) for names, value in causes], chosen.in_common
+        ),
     )
 
 
-def _common(held: Iterable[tuple[set[str], float]]) -> dict[str, float]:
-    """What answers of nine tenths of the probability hold, with that probability, the most probable first."""
+def _common(held: Iterable[tuple[set[str], float]], least: float) -> dict[str, float]:
+    """What answers of ``least`` of the probability hold, with that probability, the most probable first."""
     found: dict[str, float] = {}
     for names, value in held:
         for name in sorted(names):
             found[name] = min(found.get(name, 0.0) + value, 1.0)
     ranked = sorted(found.items(), key=lambda item: -item[1])
-    return {name: value for name, value in ranked if value >= CREDIBLE}
+    return {name: value for name, value in ranked if value >= least}
 
 
-def undecided_words(found: Decision) -> str:
+def undecided_words(found: Decision, chosen: WordsSettings) -> str:
     """What an undecided diagnosis does say, in sentences."""
     channels = {kind.name: kind.channel for kind in known_effects()}
     named = {channels[name] for name in found.effects}
@@ -124,11 +136,11 @@ def undecided_words(found: Decision) -> str:
             parts.append(f"act on the {name} ({probability(value)})")
     common = f"The likely answers {' and '.join(parts or ['have no effect and no channel in common'])}."
     answers = []
-    for effect, value in found.credible[:_SHOWN]:
+    for effect, value in found.credible[: chosen.answers_named]:
         words = "no effect of the vocabulary" if effect == "unknown" else plain(*effect.split(" + "))
         answers.append(f"{words} ({probability(value)})")
-    if len(found.credible) > _SHOWN:
-        answers.append(f"{len(found.credible) - _SHOWN} more")
+    if len(found.credible) > chosen.answers_named:
+        answers.append(f"{len(found.credible) - chosen.answers_named} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
     together = probability(sum(value for _, value in found.credible))
     if found.unpredictive:
@@ -182,8 +194,9 @@ def diagnosis_brief(document: Document) -> str:
 
 def candidates_table(document: Document) -> TextTable:
     """The answers considered and the shares that they close, most probable first; a last row counts the others."""
-    rows, given = [], document["candidates"]
-    shown = [c for c in given[:_SHOWN_ANSWERS] if c["probability"] >= _SHOWN_PROBABILITY] or given[:1]
+    rows, given, chosen = [], document["candidates"], settings_of(document).words
+    probable = [c for c in given[: chosen.answers_listed] if c["probability"] >= chosen.answer_listed]
+    shown = probable or given[:1]
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
         closed = share(candidate["closed"]) if fitted else "–"
@@ -238,14 +251,11 @@ def misfit_text(document: Document, excess: float) -> str:
     return times if misfit is None else f"{rms_shown(misfit, excess)} ({times})"
 
 
-#: Answers and effects less probable than this are counted, or left out, where they are listed.
-LISTED = 0.01
-
-
 def inclusion_line(document: Document) -> str:
-    """The effects that may be among the causes, most probable first; empty where none reaches `LISTED`."""
+    """The effects that may be among the causes, most probable first; empty where none is probable enough."""
+    least = settings_of(document).words.effect_listed
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
-    shown = [f"{name} {probability(value)}" for name, value in found if value >= LISTED]
+    shown = [f"{name} {probability(value)}" for name, value in found if value >= least]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 

@@ -12,6 +12,7 @@ import polars as pl
 
 from diagnosis.closure import Closable, Misfit, PatchedModel, Remainder, Waterfall
 from diagnosis.printing import Decision, decision, diagnosis_brief, diagnosis_parts
+from diagnosis.settings import settings_of
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text
 from identification.status import Remark
@@ -322,7 +323,8 @@ class Diagnosis:
     @property
     def decision(self) -> Decision:
         """Whether the answer is decided, and what the likely answers have in common."""
-        return decision([(c.effect, c.probability) for c in self.candidates], self.gap.closed)
+        chosen = settings_of({"provenance": self.provenance}).answer
+        return decision([(c.effect, c.probability) for c in self.candidates], chosen, self.gap.closed)
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""

@@ -13,6 +13,7 @@ from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.likelihood.run_data import Data
 from diagnosis.search.investigate import fit_nominal, investigate, nominal_study
+from diagnosis.settings import Settings
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -128,7 +129,7 @@ def _most_common(given: Sequence[Data]) -> Data | None:
 
 
 def _campaign(folder: Path) -> Campaign:
-    campaign, _ = comparable_runs(diagnosable(read_campaign(folder)).campaign)
+    campaign, _ = comparable_runs(diagnosable(read_campaign(folder)).campaign, Settings().selection)
     return campaign
 
 

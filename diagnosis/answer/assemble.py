@@ -24,7 +24,6 @@ from diagnosis.answer.verdict import (
     verdict,
 )
 from diagnosis.closure import PatchedModel
-from diagnosis.policy import MOST, WORTH_NAMING
 from diagnosis.printing import decision, plain
 from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
 from diagnosis.search.investigate import Study, located
@@ -42,7 +41,7 @@ def localise(study: Study) -> tuple[Where, Maps]:
 
     The place is that of the residuals alone. The causes only have to agree with it.
     """
-    place = located(study)
+    place, chosen = located(study), study.settings.where
     found = place.survey
     answer = None if study.chosen is study.nominal else study.chosen
     maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
@@ -56,12 +55,12 @@ def localise(study: Study) -> tuple[Where, Maps]:
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(found, MOST) or found.maps.time.interval(),
-        amplitude_rad=found.maps.amplitude.interval(),
+        time_s=blow_interval(found, chosen.interval, chosen) or found.maps.time.interval(chosen.interval),
+        amplitude_rad=found.maps.amplitude.interval(chosen.interval),
         frequency_hz=found.frequency_interval,
     )
-    bands = bands_beyond_chance(found.maps.bands)
-    words = describe(where, found, bands, place.channel, place.condition)
+    bands = bands_beyond_chance(found.maps.bands, chosen)
+    words = describe(where, found, bands, place.channel, place.condition, study.settings)
     agreed = agreement(where, [effect_class(name) for name in compared])
     return replace(where, words=f"{words} {agreed}".rstrip()), maps
 
@@ -101,7 +100,7 @@ def assemble(
         patched: the model given with the causes written into it; the share closed is then its own.
         kinds: the effects that may act unnamed beside those of an answer.
     """
-    base = excess_base(study)
+    base, settings = excess_base(study), study.settings
     chosen = study.chosen
     nominal_out = predict_held_out(study.nominal)
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
@@ -139,7 +138,7 @@ def assemble(
         answer.effects
         for answer in study.weighed[1:]
         if study.named
-        and answer.probability >= WORTH_NAMING
+        and answer.probability >= settings.answer.rivals_from
         and answer.effects != UNKNOWN
         and not set(study.fitted) <= set(answer.effects)
     ]
@@ -150,11 +149,12 @@ def assemble(
         causes=study.causes,
         verdict=verdict(
             study.causes,
-            decision([(candidate.effect, candidate.probability) for candidate in weighed], gap.closed),
+            decision([(one.effect, one.probability) for one in weighed], settings.answer, gap.closed),
             gap,
             rest=left,
             both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
-            beside=immaterial_words(before, after) if study.named else nearly_words(study),
+            beside=immaterial_words(before, after, settings.words) if study.named else nearly_words(study),
+            chosen=settings.words,
         ),
         gap=gap,
         where=where,
@@ -173,10 +173,15 @@ def assemble(
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
         blind_spots=study.model.blind_spots(data),
         seconds=seconds,
-        provenance={"versions": {name: version(name) for name in _PACKAGES}},
+        provenance={
+            "versions": {name: version(name) for name in _PACKAGES},
+            "settings": settings.differences(),
+        },
         cautions=(
             *left_out,
-            *cautions(study.campaign, noise, gap.runs, shown.confirmation, named=study.named),
+            *cautions(
+                study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
+            ),
             *((_CUT_RECORDS,) if study.cut else ()),
             *(
                 _UNRESOLVED.format(plain(*names).capitalize())
@@ -184,7 +189,7 @@ def assemble(
             ),
             *((_RESTED.format(", ".join(study.rested)),) if study.rested else ()),
         ),
-        inclusion=inclusion(weighed, study.read_off),
+        inclusion=inclusion(weighed, study.read_off, settings.gap),
         waterfall=steps,
         rest=left,
         model=patched,

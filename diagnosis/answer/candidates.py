@@ -13,29 +13,32 @@ from diagnosis.answer.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.parameters import Point
-from diagnosis.policy import EVEN_SHARE, FALSE_ALARM_RATE, UNDETERMINED_FACTOR
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study
 from diagnosis.search.process_noise import LONGEST_BANDWIDTH
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import GapSettings
 from tunnel_sim.effects import known_effects
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
 
 
-def meant_parameter(found: ParameterEstimate, info: ParameterInfo, swing: float) -> ParameterEstimate:
+def meant_parameter(
+    found: ParameterEstimate, info: ParameterInfo, swing: float, undetermined: float
+) -> ParameterEstimate:
     """A fitted parameter, without its standard deviation where that says nothing.
 
     Args:
         swing: largest angle of the motion, rad.
+        undetermined: standard deviation over value and usual size from which it says nothing, a ratio.
 
     Returns:
         The estimate; not determined where its standard deviation exceeds that of a uniform distribution over the
-        range allowed, or ten times the parameter's value and usual size.
+        range allowed, or that multiple of the parameter's value and usual size.
     """
     lower, upper = info.fit_range(swing)
     uniform = (upper - lower) / math.sqrt(12.0)
-    size = UNDETERMINED_FACTOR * max(abs(found.value), info.scale)
+    size = undetermined * max(abs(found.value), info.scale)
     return _limited(found, min(uniform, size))
 
 
@@ -85,12 +88,12 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         Answers, ``none`` and ``unknown`` among them: the answer, then the most probable ones. Their probabilities
         sum to 1.
     """
-    block = study.nominal.problem.data.mean_block
+    block, rate = study.nominal.problem.data.mean_block, study.settings.gap.detection_rate
     excess = study.nominal.excess / block
     if not study.causes:
         return (
-            Candidate("none", 1.0 - FALSE_ALARM_RATE, excess, 0.0),
-            Candidate("unknown", FALSE_ALARM_RATE, excess, 0.0),
+            Candidate("none", 1.0 - rate, excess, 0.0),
+            Candidate("unknown", rate, excess, 0.0),
         )
     found = []
     before = max(study.nominal.excess, 1e-9)
@@ -105,16 +108,17 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         whole = excess + base.hum + base.extra
         closed = float(np.clip(1.0 - max(excess, 0.0) / max(whole, 1e-9), 0.0, 1.0))
         name = " + ".join(study.read_off)
-        found.append(Candidate(name, 1.0 - EVEN_SHARE, excess, closed, _parameters(study, ())))
-        found.append(Candidate("unknown", EVEN_SHARE, whole, 0.0))
-    none = 0.0 if study.read_off else min(study.test.p_value, FALSE_ALARM_RATE)
+        even = study.settings.weighing.even_share
+        found.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study, ())))
+        found.append(Candidate("unknown", even, whole, 0.0))
+    none = 0.0 if study.read_off else min(study.test.p_value, rate)
     found.append(Candidate("none", none, before / block, 0.0))
     total = sum(candidate.probability for candidate in found)
     first, *others = (replace(c, probability=c.probability / total) for c in found)
     return (first, *sorted(others, key=lambda c: -c.probability))
 
 
-def inclusion(answers: Sequence[Candidate], read_off: Sequence[str]) -> dict[str, float]:
+def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: GapSettings) -> dict[str, float]:
     """For every effect of the vocabulary the probability that it is among the causes.
 
     Returns:
@@ -125,7 +129,7 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str]) -> dict[str
         kind.name: min(sum(c.probability for c in answers if kind.name in c.effect.split(" + ")), 1.0)
         for kind in known_effects()
     }
-    return found | dict.fromkeys(read_off, 1.0 - FALSE_ALARM_RATE)
+    return found | dict.fromkeys(read_off, 1.0 - chosen.detection_rate)
 
 
 def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEstimate]:
@@ -148,7 +152,8 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
             bound = fit.bound(name)
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
-            found[name] = meant_parameter(given, infos[name], problem.data.swing)
+            undetermined = study.settings.answer.undetermined
+            found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:

@@ -22,7 +22,6 @@ from diagnosis.answer.linear_theory import (
     wind_on_runs,
 )
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.policy import CHANCE_STDS, EVEN_SHARE, FORM_CHANGE_STD, WORTH_NAMING
 from diagnosis.result import Hidden, ParameterEstimate
 from diagnosis.search.investigate import Study
 from diagnosis.search.weigh import UNKNOWN
@@ -82,8 +81,6 @@ class Mixture:
 _SOURCES = (
     "noise", "misfit", "small causes", "hidden effects", "air density", "unseen form", "freed form", "rivals",
 )  # fmt: skip
-_INTERVAL = 0.95
-_SKEWED = 0.1  # standard deviations by which an end of the interval differs from value ± 1.96 std
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,17 +115,18 @@ class Answers:
 
 
 def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
-    """The answers of a study, without the part of `EVEN_SHARE` in their probabilities.
+    """The answers of a study, without what is spread evenly in their probabilities.
 
     That stands for causes not considered, not for an answer that the runs refute.
 
     Args:
-        kinds: the effects that may act unnamed. They are considered beside the chosen answer and every answer of
-            `WORTH_NAMING`, and only where there is a gap.
+        kinds: the effects that may act unnamed. They are considered beside the chosen answer and every probable
+            answer, and only where there is a gap.
     """
     with_moment = study.stated(study.fitted) if study.by_moment else None
     chosen = study.chosen if with_moment is None else with_moment.fit
-    even = EVEN_SHARE / max(len(study.weighed), 1)
+    even = study.settings.weighing.even_share / max(len(study.weighed), 1)
+    least = study.settings.answer.small_causes_from
     textbook = {id(h.fit): h.textbook for h in study.hypotheses}
     others, own, unknown = [], 1.0, 0.0
     for place, answer in enumerate(study.weighed):
@@ -143,7 +141,7 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
         elif answer.effects == UNKNOWN:
             unknown = probability
         elif fit is not None and probability > 0.0:
-            small = beside(fit, starts_beside(fit, kinds)) if probability >= WORTH_NAMING else None
+            small = beside(fit, starts_beside(fit, kinds)) if probability >= least else None
             share, alternatives = _by_choice(study, answer.effects, fit, probability, kinds)
             others += [Possible(probability * share, fit, textbook.get(id(fit)), small), *alternatives]
     share, alternatives = _by_choice(study, study.fitted, chosen, own, kinds)
@@ -184,10 +182,10 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         change made by freeing the forms: another family of forms may change as much. By the same rule ``unknown``
         adds half the change from the nominal model. The effect that could hide and would move the coefficient most
         (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size is two standard
-        deviations. The central interval of 0.95 is given where it is not that of a normal distribution. No standard
+        deviations. The central interval is given where it is not that of a normal distribution. No standard
         deviation is given at a bound and where the runs do not determine the coefficient.
     """
-    fit, found = answers.possible[0].fit, {}
+    fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
         if _value(fit, name) is None:
             continue  # held
@@ -195,10 +193,10 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         each = [
             of
             for one in answers.possible
-            if (of := _of_answer(one, campaign, name, move / CHANCE_STDS)) is not None
+            if (of := _of_answer(one, campaign, name, move / chosen.hidden_stds)) is not None
         ]
         _, first, parts = each[0]
-        change = FORM_CHANGE_STD * (first.mean - (_value(answers.nominal, name) or first.mean))
+        change = chosen.unknown_std * (first.mean - (_value(answers.nominal, name) or first.mean))
         if answers.unknown > 0.0:
             doubted = Mixture(first.weights, first.means, first.variances + change**2)
             each.append((answers.unknown, doubted, {**parts, "rivals": change**2}))
@@ -218,10 +216,11 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         shares["rivals"] = shares.get("rivals", 0.0) + between
         found[name] = _estimate(fit, name, whole.mean, whole.std, shares)
         if found[name].std is not None:
-            tail = 0.5 * (1.0 - _INTERVAL)
+            tail = 0.5 * (1.0 - chosen.coefficient_interval)
             low, high = whole.quantile(tail), whole.quantile(1.0 - tail)
             reach = float(ndtri(1.0 - tail)) * whole.std
-            if max(abs(low - whole.mean + reach), abs(high - whole.mean - reach)) > _SKEWED * whole.std:
+            skew = max(abs(low - whole.mean + reach), abs(high - whole.mean - reach))
+            if skew > chosen.skewed_from * whole.std:
                 found[name] = replace(found[name], interval=(low, high))
     return found
 
@@ -272,13 +271,14 @@ def _of_answer(
         runs, which = wind_on_runs(fit), 0 if name == "cn_beta" else 1
         effects = fit.problem.effects_at(fit.point.common)
         unseen = math.hypot(*(effect.unseen_form(fit.value("cn_beta"), runs)[which] for effect in effects))
+    form_std = fit.settings.answer.freed_form_std
     unfreed = None if answer.textbook is None else _value(answer.textbook, name)
     common = {
         "misfit": left**2,
         "hidden effects": hidden**2,
         "air density": (value * rounding) ** 2,
         "unseen form": unseen**2,
-        "freed form": 0.0 if unfreed is None else (FORM_CHANGE_STD * (value - unfreed)) ** 2,
+        "freed form": 0.0 if unfreed is None else (form_std * (value - unfreed)) ** 2,
     }
     noise, forms = small.noise[:, place], small.forms[:, place]
     found = Mixture(small.weights, value + small.moves[:, place], noise + forms + sum(common.values()))

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.answer.linear_theory import (
-    DEGREES,
     Starts,
     coefficient_gradients,
     coefficients_of,
@@ -30,7 +29,6 @@ from diagnosis.likelihood.starting_points import (
     second_order_starts,
 )
 from diagnosis.model.parameters import Point
-from diagnosis.policy import CHANCE_STDS
 from diagnosis.result import Hidden, ParameterEstimate
 from diagnosis.search.hypothesis import own_gain
 from tunnel_sim.vocabulary.record import Array
@@ -53,9 +51,10 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     Returns:
         In the order given, without those that the runs cannot show at all.
     """
+    chosen = fit.settings.answer
     total = fit.total if left is None else sum(float(r @ r) for r in left)
-    beyond = max(total - fit.count - CHANCE_STDS * np.sqrt(2.0 * fit.count), 0.0)
-    reach = CHANCE_STDS**2 * (1.0 + beyond / DEGREES)
+    beyond = max(total - fit.count - chosen.dispersion_stds * np.sqrt(2.0 * fit.count), 0.0)
+    reach = chosen.hidden_stds**2 * (1.0 + beyond / chosen.misfit_degrees)
     names, influence = coefficients_of(fit), influences(fit)
     found, units = [], fit.problem.data.model.coefficient_units
     for kind, points in starts:
@@ -72,7 +71,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
                 name: ParameterEstimate(float(abs(move)), None, units[name])
                 for name, move in zip(names, largest.moves, strict=True)
             }
-            stds = CHANCE_STDS * float(np.sqrt(max(one.drop for one in sizes) / reach))
+            stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one in sizes) / reach))
             found.append(Hidden(kind.name, severity.name, size, moves, stds))
     return tuple(found)
 
@@ -94,11 +93,11 @@ def _largest(fit: Fit, start: StartingPoint, influence: Sequence[Array], reach: 
     """
     if start.scaled is None:
         return None
-    found = None
+    found, least = None, fit.settings.answer.hidden_absorbed
     for number in range(_ROUNDS if start.second_order else 1):
         size = float(start.point.common[start.scaled])
         # at the size of a trial a small share tells that the runs cannot show the effect; later the size is small
-        found = _within(fit, start, influence, reach, _ABSORBED if number == 0 else 0.0)
+        found = _within(fit, start, influence, reach, least if number == 0 else 0.0)
         if found is None or found.size == 0.0 or 1.0 / _SETTLED < found.size / size < _SETTLED:
             break
         common = start.point.common.copy()
@@ -147,9 +146,6 @@ def _real_roots(polynomial: Array) -> list[float]:
 
 
 _ROUNDS, _SETTLED = 6, 1.5  # rounds, and the factor by which the last one may still change the size
-_ABSORBED = (
-    1e-4  # share of a change beyond what is absorbed that counts as none: the accuracy of linear theory
-)
 _REAL = 1e-6  # share of a root that its imaginary part may be
 
 

@@ -13,15 +13,11 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, normal_equations
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
-from diagnosis.policy import CHANCE_STDS, FORM_CHANGE_STD, NEEDLESS_CHI2, SMALL_SHARE
 from identification.statistics import scatter_of_runs
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.vocabulary.record import Array
 
-DEGREES = 6.0  # effective degrees of freedom of a real model's error
-_MOST = 3  # small causes at once
-_TRIED = 8  # effects that sets are made of: those that alone lower χ² most
 _DISTINCT = 1e-3  # least eigenvalue of the correlation matrix of a set's changes
 _SECANTS, _SETTLED = 4, 0.25  # times a size is changed, and the share by which it then changes no more
 _OWN_SIZE = 3.0  # factor by which linear theory may change the size that was found in the records' lines
@@ -64,6 +60,7 @@ def coefficient_move(fit: Fit, name: str) -> float:
         quadrature); 0 where it gives as much.
     """
     gradient = fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name)
+    chosen = fit.settings.answer
     _, slope, solutions = normal_equations(fit.jacobian, fit.residuals)
     # the step is what the fit had still to go
     direction, step = fit.covariance @ gradient, fit.covariance @ slope
@@ -93,10 +90,10 @@ def coefficient_move(fit: Fit, name: str) -> float:
         middle = order[rank[min(at, rank.size - 1)]]
         for low in (order < middle, order <= middle):  # runs of one condition are not divided
             share = float(weight[low].sum()) / max(total, 1e-300)
-            if SMALL_SHARE < share < 1.0 - SMALL_SHARE:  # else one half says nothing
+            if chosen.least_half < share < 1.0 - chosen.least_half:  # else one half says nothing
                 both = 2.0 * share * (1.0 - share)
                 moved = float(pull[low].sum()) / both
-                chance = CHANCE_STDS**2 * total / (2.0 * both)
+                chance = chosen.move_stds**2 * total / (2.0 * both)
                 found = max(found, math.sqrt(max(moved**2 - chance, 0.0)))
     return found
 
@@ -177,7 +174,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
 
     An effect that acts but is not named changes the coefficients, because the fit absorbs a part of it. The other
     part is in the residuals and gives its size. A set has the weight exp(−(χ²/φ + price)/2). The price is
-    `NEEDLESS_CHI2` for each effect. φ is the dispersion of what the best set leaves beyond chance, over the six
+    the same for each effect. φ is the dispersion of what the best set leaves beyond chance, over the six
     effective degrees of freedom that the error of a real model has (decisions 0007 and 0028). An effect
     that the readings do not show therefore has no part in the average, however far it could move a coefficient.
 
@@ -185,7 +182,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
         fit: with or without effects.
         starts: the effects that may act beside those of the fit.
     """
-    gradients = coefficient_gradients(fit)
+    gradients, settings = coefficient_gradients(fit), fit.settings.answer
     influence = influences(fit)
     causes, residuals = [], np.concatenate(fit.residuals)
     for _, points in starts:
@@ -211,14 +208,18 @@ def beside(fit: Fit, starts: Starts) -> Beside:
     formal = _formal(fit, gradients)
     zero = np.zeros(formal.size)
     found = [_Step(np.zeros(len(causes)), 0.0, zero, zero, zero)]
-    tried = np.argsort(-(score**2) / np.maximum(np.diag(gram), 1e-300), kind="stable")[:_TRIED].tolist()
-    sets = [list(chosen) for size in range(1, _MOST + 1) for chosen in combinations(tried, size)]
-    found += [step for chosen in sets if (step := _step(gram, score, causes, chosen)) is not None]
+    tried = np.argsort(-(score**2) / np.maximum(np.diag(gram), 1e-300), kind="stable")[
+        : settings.small_causes_tried
+    ].tolist()
+    sizes = range(1, settings.small_causes + 1)
+    sets = [list(chosen) for size in sizes for chosen in combinations(tried, size)]
+    steps = (_step(gram, score, causes, chosen, settings.small_form_std) for chosen in sets)
+    found += [step for step in steps if step is not None]
     excess = fit.total - fit.count - np.array([step.drop for step in found])
-    price = NEEDLESS_CHI2 * np.array([np.count_nonzero(step.sizes) for step in found])
+    price = settings.small_cause_price * np.array([np.count_nonzero(step.sizes) for step in found])
     best = float(excess[np.argmin(excess + price)])
-    beyond = max(best - CHANCE_STDS * math.sqrt(2.0 * fit.count), 0.0)
-    odds = -0.5 * (excess / (1.0 + beyond / DEGREES) + price)
+    beyond = max(best - settings.dispersion_stds * math.sqrt(2.0 * fit.count), 0.0)
+    odds = -0.5 * (excess / (1.0 + beyond / settings.misfit_degrees) + price)
     weights = np.exp(odds - odds.max())
     weights /= weights.sum()
     taken = np.split(
@@ -271,10 +272,13 @@ def _formal(fit: Fit, gradients: Array) -> Array:
     return found
 
 
-def _step(gram: Array, score: Array, causes: Sequence[_Cause], chosen: list[int]) -> _Step | None:
+def _step(
+    gram: Array, score: Array, causes: Sequence[_Cause], chosen: list[int], form_std: float
+) -> _Step | None:
     """Add the effects of some places; None where they change the readings alike, or a size would leave its range.
 
     ``gram`` holds products of the causes' changes, shape (causes, causes), ``score`` those with the residuals.
+    ``form_std`` is the standard deviation of a move due to the form, as a share of it.
     """
     own = gram[np.ix_(chosen, chosen)]
     scale = np.sqrt(np.diag(own))
@@ -295,7 +299,7 @@ def _step(gram: Array, score: Array, causes: Sequence[_Cause], chosen: list[int]
         float(score[chosen] @ size) - sum(cause.by_chance for cause in inside),
         size @ moves,
         np.einsum("ic,ij,jc->c", moves, inverse, moves),
-        size**2 @ ((FORM_CHANGE_STD * moves) ** 2 + unseen**2),
+        size**2 @ ((form_std * moves) ** 2 + unseen**2),
     )
 
 
@@ -303,7 +307,7 @@ def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
     """Standard deviations from the scatter of the runs; 0 where chance explains what is left."""
     names, runs = coefficients_of(fit), fit.problem.data.runs
     excess = sum(float(residual @ residual) for residual in residuals) - fit.count
-    if excess <= CHANCE_STDS * math.sqrt(2.0 * fit.count):
+    if excess <= fit.settings.answer.scatter_stds * math.sqrt(2.0 * fit.count):
         return np.zeros(len(names))
     windy = sum(run.wind_on for run in runs)
     informative_runs = np.array([windy if name.startswith("cn_") else len(runs) for name in names])
@@ -333,4 +337,5 @@ def _cause(fit: Fit, start: StartingPoint, influence: list[Array]) -> _Cause | N
     if "cn_beta" in fit.problem.names:  # Cnβ and Cnr come last
         effect = start.problem.effects_at(start.point.common)[-1]
         unseen[-2:] = effect.unseen_form(fit.value("cn_beta"), wind_on_runs(fit))
-    return _Cause(left, moves, unseen, least, greatest, 0.5 * NEEDLESS_CHI2 * own * len(runs))
+    gain = fit.settings.weighing.own_number_gain * own * len(runs)
+    return _Cause(left, moves, unseen, least, greatest, gain)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from diagnosis.policy import GREATER_PART
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import WordsSettings
 from identification.examination.self_excited import in_limit_cycle
 from identification.signal.frequency import starting_frequency, thinned_reading
 from identification.status import Remark
@@ -21,7 +21,6 @@ from tunnel_sim.vocabulary.record import Array, evenly_spaced
 _MOST = 1024  # thinned readings used: fifty cycles
 _LEAST = 64
 _PARTS = (1.0, 0.5, 0.25)  # of these, from the start: a mode that decays sooner is lost in the whole
-_LEAST_CYCLES = 0.5  # in its lifetime 1/rate: judgement; what dies out sooner never swings to the other side
 _ROWS = 1.0 / 3.0  # of a Hankel matrix over the readings, as in the matrix pencil
 
 
@@ -35,13 +34,13 @@ class _Modes:
     left: float  # sum of squared residuals, rad²
 
 
-def second_modes(campaign: Campaign) -> tuple[str, ...]:
+def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[str, ...]:
     """Name a second mode in each run that shows one.
 
     Returns:
-        A sentence for each run in which two decaying oscillations halve what one leaves and are farther apart than
-        the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or
-        its first quarter. What dies out before it swings to the other side is not a mode. Driven runs are left
+        A sentence for each run in which two decaying oscillations leave far less than one, and are farther
+        apart than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its
+        first half or its first quarter. What dies out before it swings to the other side is not a mode. Driven runs are left
         out.
     """
     found = []
@@ -56,11 +55,13 @@ def second_modes(campaign: Campaign) -> tuple[str, ...]:
             hankel = sliding_window_view(values, values.size - int(values.size * _ROWS) + 1)
             vectors = np.linalg.svd(hankel - hankel.mean(axis=1, keepdims=True), full_matrices=False)[0]
             one, two = (_fit_modes(values, interval, count, vectors) for count in (1, 2))
-            if one is None or two is None or two.left > GREATER_PART * one.left or two.rate.min() < 0.0:
+            if one is None or two is None or two.left > chosen.second_mode_left * one.left:
+                continue
+            if two.rate.min() < 0.0:
                 continue
             order = np.argsort(np.abs(two.frequency - one.frequency[0]))
             resolution = float(two.rate.sum()) / np.pi
-            if np.any(two.frequency < _LEAST_CYCLES * two.rate):
+            if np.any(two.frequency < chosen.second_mode_cycles * two.rate):
                 continue  # an impulse or a drift, and no oscillation
             turns = max(1, round(two.frequency[order[1]] / two.frequency[order[0]]))
             if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:

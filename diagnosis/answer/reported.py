@@ -12,7 +12,6 @@ from diagnosis.closure import Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Problem, blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.model.parameters import Point
-from diagnosis.policy import FALSE_ALARM_RATE, SMALL_SHARE
 from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
 from tunnel_sim.physics.run_settings import released_by_spring_end
@@ -79,8 +78,11 @@ def compare(problem: Problem, common: Array, release: Array) -> Comparison:
     )
 
 
-def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
+def confirm(comparisons: Sequence[Comparison], tolerance: float) -> Confirmation:
     """Judge whether the two models agree.
+
+    Args:
+        tolerance: greatest root mean square difference of a run, in noise standard deviations of a block mean.
 
     Returns:
         The largest difference, and the root mean square difference of the run closest to its tolerance.
@@ -93,9 +95,9 @@ def confirm(comparisons: Sequence[Comparison]) -> Confirmation:
             largest = max(largest, float(np.max(np.abs(difference))))
             rms = float(np.sqrt(np.mean(difference**2)))
             if rms / noise > worst:
-                worst, found = rms / noise, (run, rms, SMALL_SHARE * noise)
+                worst, found = rms / noise, (run, rms, tolerance * noise)
     failure = next((c.failure for c in comparisons if c.failure), "")
-    return Confirmation(worst <= SMALL_SHARE and not failure, largest, *found, failure=failure)
+    return Confirmation(worst <= tolerance and not failure, largest, *found, failure=failure)
 
 
 def mujoco_blocks(problem: Problem, common: Array, release: Array) -> list[Array]:
@@ -187,7 +189,7 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
         before_out=before_out,
         after=after,
         held_out=frozenset(chosen_out.residuals),
-        confirmation=confirm(comparisons),
+        confirmation=confirm(comparisons, nominal.settings.answer.integrator_tolerance),
     )
 
 
@@ -218,7 +220,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         closed=share_closed(before, after) if study.named else 0.0,
         closed_on=HELD_OUT if shown.before_out else FITTED,
         runs=tuple(runs),
-        false_alarm_rate=FALSE_ALARM_RATE,
+        false_alarm_rate=study.settings.gap.detection_rate,
         p_value=0.0 if study.read_off else study.test.p_value,
         tests=study.test.tests,
         misfit=Misfit(

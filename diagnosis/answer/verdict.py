@@ -13,21 +13,12 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.policy import (
-    AS_MUCH,
-    CHANCE_STDS,
-    FALSE_ALARM_RATE,
-    FEW_RUNS,
-    GREATER_PART,
-    MATERIAL_SHARE,
-    MOST,
-    NOISE_CONTRADICTED,
-)
-from diagnosis.printing import Decision, noise_powers, plain, probability, share, undecided_words
+from diagnosis.printing import Decision, noise_powers, part, plain, probability, share, undecided_words
 from diagnosis.result import Confirmation, GapSummary, Hidden, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
 from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings, WordsSettings
 from identification.printing import COEFFICIENTS, significant, unit_mark, with_std
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -36,7 +27,13 @@ Estimates = Mapping[str, ParameterEstimate]
 
 
 def cautions(
-    campaign: Campaign, noise: Noise, runs: Sequence[RunGap], confirmation: Confirmation, *, named: bool
+    campaign: Campaign,
+    noise: Noise,
+    runs: Sequence[RunGap],
+    confirmation: Confirmation,
+    *,
+    named: bool,
+    settings: Settings,
 ) -> tuple[str, ...]:
     """The caveats of an answer.
 
@@ -45,7 +42,7 @@ def cautions(
         confirmation: whether the fits' integrator agrees with the MuJoCo model.
         named: whether the answer names effects; only then are runs held out of a fit.
     """
-    found = []
+    found, chosen = [], settings.words
     if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
         found.append(
             "No run states spring_stiffness, so all runs are assumed to have the same spring, and moments are "
@@ -61,11 +58,11 @@ def cautions(
             f"{noise.used**0.5:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to "
             f"simulated records."
         )
-    elif ratio <= 1.0 / NOISE_CONTRADICTED:
+    elif ratio <= 1.0 / chosen.noise_contradicted:
         found.append(
             f"{said}. The answer is based on the noise found in the records; correct noise_std or leave it out."
         )
-    elif ratio >= NOISE_CONTRADICTED:
+    elif ratio >= chosen.noise_contradicted:
         found.append(
             f"{said}, and noise above the stated level counts as a gap. If the sensor really is as noisy as that, "
             f"correct noise_std or leave it out."
@@ -76,14 +73,15 @@ def cautions(
             f"from the fits' own integrator. Do not rely on the fitted parameters."
         )
     elif not confirmation.agrees:
+        tolerance = part(settings.answer.integrator_tolerance)
         found.append(
             f"The fits' own integrator differs from the MuJoCo model by {confirmation.rms_difference:.1e} rad "
-            f"(root mean square over {confirmation.run}), more than a tenth of the noise "
+            f"(root mean square over {confirmation.run}), more than {tolerance} of the noise "
             f"({confirmation.tolerance:.1e} rad). The gap before and after comes from MuJoCo. The parameters and "
             f"probabilities come from the fits, and may be wrong by as much."
         )
     windy = any(run.wind_on for run in campaign.runs)
-    if len(campaign.runs) < FEW_RUNS:
+    if len(campaign.runs) < chosen.few_runs:
         motion, others = "decay", "with other springs and release angles"
         if campaign.driven:
             motion, others = "motion", "with other inputs"
@@ -125,6 +123,7 @@ def verdict(
     rest: Remainder,
     both_winds: bool,
     beside: str = "",
+    chosen: WordsSettings,
 ) -> str:
     """The answer in one paragraph.
 
@@ -145,7 +144,8 @@ def verdict(
     if not found.decided:
         said = f"There is a gap ({size}), and its cause is undecided."
         with_first = f"With the first of them added, {share(gap.closed)} of the gap closes {gap.closed_on}."
-        return " ".join((said, undecided_words(found), *(() if tuple(causes) == UNKNOWN else (with_first,))))
+        closed = () if tuple(causes) == UNKNOWN else (with_first,)
+        return " ".join((said, undecided_words(found, chosen), *closed))
     if tuple(causes) == UNKNOWN:
         said = "no effect is named as its cause" if beside else "no effect of the vocabulary explains it"
         return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", beside, rest.words)))
@@ -176,22 +176,22 @@ _IN_CHANNEL = {
 
 def nearly_words(study: Study) -> str:
     """The effects that explain most of a gap without being named, and why they are not; empty where none do."""
-    sets = [answer for answer in study.weighed if answer.effects != UNKNOWN]
+    sets, chosen = [answer for answer in study.weighed if answer.effects != UNKNOWN], study.settings.words
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
-    if study.causes != UNKNOWN or first is None or first.share > 1.0 - MOST:
+    if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
         return ""
     names = plain(*first.effects).capitalize()
     said = f"{names} would explain {share(1.0 - first.share)} of it"
     if study.test.noisy and first.probability == 0.0:
         return f"{said}, but the noise misbehaves and may be all of a gap as small as this."
     said = f"{said} (probability {probability(first.probability)})"
-    alike = [a for a in sets if a is not first and a.share <= first.share + AS_MUCH]
+    alike = [a for a in sets if a is not first and a.share <= first.share + chosen.nearly_alike]
     rival = max(alike, key=lambda answer: answer.probability, default=None)
-    if rival is not None and rival.probability >= GREATER_PART * first.probability:
+    if rival is not None and rival.probability >= chosen.nearly_rival * first.probability:
         return f"{said}, and {plain(*rival.effects)} as much ({probability(rival.probability)})."
     fitted = study.hypothesis(first.effects)
     if fitted is not None:
-        chance = CHANCE_STDS * np.sqrt(2.0 * misfit(study.nominal).count)
+        chance = chosen.nearly_misfit_stds * np.sqrt(2.0 * misfit(study.nominal).count)
         left = [
             _IN_CHANNEL[name] for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c
         ]
@@ -200,11 +200,13 @@ def nearly_words(study: Study) -> str:
     return f"{said}: too little to name it."
 
 
-def immaterial_words(before: Estimates, after: Estimates) -> str:
+def immaterial_words(before: Estimates, after: Estimates, chosen: WordsSettings) -> str:
     """That the causes change no coefficient materially, in a sentence; empty where they do."""
     known = {name: given for name, given in after.items() if given.std and given.value and name in before}
     moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
-    limits = {name: min(MATERIAL_SHARE * abs(given.value), given.std or 0.0) for name, given in known.items()}
+    limits = {
+        name: min(chosen.immaterial * abs(given.value), given.std or 0.0) for name, given in known.items()
+    }
     if not known or any(moves[name] > limit for name, limit in limits.items()):
         return ""
 
@@ -217,7 +219,10 @@ def immaterial_words(before: Estimates, after: Estimates) -> str:
 def spring_words(study: Study) -> tuple[str, ...]:
     """The likeliest pair of springs that are off, in a sentence; none where none closes most of the gap."""
     best = min(study.outside, key=lambda pair: pair.fit.total, default=None)
-    if best is None or best.fit.excess > (1.0 - MOST) * study.nominal.excess:
+    if (
+        best is None
+        or best.fit.excess > (1.0 - study.settings.words.two_springs_explain) * study.nominal.excess
+    ):
         return ()
     chosen, inflate = dict(best.fit.problem.fixed), float(np.sqrt(1.0 + max(best.fit.excess, 0.0)))
     springs = []
@@ -269,7 +274,7 @@ def remainder(
         excess: left on readings held out of the fit, in noise variances of a sample.
         hidden: the effects that could hide beside the answer.
     """
-    random = study.random_answer(study.fitted)
+    random, chosen = study.random_answer(study.fitted), study.settings.answer
     if random is not None:  # in its wind it leaves innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if not run.wind_on]
@@ -282,15 +287,16 @@ def remainder(
         p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
     further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
     by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
-    shown = further is not None and by_effect < FALSE_ALARM_RATE <= p_value
+    shown = further is not None and by_effect < chosen.remains_rate <= p_value
     p_value = min(p_value, by_effect)
-    beyond_chance = p_value < FALSE_ALARM_RATE
+    beyond_chance = p_value < chosen.remains_rate
     moves, material = {}, []
     for name, given in stated.items():
         relative = moved[name] / abs(given.value) if given.value else None
         moves[name] = Move(moved[name], relative, given.std, given.unit)
-        # by its standard deviation, or by 1 %, where the runs determine it
-        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > MATERIAL_SHARE)
+        # by its standard deviation, or by a share, where the runs determine it
+        least = chosen.material_share
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
         material += [name] if beyond_chance and far else []
     left = f"what remains ({noise_powers(excess)})" if study.named else "it"
     known = [name for name, move in moves.items() if move.std is not None]

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from diagnosis.printing import Decision, decision
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import settings_of
 from identification.statistics import Proportion
 
 _KINDS = ("none", "single", "pair", "three", "four")
@@ -165,7 +166,8 @@ class Case:
         """Whether the answer is decided, and the smallest set of likely ones; None where there is no answer."""
         answers = [(c["effect"], float(c["probability"])) for c in self.answer.get("candidates", ())]
         closed = (self.answer.get("gap") or {}).get("closed")
-        return decision(answers, closed) if answers else None
+        chosen = settings_of(self.answer).answer
+        return decision(answers, chosen, closed) if answers else None
 
     @property
     def stated_wrongly(self) -> bool:

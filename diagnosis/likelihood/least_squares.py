@@ -11,6 +11,7 @@ import numpy as np
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
+from diagnosis.settings import Settings
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -179,6 +180,11 @@ class Fit:
     jacobian: list[tuple[Array, Array]] = field(repr=False)
     converged: bool
     spread: Array | None = field(default=None, repr=False)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the diagnosis."""
+        return self.problem.data.settings
 
     @cached_property
     def products(self) -> Products:

@@ -9,7 +9,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.whitening import correlate
-from tunnel_sim.effects.base import IN_RUNS, MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
+from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
 from tunnel_sim.vocabulary.record import Array
 
 _RINGING_PADDING = 4  # zero padding of the spectra
@@ -56,7 +56,7 @@ def ringing(fit: Fit) -> PerRunParameters | None:
         own = float(np.argmax(np.abs(np.fft.rfft(swing, padded)))) / (padded * run.interval)
         apart.append(np.all([np.abs(grid - k * own) > NEAR_MOTION * own for k in MULTIPLES], axis=0))
     beside = np.array(apart)
-    free = np.mean(beside, axis=0) >= IN_RUNS
+    free = np.mean(beside, axis=0) >= fit.settings.search.mode_runs
     if not free.any():
         return None
     shortest = min(run.duration for run in runs)
@@ -114,7 +114,8 @@ def excited(fit: Fit) -> PerRunParameters | None:
     grid = np.exp(
         np.arange(np.log(0.1 * min(own)), np.log(0.8 * np.pi / max(r.interval for r in runs)), _APART)
     )
-    grid = grid[np.mean([np.abs(grid / one - 1.0) > NEAR_MOTION for one in own], axis=0) >= IN_RUNS]
+    beside = np.mean([np.abs(grid / one - 1.0) > NEAR_MOTION for one in own], axis=0)
+    grid = grid[beside >= fit.settings.search.mode_runs]
     found = PerRunParameters((0.0, 1.0, 0.0), np.zeros(len(runs)), 0.0)
     for frequency in grid.tolist():
         for damping_ratio in _DAMPINGS:

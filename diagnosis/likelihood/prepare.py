@@ -20,7 +20,7 @@ from diagnosis.likelihood.run_data import Data, RunData, Samples
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
-from diagnosis.policy import GROWN_ON
+from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 
@@ -28,8 +28,6 @@ from tunnel_sim.vocabulary.campaign import Campaign, Run
 BLOCK_INTERVAL = 4e-3
 _END = 50  # a run ends where its last fiftieth stands
 _STILL = 0.02  # of the largest swing, within which a body counts as at rest
-_QUIET = 5.0  # noise standard deviations of a block mean, within which it does too
-_LONG_REST = 0.1  # of a run: a rest that is cut off
 
 
 def prepare(
@@ -38,6 +36,7 @@ def prepare(
     similarity: Similarity = AS_MEASURED,
     interval: float = BLOCK_INTERVAL,
     model: NominalModel | None = None,
+    settings: Settings = Settings(),
 ) -> Data:
     """Average a campaign's records in blocks.
 
@@ -46,6 +45,7 @@ def prepare(
         similarity: how the campaign was made from the measured one.
         interval: between the blocks, s; the nearest number of samples, at least one.
         model: nominal model of the campaign; None: that of its kind.
+        settings: of the diagnosis.
 
     Returns:
         The prepared data. Where a wind-on run states no air density, all have the density 1 kg/m³.
@@ -85,6 +85,7 @@ def prepare(
         width=rig.width or 0.0,
         model=model,
         similarity=similarity,
+        settings=settings,
     )
 
 
@@ -139,8 +140,10 @@ def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
         The data with such runs cut after their last reading that differs from their end by more than the noise, and
         the ids of these runs.
     """
-    ends = [_moves_until(run, _QUIET * float(np.sqrt(run.noise_variance))) for run in data.runs]
-    rests = [end < (1.0 - _LONG_REST) * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
+    chosen = data.settings.selection
+    ends = [_moves_until(run, chosen.rest_stds * float(np.sqrt(run.noise_variance))) for run in data.runs]
+    least = 1.0 - chosen.long_rest
+    rests = [end < least * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
     each = list(zip(data.runs, ends, rests, strict=True))
     runs = tuple(run.part(last=end) if rest else run for run, end, rest in each)
     return data.with_runs(runs), tuple(run.id for run, _, rest in each if rest)
@@ -219,9 +222,9 @@ def spread_out(short: Stretches, data: Data) -> Stretches:
 
     Returns:
         Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least
-        with which the runs divided by it have no more than `GROWN_ON` blocks.
+        with which the runs divided by it have no more blocks than sets are grown on.
     """
-    each = ceil(sum(run.reading.size for run in data.runs) / GROWN_ON)
+    each = ceil(sum(run.reading.size for run in data.runs) / data.settings.search.grown_on)
     long = in_stretches(data, long_stretch(short))
     kept: set[tuple[int, int]] = set()
     for run in range(len(data.runs)):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.whitening import WHITE, colour, colouring, response, whiten
 from diagnosis.model.nominal import NominalModel
+from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
@@ -330,6 +331,7 @@ class Data:
         width: m; likewise.
         model: nominal model of the campaign, whose parameters a part of its runs has, too.
         similarity: how the campaign was made from the measured one.
+        settings: of the diagnosis.
     """
 
     runs: tuple[RunData, ...]
@@ -338,6 +340,7 @@ class Data:
     width: float
     model: NominalModel
     similarity: Similarity = AS_MEASURED
+    settings: Settings = field(default_factory=Settings)
 
     @property
     def driven(self) -> bool:

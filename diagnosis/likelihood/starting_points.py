@@ -16,7 +16,6 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, Line, misfit, shedding_line
 from diagnosis.likelihood.run_data import Data
 from diagnosis.model.parameters import Point
-from diagnosis.policy import GROSS_MISFIT
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo
 from tunnel_sim.vocabulary.record import Array
@@ -178,12 +177,12 @@ def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
 def misses_motion(fit: Fit) -> bool:
     """Whether a fit misses the motion itself, so that its sensitivities are of little use.
 
-    Its residual then holds more than a hundredth of the power of the readings, both about their means in every
+    Its residual then holds more than a given share of the power of the readings, both about their means in every
     cycle. A drift or a step of the zero is slower than the motion and leaves its phase known.
     """
     found = misfit(fit)
     at_motion = float(found.chi2.sum()) - float(found.chi2[CHANNELS.index("zero")])
-    return at_motion > GROSS_MISFIT * found.motion
+    return at_motion > fit.settings.selection.gross_misfit * found.motion
 
 
 def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]:

@@ -17,14 +17,12 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import chdtri
 
-from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough
-_FEWEST_PARTS = 4  # fewer agree by chance
 _CYCLES = 8.0  # of the motion in a part, at least: its windowed line then stays within the share left out
 _BESIDE = 0.25  # of the motion's frequency, on either side of its harmonics, left out
 _LOWEST = 2.5  # cycles in a part: the window's lobe about zero frequency ends there
@@ -89,13 +87,13 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     Args:
         nominal: any fit whose residuals were scaled as white.
         beyond: multiple of the motion's frequency, from which on the spectrum is regarded.
-        throughout: whether the lowest band and `THROUGHOUT` of all must be steady; otherwise any two do.
+        throughout: whether the lowest band and most of all must be steady; otherwise any two do.
 
     Returns:
-        The spectrum; None where it is flat within `FLOOR_TOLERANCE` and chance, or no bands are the same in all
-        parts of the records, of which there must be four.
+        The spectrum; None where it is flat within a tolerance and chance, no bands are the same in all parts of the
+        records, or these are too few.
     """
-    parts = []
+    parts, chosen = [], nominal.settings.noise
     wanted = max(2, -(-_PARTS // len(nominal.residuals)))
     for index, (run, residual) in enumerate(zip(nominal.problem.data.runs, nominal.residuals, strict=True)):
         own, values = resonance(nominal, index), run.unscaled(residual)
@@ -104,7 +102,7 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
         for piece in (slice(i * length, (i + 1) * length) for i in range(pieces)):
             parts.append(_part(values[piece], run.reading[piece] - values[piece], run, own))
     sizes = [part.motion for part in parts]
-    if len(sizes) < _FEWEST_PARTS or max(sizes) < policy.COLOUR_AMPLITUDES * min(sizes):
+    if len(sizes) < chosen.colour_parts or max(sizes) < chosen.colour_amplitudes * min(sizes):
         return None
     lowest = max(
         _LOWEST * max(part.frequency[1] for part in parts),
@@ -117,15 +115,15 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     edges = np.geomspace(lowest, highest, round(_OCTAVE_PARTS * np.log2(highest / lowest)) + 1)
     cells = [part.by_band(edges) for part in parts]
     power, count = (np.array(column) for column in zip(*cells, strict=True))
-    steady = _steady(power, count)
-    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= policy.THROUGHOUT)):
+    steady = _steady(power, count, chosen.colour_band_rate)
+    if steady.sum() < 2 or (throughout and not (steady[0] and steady.mean() >= chosen.colour_bands)):
         return None
     total = count.sum(axis=0)
     level = np.log(np.sum(power * count, axis=0)[steady] / total[steady])
     std = np.sqrt(1.0 / total[steady])
-    weight = 1.0 / (std**2 + policy.FLOOR_TOLERANCE**2)
+    weight = 1.0 / (std**2 + chosen.colour_flat**2)
     departure = float(weight @ (level - float(weight @ level / weight.sum())) ** 2)
-    if departure < float(chdtri(level.size - 1, policy.FALSE_ALARM_RATE)):  # one constant within chance
+    if departure < float(chdtri(level.size - 1, chosen.colour_rate)):  # one constant within chance
         return None
     centres = np.sqrt(edges[1:] * edges[:-1])[steady]
     lowest_bands = slice(0, _SLOPE_BANDS)
@@ -135,12 +133,14 @@ def noise_colour(nominal: Fit, beyond: float = 0.0, *, throughout: bool = False)
     slope = float((weight * centred) @ level[lowest_bands]) / information
     slope_std = float(np.sqrt(1.0 / information))
     # where a gap hides the lowest bands, making the slope steeper would take the gap for noise
-    steep = slope - policy.CHANCE_STDS * slope_std if steady[0] else slope
+    steep = slope - chosen.colour_slope_stds * slope_std if steady[0] else slope
     return Colour(centres, level, std, _red(slope), slope_std, _red(steep))
 
 
-def _steady(power: Array, count: Array) -> np.ndarray:
+def _steady(power: Array, count: Array, rate: float) -> np.ndarray:
     """Which bands have one level in all parts, by a likelihood ratio of gamma variables; shape (bands,).
+
+    A steady band fails at a ``rate``.
 
     Bartlett's correction makes the statistic nearly χ² for few ordinates (Proc. R. Soc. A 160 (1937) 268,
     doi 10.1098/rspa.1937.0109).
@@ -151,7 +151,7 @@ def _steady(power: Array, count: Array) -> np.ndarray:
     corrected = count / (1.0 + 1.0 / (6.0 * np.maximum(count, 1e-300)))
     statistic = 2.0 * np.sum(corrected * (ratio - 1.0 - np.log(ratio)), axis=0)
     freedom = np.sum(count > 0, axis=0) - 1
-    limit = chdtri(np.maximum(freedom, 1), policy.LOCAL_FALSE_ALARM_RATE)
+    limit = chdtri(np.maximum(freedom, 1), rate)
     return np.asarray((freedom > 0) & (mean > 0.0) & (statistic < limit))
 
 
@@ -230,7 +230,7 @@ _WHITE = 30.0  # the level's natural logarithm stays within this of that of whit
 def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     """Whether the noise's spectrum rises to the lowest frequencies of the runs without a corner.
 
-    This is decided by a likelihood ratio at `FALSE_ALARM_RATE`. The spectrum is that of white noise and a
+    This is decided by a likelihood ratio. The spectrum is that of white noise and a
     first-order process, which is a random walk where its corner is zero; the colour's lowest band is the lowest
     corner of stationary noise that counts as seen. It is fitted to the ordinates between the harmonics by Whittle's
     likelihood (P. Whittle, Ark. Mat. 2 (1953) 423, doi 10.1007/BF02590998).
@@ -244,7 +244,7 @@ def zero_wanders(nominal: Fit, colour: Colour) -> bool:
     relative = frequency / colour.frequency[0]
     seen = _least_loss(relative, power, 1.0)
     free = min(seen, _least_loss(relative, power, _LOWEST_CORNER))
-    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * policy.FALSE_ALARM_RATE))
+    return bool(2.0 * (seen - free) / HANN > chdtri(1, 2.0 * nominal.settings.noise.wandering_rate))
 
 
 def alike_in_all_runs(fit: Fit) -> bool:
@@ -255,7 +255,7 @@ def alike_in_all_runs(fit: Fit) -> bool:
     (1 − x)ⁿ⁻¹, whatever the noise's colour.
 
     Returns:
-        By that test of the frequencies below half the motion's, together at `FALSE_ALARM_RATE`. False where fewer
+        By that test of all frequencies below half the motion's together. False where fewer
         than two runs have the same raster.
     """
     runs: dict[tuple[float, float], list[int]] = {}
@@ -269,7 +269,7 @@ def alike_in_all_runs(fit: Fit) -> bool:
         return False
     shared = np.abs(waves.mean(axis=0)) ** 2 / np.mean(np.abs(waves) ** 2, axis=0)
     chance = (1.0 - np.minimum(shared, 1.0)) ** (len(alike) - 1)
-    return bool(chance.min() * chance.size < policy.FALSE_ALARM_RATE)
+    return bool(chance.min() * chance.size < fit.settings.noise.repeated_rate)
 
 
 def _least_loss(frequency: Array, power: Array, lowest: float) -> float:

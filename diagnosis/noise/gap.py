@@ -11,7 +11,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import bdtrc, chdtrc, stdtr
 
-from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited
@@ -21,6 +20,7 @@ from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
 from diagnosis.noise.colour import alike_in_all_runs, noise_colour, whitened, zero_wanders
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
+from diagnosis.settings import GapSettings
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import the_effect
 from tunnel_sim.vocabulary.record import Array
@@ -119,7 +119,8 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
         return dict.fromkeys(_NAMES, 1.0)
     white = noise.white(trend.step)
     factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
-    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - np.log(policy.NOISE_TAILS)])
+    tails = np.log(fit.settings.gap.noise_tails)
+    observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - tails])
     count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
     found = np.zeros(3)
     for factor in factors:
@@ -141,7 +142,7 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
     median found, at the largest noise that the statement allows.
     """
     assert noise.stated_variance is not None
-    level = noise.estimated / (policy.CLEARLY_MORE * noise.stated_variance)
+    level = noise.estimated / (fit.settings.gap.noise_above_stated * noise.stated_variance)
     ordinates = max(int(_ABOVE * 0.5 * samples(fit) / _HANN), 1)
     return float(bdtrc((ordinates - 1) // 2, ordinates, 2.0**-level))
 
@@ -190,9 +191,9 @@ def gap_test(
             blocks), rad; None where they are white.
 
     Returns:
-        The verdict at `FALSE_ALARM_RATE`, shared equally among the tests (Bonferroni).
+        The verdict at one rate of false alarms, shared equally among the tests (Bonferroni).
     """
-    level, scatter = np.ones(6), np.zeros(6)
+    level, scatter, chosen = np.ones(6), np.zeros(6), fit.settings.gap
     if errors is not None:
         # statistics under noise and rounding, and their scatter beyond that of white noise, as shares of what white
         # noise of the fit's variance gives: the bands, then the offset
@@ -205,7 +206,7 @@ def gap_test(
         level = np.mean(found, axis=0)
         beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
         level, scatter = np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
-    floor = (1.0 + policy.FLOOR_TOLERANCE) * noise.margin * level
+    floor = (1.0 + chosen.noise_tolerance) * noise.margin * level
     tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
     tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
     noisy: dict[str, float] = {}
@@ -214,19 +215,19 @@ def gap_test(
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
     everything = tests | noisy
-    limit = policy.FALSE_ALARM_RATE / len(everything)
+    limit = chosen.detection_rate / len(everything)
     smallest = min(everything.values())
     return GapTest(
         smallest < limit,
         min(1.0, smallest * len(everything)),
         everything,
-        any(p < _misbehaves(everything) for p in noisy.values()),
+        any(p < _misbehaves(everything, chosen) for p in noisy.values()),
     )
 
 
-def _misbehaves(tests: Mapping[str, float]) -> float:
+def _misbehaves(tests: Mapping[str, float], chosen: GapSettings) -> float:
     """The p-value of one of these tests below which the noise itself misbehaves."""
-    return policy.FALSE_ALARM_RATE * policy.NOISE_FALSE_ALARM_SHARE / len(tests)
+    return chosen.misbehaving_rate / len(tests)
 
 
 def gap_or_colour(
@@ -273,10 +274,9 @@ def gap_or_colour(
         coloured = noise.coloured(found, nominal.problem.data)
         test = gap_test(white, coloured, trend, coarse_step=coarse_step, errors=errors)
         still = any(not run.wind_on for run in nominal.problem.data.runs)
-        excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests)
-        believed = (
-            still and not excessive and noise_colour(source, beyond=policy.BEYOND_THE_MOTION) is not None
-        )
+        excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, nominal.settings.gap)
+        beyond = nominal.settings.noise.colour_beyond
+        believed = still and not excessive and noise_colour(source, beyond=beyond) is not None
         repeats = alike_in_all_runs(nominal) or _follows_input(white)
         noise_alone = not zero_wanders(nominal, found) and not repeats
         if believed if test.detected else noise_alone:
@@ -305,7 +305,8 @@ _TRIED = 2000  # frequencies and dampings of an oscillation, at most
 def _follows_input(white: Fit) -> bool:
     """Whether white residuals hold an oscillation that the input excites alike in all runs, as noise does not."""
     found = excited(white)
-    return found is not None and bool(_TRIED * chdtrc(1.0, found.drop) < policy.FALSE_ALARM_RATE)
+    rate = white.settings.noise.oscillation_rate
+    return found is not None and bool(_TRIED * chdtrc(1.0, found.drop) < rate)
 
 
 def _beside_mode(nominal: Fit) -> Fit | None:

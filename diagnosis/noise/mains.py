@@ -22,14 +22,7 @@ from diagnosis.likelihood.mains_lines import (
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
 from diagnosis.noise.sensor_noise import SmoothCurve
-from diagnosis.policy import (
-    AS_MUCH,
-    FALSE_ALARM_RATE,
-    HUM_CONTRAST,
-    HUM_STEADY,
-    NOISE_FALSE_ALARM_SHARE,
-    THROUGHOUT,
-)
+from diagnosis.settings import ReadOffSettings
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
@@ -64,14 +57,17 @@ class Hum:
 def find_hum(nominal: Fit) -> float | None:
     """The frequency of the mains whose hum is in the residuals of the nominal fit, Hz; None where there is none.
 
-    It is sought near 50 and 60 Hz and their multiples at `FALSE_ALARM_RATE`, all of them together. Where several
-    frequencies explain the same lines as sampled, it is the one of least folding, then that of the lowest multiple.
+    It is sought near 50 and 60 Hz and their multiples, at one rate of false alarms for all of them together. Where
+    several frequencies explain the same lines as sampled, it is the one of least folding, then that of the lowest
+    multiple.
     """
-    found = [line for line in mains_lines(nominal) if _is_hum(line)]
+    chosen = nominal.settings.read_off
+    found = [line for line in mains_lines(nominal) if _is_hum(line, chosen)]
     if not found:
         return None
     most = max(line.evidence for line in found)
-    return min((line for line in found if line.evidence >= (1.0 - AS_MUCH) * most), key=_plainness).parameter
+    alike = (line for line in found if line.evidence >= (1.0 - chosen.hum_alike) * most)
+    return min(alike, key=_plainness).parameter
 
 
 def _plainness(line: MainsLine) -> tuple[int, int]:
@@ -79,19 +75,19 @@ def _plainness(line: MainsLine) -> tuple[int, int]:
     return line.folds, line.harmonic
 
 
-def _is_hum(line: MainsLine) -> bool:
+def _is_hum(line: MainsLine, chosen: ReadOffSettings) -> bool:
     """Whether a line is beyond chance, beyond what is beside it, in most runs, and in their later halves as well.
 
     A ringing rod and the harmonics of a motion with corners also raise the spectrum beside the line, and are
     therefore rejected. A mode that is excited at the release decays.
     """
-    chance = float(chdtri(line.freedom, FALSE_ALARM_RATE / line.trials))
-    shown = line.powers > chdtri(2.0 * line.pieces, FALSE_ALARM_RATE)
+    chance = float(chdtri(line.freedom, chosen.hum_rate / line.trials))
+    shown = line.powers > chdtri(2.0 * line.pieces, chosen.hum_run_rate)
     return (
         line.drop > chance
-        and line.contrast >= HUM_CONTRAST
-        and float(np.mean(shown)) >= THROUGHOUT
-        and HUM_STEADY <= line.later <= 1.0 / HUM_STEADY
+        and line.contrast >= chosen.hum_contrast
+        and float(np.mean(shown)) >= chosen.hum_runs
+        and chosen.hum_steady <= line.later <= 1.0 / chosen.hum_steady
     )
 
 
@@ -123,7 +119,11 @@ def refine_frequency(campaign: Campaign, frequency: float, motion: float = REFER
 
 
 def remove_hum(
-    campaign: Campaign, frequency: float, variance: float, motion: float = REFERENCE_FREQUENCY
+    campaign: Campaign,
+    frequency: float,
+    variance: float,
+    chosen: ReadOffSettings,
+    motion: float = REFERENCE_FREQUENCY,
 ) -> tuple[Campaign, Hum]:
     """Remove a hum and its harmonics from every record, as far as the record shows them apart from the motion.
 
@@ -142,7 +142,7 @@ def remove_hum(
 
     shown = _showing(campaign, frequency, motion)
     harmonic = _strongest(shown, frequency)
-    swells = _swells(shown, frequency, harmonic, variance)
+    swells = _swells(shown, frequency, harmonic, variance, chosen.hum_swell_rate)
     cleaned, squares, powers, counts = [], [], [], []
     curvature, scatter = 0.0, 0.0
     for run, (record, multiples) in zip(campaign.runs, shown, strict=True):
@@ -227,7 +227,7 @@ def _strongest(shown: Sequence[tuple[Record, list[int]]], frequency: float) -> i
 
 
 def _swells(
-    shown: Sequence[tuple[Record, list[int]]], frequency: float, harmonic: int, variance: float
+    shown: Sequence[tuple[Record, list[int]]], frequency: float, harmonic: int, variance: float, rate: float
 ) -> bool:
     """Whether the amplitude or the phase of a hum's strongest line varies within the runs beyond chance."""
     gained, freedom = 0.0, 0
@@ -244,7 +244,7 @@ def _swells(
         found = both.T @ reading
         gained += float(found @ np.linalg.solve(share, found)) / variance
         freedom += both.shape[1]
-    return freedom > 0 and gained > float(chdtri(freedom, NOISE_FALSE_ALARM_SHARE * FALSE_ALARM_RATE))
+    return freedom > 0 and gained > float(chdtri(freedom, rate))
 
 
 def _lines(record: Record, frequency: float, multiples: Sequence[int]) -> Array:

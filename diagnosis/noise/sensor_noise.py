@@ -17,7 +17,7 @@ from diagnosis.likelihood.nondimensional import frequency
 from diagnosis.likelihood.prepare import BLOCK_INTERVAL
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.colour import Colour
-from diagnosis.policy import FALSE_ALARM_RATE
+from diagnosis.settings import NoiseSettings
 from identification.signal.decay_fit import mean_of_blocks
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
@@ -245,11 +245,11 @@ def driven_variance(reading: Array, values: Array, low: float) -> tuple[float, f
     return float(np.median(left)) / median, 1.2533 / float(np.sqrt(len(left) * freedom))
 
 
-def campaign_noise(campaign: Campaign) -> Noise:
+def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
-    It is as stated where the runs agree with one another and their mean agrees with it, at
-    `FALSE_ALARM_RATE`; else the estimate, pooled over runs where they agree with one another. A
+    It is as stated where the runs agree with one another and their mean agrees with it,
+    both within chance; else the estimate, pooled over runs where they agree with one another. A
     data sheet may give the noise before or after rounding: the closer one counts. Where a run contains less noise
     than the accuracy of the fits, that stands in for it.
     """
@@ -281,7 +281,8 @@ def campaign_noise(campaign: Campaign) -> Noise:
             "of the fits, which stands in for it"
         )
         return Noise(used, stated, "floor", reason, pooled, measured=measured)
-    apart, agrees = (-float(ndtri(0.5 * FALSE_ALARM_RATE / tests)) for tests in (variances.size, 1))
+    apart = -float(ndtri(0.5 * chosen.own_rate / variances.size))
+    agrees = -float(ndtri(0.5 * chosen.stated_rate))
     uniform = bool(np.all(np.abs(variances / pooled - 1.0) < apart * relative))
     used = dict.fromkeys(estimates, pooled) if uniform else estimates
     found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"

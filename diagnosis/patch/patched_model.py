@@ -36,7 +36,6 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-_FAITHFUL = 0.02  # of a moment's greatest value: what a polynomial may miss of it
 _GRID = 201
 _NAMES = frozenset(
     {"b", "r", "Kr", "gravity_angle", *TEXTBOOK_POWERS, *(name for name, *_ in (*OF_ANGLE, *OF_RATE))}
@@ -107,7 +106,9 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
             found[np.abs(found) < 1e-9 * greatest] = 0.0
             found /= sizes
             missed = float(np.max(np.abs(columns @ found - wanted)) / greatest)
-            if missed < _FAITHFUL and not (name == "r" and native[0] + law.damping + found[0] < 0.0):
+            if missed < data.settings.answer.patched_misses and not (
+                name == "r" and native[0] + law.damping + found[0] < 0.0
+            ):
                 native += found
                 if missed >= 1e-6:
                     notes.append(

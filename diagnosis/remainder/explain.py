@@ -11,7 +11,6 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
-from diagnosis import policy
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
 from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
@@ -20,6 +19,7 @@ from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places,
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.remainder.formula import choose, propose
 from diagnosis.search.investigate import Study
+from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
 from identification.printing import unit_mark, with_std
 from tunnel_sim.vocabulary.record import Array
@@ -27,8 +27,6 @@ from tunnel_sim.vocabulary.record import Array
 Events = tuple[Mapping[str, Any], ...]
 """By run, the largest part first: ``run``, its ``share`` of what is closed, and ``from_s`` and ``to_s`` since the
 start of the record."""
-
-_BESIDE = 2.0  # standard deviations
 
 
 def closable(study: Study, *, significant: bool, decided: bool = True) -> Closable | None:
@@ -57,7 +55,8 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     line = steady_line(unexplained)
     single = {} if line is None else {"line": line.evidence}
     single |= {kind: unexplained.single(kind) for kind in SINGLE}
-    kind = chosen_kind(common, single)
+    chosen = study.settings.remainder
+    kind = chosen_kind(common, single, chosen)
     if kind is None:
         return None
     law, shape = None, None
@@ -78,7 +77,12 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     )
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
     words = _words(
-        kind, ceilings, law, where, "what the causes leave" if study.named and decided else "the gap"
+        kind,
+        ceilings,
+        law,
+        where,
+        "what the causes leave" if study.named and decided else "the gap",
+        chosen,
     )
     if line is not None and kind == "line":
         unit = similarity.reading
@@ -87,29 +91,31 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         words += (
             f" The line is at {with_std(*sizes[:2])} Hz, with an amplitude of {with_std(*sizes[2:])} "
             f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
-            f"{100.0 * policy.LOCAL_FALSE_ALARM_RATE:.2g} % of campaigns."
+            f"{100.0 * chosen.steady_line_rate:.2g} % of campaigns."
         )
     excess = left.excess / left.problem.data.mean_block
     return Closable(excess, ceilings, kind, words, where, shape, law)
 
 
-def chosen_kind(common: Mapping[str, Evidence], single: Mapping[str, Evidence]) -> str | None:
+def chosen_kind(
+    common: Mapping[str, Evidence], single: Mapping[str, Evidence], chosen: RemainderSettings
+) -> str | None:
     """The simplest kind of `KINDS` that closes about as much as any; of common laws the simpler come first.
 
     None where only kinds whose shares are not determined could close more than a small share.
     """
     of_all, of_one = (
-        {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined}
+        {kind: one.ceiling for kind, one in kinds.items() if one.ceiling.determined(chosen)}
         for kinds in (common, single)
     )
     most_of_all, most_of_one = (
         max((c.closed for c in kinds.values()), default=0.0) for kinds in (of_all, of_one)
     )
-    if max(most_of_all, most_of_one) < policy.SMALL_SHARE:
+    if max(most_of_all, most_of_one) < chosen.least_closed:
         return "noise" if len(of_all) + len(of_one) == len(common) + len(single) else None
-    among = of_all if most_of_all >= policy.MOST * most_of_one else of_one
+    among = of_all if most_of_all >= chosen.common_first * most_of_one else of_one
     best = max(among.values(), key=lambda one: one.closed)
-    least = best.closed - max(policy.AS_MUCH, best.std)
+    least = best.closed - max(chosen.closes_alike, best.std)
     return next(kind for kind, one in among.items() if one.closed >= least)
 
 
@@ -128,7 +134,7 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
     sizes = np.array([before[run].size for run in both], np.float64)
     closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-    if closed < policy.SMALL_SHARE:
+    if closed < base.settings.remainder.formula_closes:
         return None
     own, values = {}, {}
     for place, (name, given) in enumerate(proposal.table["parameters"].items()):
@@ -143,13 +149,21 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     return Law({**proposal.table, "parameters": own}, values, closed, std)
 
 
-def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Events, left: str) -> str:
+def _words(
+    kind: str,
+    ceilings: tuple[Ceiling, ...],
+    law: Law | None,
+    where: Events,
+    left: str,
+    chosen: RemainderSettings,
+) -> str:
     """What could be closed of what is left, in a few sentences."""
-    determined = [one for one in ceilings if one.determined]
+    determined = [one for one in ceilings if one.determined(chosen)]
     if kind == "noise":
         most = max(determined, key=lambda one: one.closed)
+        bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
         return (
-            f"No more than {percent(max(most.closed, 0.0) + _BESIDE * most.std)} of {left} could be closed by any "
+            f"No more than {bound} of {left} could be closed by any "
             "smooth moment or error of the reading: the rest is noise."
         )
     best = next(one for one in ceilings if one.kind == kind)
@@ -160,7 +174,7 @@ def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Eve
     # of others, those that the kind is not a case of
     included = (kind, "state") if kind in ("angle", "rate") else (kind,)
     others = [one for one in determined if one.held_out == best.held_out and one.kind not in included]
-    alike = [one for one in others if one.closed >= best.closed - max(policy.AS_MUCH, best.std)]
+    alike = [one for one in others if one.closed >= best.closed - max(chosen.named_alike, best.std)]
     if alike:
         said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")
     elif others:
@@ -177,8 +191,6 @@ def _words(kind: str, ceilings: tuple[Ceiling, ...], law: Law | None, where: Eve
 
 
 _POINTS, _MAP = 41, 13
-_LISTED = 0.1  # of the largest run's part: from it on a run is among the events
-_INSIDE = 0.8  # of an event's energy lies within the times given
 
 _OVER: Mapping[str, tuple[str, ...]] = {
     "angle": ("angle",), "rate": ("rate",), "state": ("angle", "rate"), "wind": ("angle", "rate"),
@@ -238,9 +250,9 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
         precision: one over the variance of a coefficient in the prior, in the basis' units.
 
     Returns:
-        The times are those between which four fifths of a run's part lie.
+        The times are those between which most of a run's part lies.
     """
-    drops, spans = [], []
+    drops, spans, share = [], [], unexplained.fit.settings.remainder.event_share
     for unit, columns in zip(unexplained.runs, unexplained.columns(kind), strict=True):
         path = unit.path
         part = normal(unit.left(path.residual), unit.left(columns))
@@ -249,7 +261,7 @@ def events(unexplained: Unexplained, kind: str, precision: float) -> Events:
         # the shortest interval of time with most of the energy
         energy = (SINGLE[kind](path, unexplained.ranges) @ solution) ** 2
         sums = np.concatenate([[0.0], np.cumsum(energy)])
-        ends = np.minimum(np.searchsorted(sums, sums[:-1] + _INSIDE * sums[-1]), sums.size)
+        ends = np.minimum(np.searchsorted(sums, sums[:-1] + share * sums[-1]), sums.size)
         lengths = np.where(ends < sums.size, ends - np.arange(energy.size), energy.size + 1)
         first = int(np.argmin(lengths))
         time = path.time + path.run.start
@@ -261,10 +273,11 @@ def _listed(
     unexplained: Unexplained, drops: list[float], whole: float, spans: list[tuple[float, float]]
 ) -> Events:
     ranked = sorted(zip(unexplained.paths, drops, spans, strict=True), key=lambda one: -one[1])
+    least = unexplained.fit.settings.remainder.events_from * max(drops)
     return tuple(
         {"run": path.run.id, "share": drop / whole, "from_s": first, "to_s": last}
         for path, drop, (first, last) in ranked
-        if drop > _LISTED * max(drops)
+        if drop > least
     )
 
 
@@ -296,7 +309,7 @@ class SteadyLine:
 def steady_line(unexplained: Unexplained) -> SteadyLine | None:
     """The strongest line at one frequency in what a fit leaves, away from the motion and its harmonics.
 
-    None where chance may explain it, at a rate of `LOCAL_FALSE_ALARM_RATE` for all frequencies together, and where
+    None where chance may explain it, at one rate for all frequencies together, and where
     it is the skirt of something broader or does not keep its phase in a run.
     """
     start, floor = _strongest(unexplained)
@@ -319,7 +332,7 @@ def steady_line(unexplained: Unexplained) -> SteadyLine | None:
             before = float(residual[own] @ residual[own])
             predicted += before - float(np.sum((residual[own] - waves[own] @ other) ** 2)) + 2.0 * floor
             fitted += before - float(np.sum((residual[own] - waves[own] @ mine) ** 2)) - 2.0 * floor
-    if predicted / max(fitted, 1e-300) < policy.MOST:
+    if predicted / max(fitted, 1e-300) < unexplained.fit.settings.remainder.steady_line_halves:
         return None
     drops = _drops(unexplained, frequency)
     whole = float(drops.sum())
@@ -376,8 +389,9 @@ def _strongest(unexplained: Unexplained) -> tuple[float | None, float]:
     with np.errstate(divide="ignore"):
         chance = np.where(count > 0, np.log(chdtrc(2.0 * np.maximum(count, 1.0), power)), 0.0)
     best = int(np.argmin(chance))
-    clear = power[best] >= policy.LINE_CONTRAST * 2.0 * count[best]
-    if not clear or chance[best] + np.log(grid.size) > np.log(policy.LOCAL_FALSE_ALARM_RATE):
+    chosen = unexplained.fit.settings.remainder
+    clear = power[best] >= chosen.steady_line_contrast * 2.0 * count[best]
+    if not clear or chance[best] + np.log(grid.size) > np.log(chosen.steady_line_rate):
         return None, 1.0
     return float(grid[best]), float(floors[best] / count[best])
 

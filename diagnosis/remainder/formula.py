@@ -19,7 +19,6 @@ from diagnosis.likelihood.ceiling import Normal, Ridge, Unexplained, held_out, t
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.paths import Ranges
 from diagnosis.model.parameters import Point
-from diagnosis.policy import AS_MUCH, FALSE_ALARM_RATE
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.physics.expression import Expression, parse
@@ -133,7 +132,6 @@ def _places(r: Ranges) -> Array:
     return np.linspace(0.08, 0.92, 15) * r.angle
 
 
-_MOST_TERMS = 3
 _TRIED = 10  # terms of the greatest drop of χ² that are tried on held-out runs
 _FAR = 1e3  # bounds of a coefficient, in its first value
 _NEAR = 4.0  # bounds of a width or place, likewise
@@ -175,11 +173,12 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
         closable: drop of χ² on held-out runs that the kind's own basis reaches.
 
     Returns:
-        The formula; None where no term is supported: by chance alone one would be in `FALSE_ALARM_RATE` of the
-        campaigns, and it must predict held-out runs.
+        The formula; None where no term is supported beyond chance, or it does not predict held-out runs.
     """
     found = _chosen(unexplained, kind, closable)
-    if kind in ("angle", "rate") and (found is None or found.gained < (1.0 - AS_MUCH) * closable):
+    if kind in ("angle", "rate") and (
+        found is None or found.gained < (1.0 - unexplained.fit.settings.remainder.wider_open) * closable
+    ):
         wider = _chosen(unexplained, "state", closable)
         found = found if wider is None or (found and found.gained >= wider.gained) else wider
     return found
@@ -215,11 +214,13 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
     whole = total(parts)
     c = whole.free
     own = np.diag(whole.matrix)[c:]
-    threshold = float(chdtri(1, FALSE_ALARM_RATE / len(candidates)))
+    settings = unexplained.fit.settings.remainder
+    threshold = float(chdtri(1, settings.term_rate / len(candidates)))
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
-    while len(chosen) < _MOST_TERMS and gained < (1.0 - AS_MUCH) * closable:
+    enough = (1.0 - settings.formula_open) * closable
+    while len(chosen) < settings.most_terms and gained < enough:
         known = [*range(c), *(c + i for i in chosen)]
         inner = whole.matrix[np.ix_(known, known)]
         width = np.sqrt(np.maximum(np.diag(inner), 1e-300))
@@ -235,7 +236,7 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
             some = [_of(part, [*chosen, i]) for part in parts]
             after = held_out(some, unexplained.groups, None)
             tried.append((before - float(after[unexplained.seen].sum()), i))
-        if not tried or max(tried)[0] - gained < max(AS_MUCH * closable, threshold):
+        if not tried or max(tried)[0] - gained < max(settings.term_gain * closable, threshold):
             break
         gained, best = max(tried)
         chosen.append(best)
@@ -278,7 +279,7 @@ def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal |
     for first in (common, base.point.common):
         with suppress(FitError, np.linalg.LinAlgError):
             found.append(fit(problem, Point(np.concatenate([first, own]), base.point.release)))
-            if found[-1].excess < AS_MUCH * base.excess:
+            if found[-1].excess < base.settings.remainder.first_start * base.excess:
                 break
     best = min((f for f in found if np.isfinite(f.total)), key=lambda f: f.total, default=None)
     return None if best is None or best.total >= base.total else Proposal(table, best)

@@ -14,7 +14,6 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.model.parameters import Point
-from diagnosis.policy import WORTH_NAMING
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, restricted
 from tunnel_sim.effects import Effect
 
@@ -40,8 +39,8 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
         gap: what the nominal model leaves.
 
     Returns:
-        Those of `WORTH_NAMING`, weighed like sets of effects; empty where there is nothing to choose, or one choice
-        only is worth naming.
+        Those probable enough to be stated, weighed like sets of effects; empty where there is nothing to choose, or
+        one choice only is stated.
     """
     others = [
         other
@@ -52,10 +51,11 @@ def choices(chosen: Hypothesis, gap: ChannelMisfit) -> tuple[Choice, ...]:
     if not others:
         return ()
     sets = [chosen, *others]
-    scale = Scale.of(sets, gap)
+    weighing = chosen.fit.settings.weighing
+    scale = Scale.of(sets, gap, weighing)
     logs = np.array([scale.weight(one) for one in sets])
     weights = np.exp(logs - logs.max())
-    kept = weights / weights.sum() >= WORTH_NAMING
+    kept = weights / weights.sum() >= weighing.choice_kept
     if kept.sum() < 2:
         return ()
     shares = weights * kept / (weights @ kept)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.prepare import Stretches, fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
@@ -45,22 +44,23 @@ def grow(
 
     Returns:
         Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
-        could not rise, and at `MOST_CAUSES`.
+        could not rise, and at the most causes named.
     """
     found: dict[tuple[str, ...], Hypothesis] = {} if first is None else {first.names: first}
     level, gap = [Hypothesis((), nominal) if first is None else first], misfit(nominal)
+    chosen = nominal.settings.search
     while level:
         children = sets_with_one_more(level, kinds, progress)
-        scale = Scale.of(children, gap)
+        scale = Scale.of(children, gap, nominal.settings.weighing)
         if all(scale.form_may_gain(child) for child in children):
-            count = policy.FREED_HYPOTHESES if not level[0].effects else 1
-            children = with_forms(children, gap, policy.AS_MUCH * level[0].fit.excess, count)
+            count = chosen.freed_hypotheses if not level[0].effects else 1
+            children = with_forms(children, gap, chosen.form_open * level[0].fit.excess, count)
         found |= {child.names: child for child in children}
         going, level = going_on(children, level, gap), []
         for hypothesis in going:  # those that change the readings alike would grow alike
             if not any(_same_change(hypothesis.fit, other.fit, nominal) for other in level):
                 level.append(hypothesis)
-        level = level[: policy.GROWN_FROM]
+        level = level[: chosen.grown_from]
     return sorted(found.values(), key=lambda h: h.fit.total)
 
 
@@ -76,9 +76,9 @@ def second_mode_alone(nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis
 
 
 def _same_change(one: Fit, other: Fit, nominal: Fit) -> bool:
-    """Whether two fits differ by less than `AS_MUCH` of the power by which they change the nominal one."""
+    """Whether two fits differ by little of the power by which they change the nominal one."""
     apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.residuals, other.residuals, strict=True))
-    return apart < policy.AS_MUCH * (nominal.total - max(one.total, other.total))
+    return apart < nominal.settings.search.same_change * (nominal.total - max(one.total, other.total))
 
 
 def going_on(
@@ -89,7 +89,8 @@ def going_on(
     Args:
         gap: what the nominal model leaves.
     """
-    scale = Scale.of((*children, *parents), gap)
+    settings = parents[0].fit.settings
+    scale = Scale.of((*children, *parents), gap, settings.weighing)
     ranked = sorted(children, key=lambda h: -scale.weight(h))
     if not ranked or not _may_gain(ranked[0], scale):
         return []
@@ -97,7 +98,7 @@ def going_on(
     for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
         first = not any(parent.effects for parent in smaller)
-        if first or scale.weight(child) > max(map(scale.weight, smaller)) - policy.GROWTH_LOSS:
+        if first or scale.weight(child) > max(map(scale.weight, smaller)) - settings.search.growth_loss:
             going.append(child)
     return going
 
@@ -107,7 +108,7 @@ def _may_gain(hypothesis: Hypothesis, scale: Scale) -> bool:
     if not hypothesis.effects:
         return True
     rises = scale.greatest(hypothesis) > scale.weight(hypothesis)
-    return rises and len(hypothesis.effects) < policy.MOST_CAUSES
+    return rises and len(hypothesis.effects) < hypothesis.fit.settings.search.most_causes
 
 
 def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -205,18 +206,23 @@ def _worth_fitting(
     Beside other effects, those that are predicted to do no more than a needless one are left out.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
-    scale = misfit_scale(misfit(parent.fit))
-    scored.sort(key=lambda item: min(log_misfit(start.predicted, scale, OF_MOTION) for start in item[1]))
+    weighing, chosen = parent.fit.settings.weighing, parent.fit.settings.search
+    scale = misfit_scale(misfit(parent.fit), weighing)
+    scored.sort(
+        key=lambda item: min(
+            log_misfit(start.predicted, scale, OF_MOTION, weighing.leak) for start in item[1]
+        )
+    )
     if parent.effects:
         needed, own = [], own_gain(parent.fit.problem)
-        for kind, starts in scored[: policy.GROWN_BY]:
+        for kind, starts in scored[: chosen.grown_by]:
             by_chance = own_gain(starts[0].problem) - own
-            if starts[0].predicted_drop > policy.NEEDLESS_CHI2 + by_chance:
+            if starts[0].predicted_drop > chosen.predicted_drop + by_chance:
                 needed.append((kind, starts))
         return needed
-    limit = policy.PREDICTED_SHARE * parent.fit.total
+    limit = chosen.predicted_share * parent.fit.total
     return [
-        item for i, item in enumerate(scored) if i < policy.ALWAYS_FITTED or item[1][0].predicted_drop > limit
+        item for i, item in enumerate(scored) if i < chosen.always_fitted or item[1][0].predicted_drop > limit
     ]
 
 
@@ -280,11 +286,12 @@ def grow_in_stretches(
         nominal, long = first, short
     level, found = [_Grown(Hypothesis((), nominal), Hypothesis((), first))], []
     able, gap = [kind for kind in kinds if kind.autonomous], misfit(nominal)
+    chosen = data.settings.search
     while level:
         # sets with one effect more, from the better of two starts where there are two
         tried = sets_with_one_more([g.short for g in level if g.short is not None], able, progress)
         grown: dict[tuple[str, ...], _Grown] = {}
-        for h in sorted(tried, key=lambda h: h.fit.total)[: policy.GROWN_BY]:
+        for h in sorted(tried, key=lambda h: h.fit.total)[: chosen.fitted_longer]:
             with suppress(FitError, np.linalg.LinAlgError):
                 longer, _ = fit_longer(h.fit, short, data, long_stretch(short))
                 grown[h.names] = _Grown(replace(h, fit=longer), h)
@@ -294,13 +301,14 @@ def grow_in_stretches(
             if other is None or child.fit.total < other.long.fit.total:
                 grown[child.names] = _Grown(child, None if other is None else other.short)
         least = min(
-            policy.AS_MUCH * level[0].long.fit.excess, policy.MODEL_ERROR**2 * gap.motion / nominal.count
+            chosen.form_open * level[0].long.fit.excess,
+            data.settings.weighing.model_error**2 * gap.motion / nominal.count,
         )
         children = with_forms([child.long for child in grown.values()], gap, least)
         found += children
         parents = [g.long for g in level]
         going = _of_each(parents, going_on(children, parents, gap))
-        level = [replace(grown[h.names], long=h) for h in going[: policy.GROWN_FROM]]
+        level = [replace(grown[h.names], long=h) for h in going[: chosen.grown_from]]
     return InStretches(nominal, long, tuple(sorted(found, key=lambda h: h.fit.total)))
 
 

@@ -14,13 +14,11 @@ from diagnosis.likelihood.other_minima import deepest
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
 from diagnosis.model.parameters import Point
-from diagnosis.policy import FREED_HYPOTHESES, MOST, NEEDLESS_CHI2, NEEDLESS_SPRING
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
-from tunnel_sim.effects.base import IN_RUNS
+from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
 
 _POLISH = 1e-7  # drop of χ², as a share of it, at which a polished fit has converged
-_AS_WELL = 1.01  # of χ², up to which a fit explains the readings as well as another
 _SAME_READING = 0.2  # noise standard deviations of a block mean
 
 
@@ -62,7 +60,8 @@ class Hypothesis:
         )
         spring = self.fit.fitted_spring
         if spring is not None:
-            numbers -= 2 * (spring < NEEDLESS_SPRING * linear_coefficients(self.fit, 0)[2])
+            needless = self.fit.settings.weighing.needless_spring * linear_coefficients(self.fit, 0)[2]
+            numbers -= 2 * (spring < needless)
         return numbers
 
     @cached_property
@@ -73,12 +72,12 @@ class Hypothesis:
         harmonics.
         """
         problem = self.fit.problem
-        found = misfit(self.fit).excess
+        found, gain = misfit(self.fit).excess, self.fit.settings.weighing.own_number_gain
         for kind in problem.effects:
             count = len(kind.own_numbers(problem.instants)) * len(problem.data.runs)
             if count:
                 channel = "frequency" if kind.skips else "harmonics"
-                found[CHANNELS.index(channel)] += 0.5 * NEEDLESS_CHI2 * count
+                found[CHANNELS.index(channel)] += gain * count
         return found
 
     def fitted_set(self, nominal: Fit, *, outside: bool = False) -> FittedSet:
@@ -98,51 +97,59 @@ class Scale:
     Args:
         misfit: χ² by channel, shape (6,).
         least: χ² by channel, shape (6,), 0 or less.
+        chosen: how sets are weighed.
     """
 
     misfit: Array
     least: Array
+    chosen: WeighingSettings
 
     @classmethod
-    def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit) -> Scale:
+    def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit, chosen: WeighingSettings) -> Scale:
         """The scale of some sets, from what the nominal model leaves."""
-        return cls(misfit_scale(gap), least_excess([h.excess for h in sets]))
+        return cls(misfit_scale(gap, chosen), least_excess([h.excess for h in sets]), chosen)
 
     def weight(self, hypothesis: Hypothesis) -> float:
         """Logarithm of the weight of a set."""
-        left = hypothesis.excess - self.least
-        return log_weight(left, self.misfit, len(hypothesis.effects), hypothesis.further_numbers)
+        return self._log_weight(hypothesis.excess - self.least, hypothesis)
 
     def greatest(self, hypothesis: Hypothesis) -> float:
         """The same of the set with one more effect that leaves nothing."""
-        return log_weight(np.zeros(6), self.misfit, len(hypothesis.effects) + 1, hypothesis.further_numbers)
+        return self._log_weight(np.zeros(6), hypothesis, effects=1)
 
     def form_may_gain(self, hypothesis: Hypothesis) -> bool:
         """Whether the weight of a set would rise with one more form that leaves nothing."""
-        numbers = hypothesis.further_numbers + 1
-        freed = log_weight(np.zeros(6), self.misfit, len(hypothesis.effects), numbers)
-        return freed > self.weight(hypothesis)
+        return self._log_weight(np.zeros(6), hypothesis, numbers=1) > self.weight(hypothesis)
+
+    def _log_weight(self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0) -> float:
+        """Logarithm of the weight of a set with so many more effects and numbers that leaves ``left``."""
+        count, further = len(of.effects) + effects, of.further_numbers + numbers
+        return log_weight(left, self.misfit, count, further, self.chosen)
 
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
     """That of more weight beside what the nominal model leaves; the first if they are equal."""
-    return other if one is None else max(one, other, key=Scale.of((one, other), gap).weight)
+    if one is None:
+        return other
+    return max(one, other, key=Scale.of((one, other), gap, other.fit.settings.weighing).weight)
 
 
 def own_gain(problem: Problem) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
-    return float(0.5 * NEEDLESS_CHI2 * problem.parameters.of_effects * len(problem.data.runs))
+    gain = problem.data.settings.weighing.own_number_gain
+    return float(gain * problem.parameters.of_effects * len(problem.data.runs))
 
 
 def is_plausible(fitted: Fit) -> bool:
-    """Whether every effect of a fit is still what its name means, in at least half of the runs.
+    """Whether every effect of a fit is still what its name means, in enough of the runs.
 
     Gravity that cancels most of an unstated spring is not: what both leave is called a spring that is not linear.
     Neither is a power law whose free exponent ends at a bound: the readings ask for another law.
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
+    chosen = fitted.settings.search
     spring, gravity = fitted.fitted_spring, sum(effect.stiffness_at_rest for effect in effects)
-    if spring is not None and -gravity > MOST * spring:
+    if spring is not None and -gravity > chosen.gravity_cancels * spring:
         return False
     exponents = [
         f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent
@@ -150,7 +157,9 @@ def is_plausible(fitted: Fit) -> bool:
     if any(name in problem.names and fitted.bound(name) for name in exponents):
         return False
     motions = [2.0 * np.pi * resonance(fitted, i) for i in range(len(fitted.problem.data.runs))]
-    return all(np.mean([effect.plausible(omega) for omega in motions]) >= IN_RUNS for effect in effects)
+    return all(
+        np.mean([effect.plausible(omega) for omega in motions]) >= chosen.plausible_runs for effect in effects
+    )
 
 
 def turned_back(fitted: Fit) -> Fit:
@@ -173,7 +182,8 @@ def turned_back(fitted: Fit) -> Fit:
     common[[problem.names.index(name) for name in signs]] *= -1.0
     release[:, 0] -= turn
     turned = try_fit(problem, Point(common, release))
-    return fitted if turned is None or turned.total >= _AS_WELL * fitted.total else turned
+    greatest = fitted.settings.search.turned_as_well * fitted.total
+    return fitted if turned is None or turned.total >= greatest else turned
 
 
 def restricted(whole: Fit, names: Collection[str]) -> Fit:
@@ -203,7 +213,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
 
 
 def with_forms(
-    found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int = FREED_HYPOTHESES
+    found: Sequence[Hypothesis], gap: ChannelMisfit, least: float, count: int | None = None
 ) -> list[Hypothesis]:
     """Free the forms of the best hypotheses where the textbook form leaves a good part open and they gain weight.
 
@@ -212,14 +222,16 @@ def with_forms(
     Args:
         gap: what the nominal model leaves.
         least: excess of a textbook form from which freeing it is tried, dimensionless (noise variances).
-        count: how many of the best are tried with free forms.
+        count: how many of the best are tried with free forms; None: as the settings say.
 
     Returns:
         All hypotheses, best first.
     """
     ranked = sorted(found, key=lambda h: h.fit.total)
-    for place, hypothesis in enumerate(ranked[:count]):
-        textbook = hypothesis.fit
+    for place, hypothesis in enumerate(ranked):
+        textbook, chosen = hypothesis.fit, hypothesis.fit.settings.search
+        if place == (chosen.freed_hypotheses if count is None else count):
+            break
         if textbook.excess > least:
             textbook = deepest(textbook)
             ranked[place] = hypothesis = dataclasses.replace(hypothesis, fit=textbook)
@@ -234,7 +246,7 @@ def with_forms(
                 ]
                 # a form that the runs cannot tell has no standard deviation
                 pulls = [(freed.value(n) - v) / s for n, v in values if (s := freed.std(n)) > 0.0]
-                if max(np.square(pulls), default=0.0) > (1.0 - MOST) * textbook.excess * textbook.count:
+                if max(np.square(pulls), default=0.0) > chosen.form_needed * textbook.excess * textbook.count:
                     needed.append(kind.name)
         if needed and tuple(needed) != freed.problem.free_forms:
             freed = _free_forms(textbook, only=needed) or freed

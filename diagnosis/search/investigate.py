@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from diagnosis import policy
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
 from diagnosis.likelihood.mains_lines import fastest, mains_interval
@@ -40,6 +39,7 @@ from diagnosis.search.outside import two_springs
 from diagnosis.search.random_moments import RandomAnswer, weigh_random_moments, without_the_random_moment
 from diagnosis.search.resolved import unresolved
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
+from diagnosis.settings import Settings
 from diagnosis.where.place import Place, locate
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -105,6 +105,11 @@ class Study:
     def model(self) -> NominalModel:
         """The nominal model."""
         return self.nominal.problem.data.model
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the diagnosis."""
+        return self.nominal.settings
 
     @property
     def read_off(self) -> tuple[str, ...]:
@@ -184,18 +189,20 @@ def investigate(
     kinds: Sequence[type[Effect]] = ALL_EFFECTS,
     progress: Progress | None = None,
     model: NominalModel | None = None,
+    settings: Settings = Settings(),
 ) -> Study:
     """Test a campaign for a gap, and weigh the effects that may cause it, in the units of the similar campaign.
 
     Args:
         progress: called with the name of each step.
         model: the nominal model of the campaign; None: that of its kind.
+        settings: of the diagnosis.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     clock = _Clock(progress)
-    found = _test(campaign, model or nominal_model(campaign), kinds, clock)
+    found = _test(campaign, model or nominal_model(campaign), kinds, clock, settings)
     if found.test.detected:
         with clock.step("where"):
             found = replace(found, place=located(found))
@@ -205,16 +212,19 @@ def investigate(
     return replace(found, seconds=clock.seconds)
 
 
-def nominal_study(campaign: Campaign, kinds: Sequence[type[Effect]]) -> Study:
+def nominal_study(
+    campaign: Campaign, kinds: Sequence[type[Effect]], settings: Settings = Settings()
+) -> Study:
     """Test a campaign for a gap, and fit no effect: the study up to the fit of the nominal model.
 
     Args:
         kinds: the effects that may be read off the records.
+        settings: of the diagnosis.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    return _test(campaign, nominal_model(campaign), kinds, _Clock(None))
+    return _test(campaign, nominal_model(campaign), kinds, _Clock(None), settings)
 
 
 def fit_nominal(data: Data) -> Fit:
@@ -238,23 +248,30 @@ def fit_nominal(data: Data) -> Fit:
     return found
 
 
-def _test(measured: Campaign, model: NominalModel, kinds: Sequence[type[Effect]], clock: _Clock) -> Study:
+def _test(
+    measured: Campaign,
+    model: NominalModel,
+    kinds: Sequence[type[Effect]],
+    clock: _Clock,
+    settings: Settings,
+) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
     campaign, similarity = similar_campaign(measured, model)
     model = model.similar(similarity)
     allowed = {kind.name for kind in kinds}
     with clock.step("noise"):
-        noise, trend, step = campaign_noise(campaign), noise_trend(campaign), reading_step(campaign)
+        noise = campaign_noise(campaign, settings.noise)
+        trend, step = noise_trend(campaign), reading_step(campaign)
         stated = campaign.sensor.resolution
-        coarse = COARSE_STEP.name in allowed and stated is not None and step > policy.CLEARLY_MORE * stated
+        least = settings.read_off.coarse_step
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > least * stated
     with clock.step("nominal fit"):
-        nominal = fit_nominal(prepare(campaign, noise.variance, similarity, model=model))
+        nominal = fit_nominal(prepare(campaign, noise.variance, similarity, model=model, settings=settings))
         cleaned, hum, line = campaign, None, None
         if HUM.name in allowed:
             # block means short enough to show every line of the mains that the samples show
-            problem = Problem(
-                prepare(campaign, noise.variance, similarity, mains_interval(similarity), model)
-            )
+            interval = mains_interval(similarity)
+            problem = Problem(prepare(campaign, noise.variance, similarity, interval, model, settings))
             residuals = scaled_residuals(problem, nominal.point)
             line = find_hum(replace(nominal, problem=problem, residuals=residuals))
         if line is not None:
@@ -262,9 +279,11 @@ def _test(measured: Campaign, model: NominalModel, kinds: Sequence[type[Effect]]
             frequency = refine_frequency(campaign, line, motion)
             for _ in range(2):  # as a hum may count as noise at first
                 variance = float(np.mean(list(noise.variance.values())))
-                cleaned, hum = remove_hum(campaign, frequency, variance, motion)
-                noise = campaign_noise(cleaned)
-            nominal = fit_nominal(prepare(cleaned, noise.variance, similarity, model=model))
+                cleaned, hum = remove_hum(campaign, frequency, variance, settings.read_off, motion)
+                noise = campaign_noise(cleaned, settings.noise)
+            nominal = fit_nominal(
+                prepare(cleaned, noise.variance, similarity, model=model, settings=settings)
+            )
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
         missed = misses_motion(nominal) and not campaign.driven
         cut = missed and second_mode_alone(nominal, kinds) is None
@@ -300,7 +319,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = _compared(found, found.nominal, clock)
     found, weighed = _resolved(found, found.nominal)
     best = None if found.model.restored else _best(found, weighed)
-    if best is not None and best.fit.chance < 1.0:
+    if best is not None and best.fit.chance < found.settings.search.moment_chance:
         again = _weigh_by_moment(found, weighed, fitted, clock)
         if again is not None:
             return again
@@ -329,16 +348,16 @@ def _weigh_by_moment(
     Returns:
         None where no set explains the angle, and none leaves a small moment.
     """
-    data = found.nominal.problem.data
-    # the nominal model in the noise that the likeliest set leaves, and that others worth naming leave
+    data, chosen = found.nominal.problem.data, found.settings.search
+    # the nominal model in the noise that the likeliest set leaves, and that other probable ones leave
     bases: list[Fit] = []
     for answer in weighed:
         left = found.hypothesis(answer.effects)
-        if left is None or (bases and answer.probability < policy.WORTH_NAMING):
+        if left is None or (bases and answer.probability < chosen.moment_noise_from):
             continue
         with suppress(FitError, np.linalg.LinAlgError):
             bases.append(fit(Problem(by_moment(left.fit)), found.nominal.point))
-    small = [base for base in bases if policy.MOMENT_LEFT * (1.0 + base.excess) >= 1.0]
+    small = [base for base in bases if chosen.moment_left * (1.0 + base.excess) >= 1.0]
     if not bases or (not small and weighed[0].effects == UNKNOWN):
         return None
     base = (small or bases)[0]
@@ -391,10 +410,10 @@ def _without(found: Study, names: tuple[str, ...], lost: tuple[str, ...]) -> Stu
 
 
 def _choices(found: Study) -> dict[tuple[str, ...], tuple[Choice, ...]]:
-    """By names of the answers worth naming, the choices that whole runs cannot exclude."""
-    nominal, chosen = misfit(found.nominal), {}
+    """By names of the probable answers, the choices that whole runs cannot exclude."""
+    nominal, chosen, least = misfit(found.nominal), {}, found.settings.search.choices_from
     for answer in found.weighed:
-        hypothesis = found.stated(answer.effects) if answer.probability >= policy.WORTH_NAMING else None
+        hypothesis = found.stated(answer.effects) if answer.probability >= least else None
         if hypothesis is not None and hypothesis.fit.problem.data is found.nominal.problem.data:
             chosen[answer.effects] = choices(hypothesis, nominal)
     return {names: several for names, several in chosen.items() if several}
@@ -403,7 +422,8 @@ def _choices(found: Study) -> dict[tuple[str, ...], tuple[Choice, ...]]:
 def _compared(found: Study, base: Fit, clock: _Clock) -> Study:
     """The study with the sets that the answer has to be compared with."""
     found = _pruned(found, base, clock)
-    likely = [w.effects for w in _weighed(found, base) if w.probability > policy.WORTH_NAMING]
+    least = found.settings.search.two_springs_from
+    likely = [w.effects for w in _weighed(found, base) if w.probability > least]
     answers = [hypothesis for names in likely if (hypothesis := found.hypothesis(names)) is not None]
     with clock.step("pruning"):
         return replace(found, outside=tuple(two_springs(answers, found.hypotheses, base)))
@@ -419,7 +439,7 @@ def _pruned(found: Study, base: Fit, clock: _Clock) -> Study:
         found = replace(found, hypotheses=(*known, *exchange(best, known, base)))
     with clock.step("forms"):  # of rival sets, free where that pays: growth frees those of few sets
         weighed = [w for w in _weighed(found, base) if w.effects != UNKNOWN]
-        near = [w.effects for w in weighed if w.probability > policy.WORTH_NAMING]
+        near = [w.effects for w in weighed if w.probability > found.settings.search.rival_forms]
         if len(near) < 2:
             return found
         rivals = [h for h in found.hypotheses if h.names in near and not h.forms]
@@ -435,12 +455,12 @@ def _best(found: Study, weighed: Sequence[Weighed]) -> Hypothesis | None:
 
 def _weighed(found: Study, base: Fit) -> list[Weighed]:
     """The answers with their probabilities, the answer first; shares of the gap that ``base`` leaves."""
-    nominal = misfit(base)
+    nominal, weighing = misfit(base), found.settings.weighing
     # χ² by channel that causes read off the records leave under any set of effects: the error of a coarse step is
     # not white, and follows a slow motion, and a hum that is not a pure line leaves a small share of itself
     own = np.zeros(len(CHANNELS))
     if found.hum is not None:
-        own += policy.AS_MUCH * found.hum.excess * base.count * _IN_HARMONICS
+        own += weighing.hum_left * found.hum.excess * base.count * _IN_HARMONICS
     errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
@@ -462,7 +482,7 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
     if found.hum is not None:
         removed = found.hum.excess * base.count * _IN_HARMONICS
         nominal = replace(nominal, chi2=nominal.chi2 + removed)
-    return weigh([replace(one, excess=one.excess - own) for one in sets], nominal)
+    return weigh([replace(one, excess=one.excess - own) for one in sets], nominal, weighing)
 
 
 def _polished(
@@ -496,7 +516,7 @@ def _noise_explains(found: Study, weighed: Sequence[Weighed]) -> bool:
 
     Effects of a few numbers close little of any noise, however it misbehaves.
     """
-    block = found.nominal.problem.data.mean_block
-    small = found.test.noisy and found.nominal.excess < policy.NOISE_EXPLAINS_UP_TO * block
-    closed = any(w.effects != UNKNOWN and w.share < 1.0 - policy.MOST for w in weighed)
-    return found.nominal.chance > 1.0 or (small and not closed)
+    block, weighing = found.nominal.problem.data.mean_block, found.settings.weighing
+    small = found.test.noisy and found.nominal.excess < weighing.noise_explains * block
+    closed = any(w.effects != UNKNOWN and w.share < 1.0 - weighing.noise_excused for w in weighed)
+    return found.nominal.chance > weighing.shares_chance or (small and not closed)

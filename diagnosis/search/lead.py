@@ -11,9 +11,9 @@ from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
-from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import Progress, Study, investigate
 from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
 
@@ -23,6 +23,7 @@ def investigate_with_lead(
     kinds: Sequence[type[Effect]],
     progress: Progress | None = None,
     model: NominalModel | None = None,
+    settings: Settings = Settings(),
 ) -> Study:
     """The study of a campaign; with the lead of the motion where it explains more with no more causes.
 
@@ -33,18 +34,19 @@ def investigate_with_lead(
     Args:
         campaign: in its own units.
         model: its nominal model, in the same units; None: that of its kind.
+        settings: of the diagnosis.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     model = model or nominal_model(campaign)
-    found = investigate(campaign, kinds, progress, model)
+    found = investigate(campaign, kinds, progress, model, settings)
     if not (campaign.driven and found.test.detected):
         return found
     lead = found.similarity.own(_lead(found), "s")
     if lead == 0.0:
         return found
-    again = investigate(campaign, kinds, progress, model.with_lead(lead))
+    again = investigate(campaign, kinds, progress, model.with_lead(lead), settings)
     unexplained = again.causes == UNKNOWN and found.causes != ()
     fewer = found.causes == UNKNOWN or len(again.causes) <= len(found.causes)
     return again if fewer and not unexplained else found
@@ -74,4 +76,5 @@ def _lead(study: Study) -> float:
     best = float(leads[np.argmin(totals)])
     if curve[0] > 0.0:
         best = float(np.clip(-0.5 * curve[1] / curve[0], 0.0, leads[-1]))
-    return best if totals[0] - float(np.polyval(curve, best)) > chdtri(1.0, FALSE_ALARM_RATE) else 0.0
+    least = chdtri(1.0, study.settings.read_off.lead_rate)
+    return best if totals[0] - float(np.polyval(curve, best)) > least else 0.0

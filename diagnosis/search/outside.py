@@ -16,8 +16,6 @@ from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 
-_LEAST_SPRINGS = 3  # with fewer, one effect of the vocabulary fits any frequencies
-
 (ONE_SPRING,) = (kind for kind in ALL_EFFECTS if kind.chosen_spring() is not None)
 
 
@@ -37,10 +35,10 @@ def two_springs(answers: Iterable[Hypothesis], found: Sequence[Hypothesis], nomi
         nominal: the nominal model.
 
     Returns:
-        Fitted hypotheses that lower χ² by more than needless effects would; none with fewer than three springs.
+        Fitted hypotheses that lower χ² by more than needless effects would; none with too few springs.
     """
     data = nominal.problem.data
-    if len(data.springs) < _LEAST_SPRINGS:
+    if len(data.springs) < data.settings.search.two_springs_of:
         return []
     known = {hypothesis.names: hypothesis for hypothesis in found} | {(): Hypothesis((), nominal)}
     pairs: dict[tuple[str, ...], Hypothesis] = {}

@@ -18,7 +18,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.run_data import Data
-from diagnosis.policy import CHANCE_STDS, CLEARLY_MORE, FALSE_ALARM_RATE, NEEDLESS_CHI2, WHITE_INNOVATIONS
+from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
 
@@ -96,11 +96,10 @@ class ProcessNoise:
         """Of −2 ln L of all runs, dimensionless."""
         return float(self.drops.sum())
 
-    @property
-    def price(self) -> float:
-        """What −2 ln L has to fall by beyond one part without a centre, dimensionless."""
+    def price(self, of_part: float) -> float:
+        """What −2 ln L has to fall by beyond one part without a centre, ``of_part`` for each; dimensionless."""
         centres = sum(part.centre > 0.0 for part in self.spectrum)
-        return NEEDLESS_CHI2 * (centres + len(self.spectrum) - 1)
+        return of_part * (centres + len(self.spectrum) - 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,18 +162,19 @@ def random_moments(fit: Fit) -> list[ProcessNoise]:
         wind-on runs or where the model is not stable. A spectrum of another shape than first order has two parts
         of one kind sooner than a part of another kind.
     """
-    channels, narrow = _channels(fit), _wandering(fit.problem.data)
+    channels, narrow, chosen = _channels(fit), _wandering(fit.problem.data), fit.settings.moment
     forms = [form for form in (_BROAD, _CENTRED, narrow) if form is not None]
     found = {form: one for form in forms if (one := _fit(channels, (form,))) is not None}
-    first = likeliest(found.values())
+    first = likeliest(found.values(), chosen)
     if first is None:
         return list(found.values())
     (own,) = (form for form in found if found[form] is first)
-    both = [_fit(channels, (own, other), first) for other in forms]
-    return [*found.values(), *(one for one in both if one is not None and _pays_in_all_runs(one, first))]
+    both = [_fit(channels, (own, other), first, chosen.part_price) for other in forms]
+    paying = (one for one in both if one is not None and _pays_in_all_runs(one, first, chosen))
+    return [*found.values(), *paying]
 
 
-def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise) -> bool:
+def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise, chosen: RandomMomentSettings) -> bool:
     """Whether a second part lowers −2 ln L by more than a needless one may, whichever the runs had been.
 
     It acts in all runs, while an error of the model is in those of one spring or speed. The scatter between the
@@ -184,22 +184,26 @@ def _pays_in_all_runs(both: ProcessNoise, first: ProcessNoise) -> bool:
     if gains.size < 2:
         return False
     std = float(np.std(gains, ddof=1)) * np.sqrt(gains.size)
-    return bool(gains.sum() - CHANCE_STDS * std > NEEDLESS_CHI2)
+    return bool(gains.sum() - chosen.part_stds * std > chosen.part_price)
 
 
-def likeliest(tried: Iterable[ProcessNoise]) -> ProcessNoise | None:
+def likeliest(tried: Iterable[ProcessNoise], chosen: RandomMomentSettings) -> ProcessNoise | None:
     """The random moment that explains residuals best; None where white noise explains them as well."""
-    acting = [one for one in tried if one.drop > NEEDLESS_CHI2]
-    return min(acting, key=lambda one: one.cost + one.price, default=None)
+    acting = [one for one in tried if one.drop > chosen.acts_from]
+    return min(acting, key=lambda one: one.cost + one.price(chosen.part_price), default=None)
 
 
 def _fit(
-    channels: Sequence[_Channel], forms: Sequence[_Form], known: ProcessNoise | None = None
+    channels: Sequence[_Channel],
+    forms: Sequence[_Form],
+    known: ProcessNoise | None = None,
+    price: float = 0.0,
 ) -> ProcessNoise | None:
     """The likeliest spectrum of these parts.
 
     Args:
         known: the fit without the last part; the fit starts there.
+        price: what −2 ln L has to fall by for the last part to pay beside it, dimensionless.
 
     Returns:
         None without channels, or where beside the known parts no point of the last one's grid pays.
@@ -222,7 +226,7 @@ def _fit(
     every = [spectrum(x) for x in grid for _ in channels]
     costs = np.array([c for c, _ in _filtered(list(channels) * len(grid), every)]).reshape(len(grid), -1)
     totals = costs.sum(axis=1)
-    if known is not None and not totals.min() < known.cost - NEEDLESS_CHI2:
+    if known is not None and not totals.min() < known.cost - price:
         return None
     start = grid[int(np.argmin(totals))]
     low, high = np.log([bound for form in forms for bound in form.bounds]).T
@@ -364,12 +368,12 @@ def _discrete(channels: Sequence[_Channel], spectra: Sequence[Spectrum]) -> tupl
     return transition, disturbance + 1e-18 * np.eye(size)
 
 
-def is_steady_noise(result: ProcessNoise) -> bool:
+def is_steady_noise(result: ProcessNoise, chosen: RandomMomentSettings) -> bool:
     """Whether innovations are white and steady, do not come in bursts, and are not those of one run."""
     return (
-        departure_from_white(result) <= WHITE_INNOVATIONS
-        and bursts(result, FALSE_ALARM_RATE) <= CLEARLY_MORE
-        and of_all_runs(result) >= FALSE_ALARM_RATE
+        departure_from_white(result) <= chosen.white_innovations
+        and bursts(result, chosen.burst_rate) <= chosen.burst_power
+        and of_all_runs(result) >= chosen.one_run_rate
     )
 
 

@@ -22,7 +22,6 @@ from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
-from diagnosis.policy import CHANCE_STDS, FALSE_ALARM_RATE, GREATER_PART, MOST_CAUSES, NEEDLESS_CHI2
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import (
@@ -36,7 +35,6 @@ from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
-_FURTHER = 2  # effects added so that the innovations are white
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,21 +78,22 @@ def weigh_random_moments(
         where the likeliest is of a kind that is not among ``kinds``, or where no random moment in the wind could
         leave little enough of the gap.
     """
-    allowed = {kind.random: kind for kind in kinds if kind.random}
-    scale = Scale.of(hypotheses, misfit(nominal))
+    allowed, chosen = {kind.random: kind for kind in kinds if kind.random}, nominal.settings.moment
+    scale = Scale.of(hypotheses, misfit(nominal), nominal.settings.weighing)
     best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
     if not allowed or not _may_act(best, scale):
         return []
     able = [kind for kind in kinds if kind.fitted]
     top = _settled(best, nominal, able)
-    for number in range(_FURTHER + 1):
+    for number in range(chosen.further_effects + 1):
         if number > 0:  # a small effect that no gap shows may keep the innovations from being white
             further = _evident(top, able)
             if not further:
                 break
             top = further[0]
         seen = _seen_in(top, nominal.problem.data)
-        process = likeliest([one for one in random_moments(seen.fit) if is_steady_noise(one)])
+        steady = [one for one in random_moments(seen.fit) if is_steady_noise(one, chosen)]
+        process = likeliest(steady, chosen)
         if process is not None and not follows_the_motion(seen.fit) and not obeys_a_law(seen.fit):
             bands = dict.fromkeys(part.band for part in process.spectrum)
             if not bands.keys() <= allowed.keys():
@@ -131,13 +130,13 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     The noise is estimated from the residuals themselves, and no real spectrum has its form. So the scatter between
     the runs says how much of a fall of χ² is chance.
     """
-    if len(top.effects) >= MOST_CAUSES:
+    if len(top.effects) >= top.fit.settings.search.most_causes:
         return []
     able = {kind.name: kind for kind in kinds if not kind.line}
     larger = sets_with_one_more([top], list(able.values()), None)
     gains = [(top.fit.total - h.fit.total) / overdispersion(h.fit, able[h.effects[-1]]) for h in larger]
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
-    return [larger[i] for i in order if gains[i] > NEEDLESS_CHI2]
+    return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
 
 
 def _may_act(best: Hypothesis, scale: Scale) -> bool:
@@ -150,10 +149,11 @@ def _may_act(best: Hypothesis, scale: Scale) -> bool:
     if not any(run.wind_on for run, _ in runs) or scale.greatest(best) <= scale.weight(best):
         return False
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
-    if log_weight(still, scale.misfit, len(best.effects) + 1, best.further_numbers) > scale.weight(best):
+    count, chosen = len(best.effects) + 1, best.fit.settings.moment
+    if log_weight(still, scale.misfit, count, best.further_numbers, scale.chosen) > scale.weight(best):
         return True
-    process = likeliest(random_moments(best.fit))
-    return process is not None and is_steady_noise(process)
+    process = likeliest(random_moments(best.fit), chosen)
+    return process is not None and is_steady_noise(process, chosen)
 
 
 def wind_off_excess(fit: Fit) -> float:
@@ -185,7 +185,7 @@ def follows_the_motion(fitted: Fit) -> bool:
     motion = along["damping"] + along["damping of runs"]
     rate = along["frequency"] + along["frequency of runs"]
     larger = max(motion, rate) / max(min(motion, rate), 1e-300)
-    return 2.0 * float(fdtrc(windy, windy, larger)) < FALSE_ALARM_RATE
+    return 2.0 * float(fdtrc(windy, windy, larger)) < fitted.settings.moment.phase_rate
 
 
 def obeys_a_law(fitted: Fit) -> bool:
@@ -195,14 +195,14 @@ def obeys_a_law(fitted: Fit) -> bool:
     law of angle, rate and wind speed does, and a slow random moment would take its place.
 
     Returns:
-        Whether the law of the wind (`diagnosis.likelihood.paths.wind`) closes more than half on runs held out of
-        its fit, beyond chance.
+        Whether the law of the wind (`diagnosis.likelihood.paths.wind`) closes enough on runs held out of its fit,
+        beyond chance.
     """
     unexplained = Unexplained(fitted)
     if unexplained.held_out != "runs":  # no run can be left out
         return False
-    closed = unexplained.common("wind").ceiling
-    return closed.closed - CHANCE_STDS * closed.std > GREATER_PART
+    closed, chosen = unexplained.common("wind").ceiling, fitted.settings.moment
+    return closed.closed - chosen.law_stds * closed.std > chosen.law_share
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
@@ -233,24 +233,26 @@ def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> H
     taken.
     """
     data, known, top = nominal.problem.data, best.fit, best
+    chosen = nominal.settings.moment
     windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
     reached: dict[tuple[str, ...], Hypothesis] = {}
 
     def cost(hypothesis: Hypothesis) -> float:
-        process = likeliest(random_moments(_seen_in(hypothesis, data).fit))
+        process = likeliest(random_moments(_seen_in(hypothesis, data).fit), chosen)
         if process is None:
             return np.inf
-        return process.cost + process.price + NEEDLESS_CHI2 * len(hypothesis.effects)
+        price = process.price(chosen.part_price) + chosen.effect_price * len(hypothesis.effects)
+        return process.cost + price
 
     with suppress(FitError, np.linalg.LinAlgError):
         for _ in range(_ROUNDS):
-            process = likeliest(random_moments(known))
+            process = likeliest(random_moments(known), chosen)
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
             base = fit(Problem(noisy), nominal.point)
             sets = [Hypothesis((), base), *grow(base, kinds)]
-            found = max(sets, key=Scale.of(sets, misfit(base)).weight)
+            found = max(sets, key=Scale.of(sets, misfit(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap in the wind for effects to be compared there: more are added
             # while one of the wind is evident, the most evident of all, so that none mops up what another leaves
             top = _sought_again(found)

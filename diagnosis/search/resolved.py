@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from diagnosis.likelihood.least_squares import Fit, fit_at, normal_equations
 from diagnosis.likelihood.partial import fit_seen
-from diagnosis.policy import CHANCE_STDS
 from tunnel_sim.vocabulary.record import Array
 
 _ROUNDS = 4  # of the fit of a half
@@ -25,7 +24,7 @@ def unresolved(whole: Fit) -> tuple[str, ...]:
     """The effects that neither the early nor the late half of the records resolves with the sign of the whole.
 
     Free decays swing far in their early halves and little in their late ones. Each half is fitted by itself, with
-    the forms of the effects as the whole gives them. An effect is resolved where its severity lies two standard
+    the forms of the effects as the whole gives them. An effect is resolved where its severity lies enough standard
     deviations from zero, which allow for the misfit of the half.
 
     Args:
@@ -43,7 +42,7 @@ def unresolved(whole: Fit) -> tuple[str, ...]:
         for name, full in list(left.items()):
             place = problem.names.index(full)
             same_sign = values[place] * whole.value(full) > 0.0
-            if same_sign and abs(values[place]) > CHANCE_STDS * stds[place]:
+            if same_sign and abs(values[place]) > whole.settings.search.resolved_stds * stds[place]:
                 del left[name]
     return tuple(left)
 

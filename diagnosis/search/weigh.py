@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis import policy
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
+from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
 
 UNKNOWN = ("unknown",)
@@ -22,7 +22,6 @@ UNKNOWN = ("unknown",)
 OF_MOTION = np.array([0.0 if name in ("zero", "harmonics") else 1.0 for name in CHANNELS])
 #: The same for the odds against ``unknown``, which were fitted with a leak between all channels.
 ALL_CHANNELS = np.ones(len(CHANNELS))
-_LEAST_CLOSED = 0.02  # a share: keeps its logarithm finite
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class FittedSet:
     outside: bool = False
 
 
-def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
+def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit, chosen: WeighingSettings) -> list[Weighed]:
     """Probabilities of the answers.
 
     Args:
@@ -76,29 +75,31 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
             best[key] = given
     excesses = [given.excess for given in best.values()]
     least, common = least_excess(excesses), common_misfit(excesses)
-    scale = misfit_scale(nominal, common)
-    logs = np.array([log_weight(s.excess - least, scale, len(key), s.numbers) for key, s in best.items()])
+    scale = misfit_scale(nominal, chosen, common)
+    logs = np.array(
+        [log_weight(s.excess - least, scale, len(key), s.numbers, chosen) for key, s in best.items()]
+    )
     weights = np.exp(logs - logs.max(initial=-np.inf))
     # odds of each set against an unknown cause
-    by_chance = misfit_scale(nominal, common, policy.CHANCE_STDS * np.sqrt(2.0 * nominal.count))
-    gap, against = log_misfit(nominal.excess, by_chance, ALL_CHANNELS), []
+    by_chance = misfit_scale(nominal, chosen, common, chosen.chance_stds * np.sqrt(2.0 * nominal.count))
+    gap, against = log_misfit(nominal.excess, by_chance, ALL_CHANNELS, chosen.leak), []
     for given in best.values():
-        left = log_misfit(given.excess, by_chance, ALL_CHANNELS)
+        left = log_misfit(given.excess, by_chance, ALL_CHANNELS, chosen.leak)
         closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
-        doubt = policy.UNKNOWN_LEFT * (np.log1p(left) - np.log(closed + _LEAST_CLOSED))
-        against.append(float(policy.UNKNOWN_AT + policy.UNKNOWN_GAP * gap - doubt))
+        doubt = chosen.unknown_left * (np.log1p(left) - np.log(closed + chosen.least_closed))
+        against.append(float(chosen.unknown_at + chosen.unknown_gap * gap - doubt))
     odds = float(weights @ np.exp(against) / weights.sum()) if best else 0.0
-    known = (1.0 - policy.EVEN_SHARE) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
+    known = (1.0 - chosen.even_share) * odds / (1.0 + odds) * weights / (weights.sum() or 1.0)
     inside = np.array([not given.outside for given in best.values()], bool)
-    even = policy.EVEN_SHARE / (int(inside.sum()) + 1)
+    even = chosen.even_share / (int(inside.sum()) + 1)
     found = [
         Weighed(key, max(given.share, 0.0), float(probability) + even)
         for (key, given), probability in zip(best.items(), known, strict=True)
         if not given.outside
     ]
-    beyond = (1.0 - policy.EVEN_SHARE) / (1.0 + odds) + float(known[~inside].sum())
+    beyond = (1.0 - chosen.even_share) / (1.0 + odds) + float(known[~inside].sum())
     unknown = Weighed(UNKNOWN, 1.0, beyond + even)
-    if unknown.probability < 0.5:
+    if unknown.probability < chosen.unknown_from:
         first = max(found, key=lambda w: w.probability)
         rest = [unknown, *(w for w in found if w is not first)]
     else:
@@ -126,24 +127,29 @@ def common_misfit(excesses: Sequence[Array]) -> float:
     return max(0.0, float(np.max(np.min(excesses, axis=0)))) if excesses else 0.0
 
 
-def misfit_scale(nominal: ChannelMisfit, common: float = 0.0, chance: float | Array | None = None) -> Array:
+def misfit_scale(
+    nominal: ChannelMisfit,
+    chosen: WeighingSettings,
+    common: float = 0.0,
+    chance: float | Array | None = None,
+) -> Array:
     """χ² by channel that needs no cause, shape (6,).
 
-    Beside chance it is that of an error of the model: a tenth of the amplitude of the gap, since no real effect has
-    its textbook form, or what all sets leave if that is more, and a thousandth of the motion at most.
+    Beside chance it is that of an error of the model: a share of the amplitude of the gap, since no real effect has
+    its textbook form, or what all sets leave if that is more, and a share of the motion at most.
 
     Args:
         nominal: what the nominal model leaves, and the motion.
         common: χ² of a channel that all sets leave (`common_misfit`), dimensionless.
-        chance: χ² that chance explains, by channel or common to all; None: `NEEDLESS_CHI2`.
+        chance: χ² that chance explains, by channel or common to all; None: that of a needless effect.
     """
-    by_chance = policy.NEEDLESS_CHI2 if chance is None else chance
-    by_form = policy.FORM_ERROR**2 * float(np.sum(np.maximum(nominal.excess, 0.0)))
-    error = min(max(by_form, common), policy.MODEL_ERROR**2 * nominal.motion)
+    by_chance = chosen.needless_chi2 if chance is None else chance
+    by_form = chosen.form_error**2 * float(np.sum(np.maximum(nominal.excess, 0.0)))
+    error = min(max(by_form, common), chosen.model_error**2 * nominal.motion)
     return np.asarray(np.broadcast_to(by_chance, 6) + error, np.float64)
 
 
-def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
+def log_weight(left: Array, scale: Array, effects: int, numbers: int, chosen: WeighingSettings) -> float:
     """Logarithm of the weight of a set among all sets.
 
     Args:
@@ -152,22 +158,23 @@ def log_weight(left: Array, scale: Array, effects: int, numbers: int) -> float:
         effects: how many it has.
         numbers: how many it has beside their own.
     """
-    price = policy.SET_PRICE * effects + policy.FORM_PRICE * numbers
-    return -policy.STEEPNESS * log_misfit(left, scale, OF_MOTION) - price
+    price = chosen.set_price * effects + chosen.form_price * numbers
+    return -chosen.steepness * log_misfit(left, scale, OF_MOTION, chosen.leak) - price
 
 
-def log_misfit(left: Array, scale: Array, leaking: Array) -> float:
+def log_misfit(left: Array, scale: Array, leaking: Array, leak: float) -> float:
     """Sum over the channels of the logarithm of the misfit, 0 where there is none.
 
     Args:
         left: χ² by channel, shape (6,), dimensionless.
         scale: from `misfit_scale`, shape (6,).
-        leaking: 1 for the channels between which `LEAK` of a misfit counts, else 0, shape (6,): `OF_MOTION` or
+        leaking: 1 for the channels between which a misfit leaks, else 0, shape (6,): `OF_MOTION` or
             `ALL_CHANNELS`.
+        leak: share of the misfit in other channels that counts in a channel.
     """
     above = np.maximum(left, 0.0)
     shared = leaking * above
-    return float(np.sum(np.log1p((above + policy.LEAK * leaking * (shared.sum() - shared)) / scale)))
+    return float(np.sum(np.log1p((above + leak * leaking * (shared.sum() - shared)) / scale)))
 
 
 def main_effect(effects: Sequence[str], shares: Mapping[tuple[str, ...], float]) -> str:

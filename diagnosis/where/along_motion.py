@@ -17,7 +17,6 @@ from scipy.linalg import lstsq
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.policy import CLEARLY_MORE
 from identification.estimate import NoiseLevel
 from identification.signal.decay_fit import Reading, fit_run
 from identification.signal.free_decay import Decay
@@ -72,7 +71,7 @@ def backbones(fit: Fit) -> list[Backbone]:
             continue
         std = float(run.noise_at(resonance(fit, index)))
         reading = Reading(run.interval * np.arange(run.reading.size, dtype=np.float64), run.reading)
-        departs = float(np.mean(fit.residuals[index] ** 2)) > CLEARLY_MORE
+        departs = float(np.mean(fit.residuals[index] ** 2)) > fit.settings.where.run_departs
         noise = NoiseLevel(std, "residual", std, 1.0, departs, disagrees=False)
         windows = fit_windows(reading, decay, fit.zero(index), noise)
         fitted = fit_run(reading, decay).runs

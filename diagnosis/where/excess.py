@@ -19,7 +19,7 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import RunData
 from diagnosis.noise.gap import chance
 from diagnosis.noise.sensor_noise import estimate_variance
-from diagnosis.policy import FLOOR_TOLERANCE, LINE_CONTRAST, LOCAL_FALSE_ALARM_RATE, MOST
+from diagnosis.settings import WhereSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
 
@@ -92,7 +92,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     levels = [run.noise_variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
-    relative = [float(np.hypot(value, 0.5 * FLOOR_TOLERANCE)) for value in relative]
+    relative = [float(np.hypot(value, fit.settings.where.noise_std)) for value in relative]
     shared = len(fit.problem.names) / len(data.runs)
     return [
         RunExcess(
@@ -138,9 +138,9 @@ def band_excesses(runs: list[RunExcess]) -> tuple[BandExcess, ...]:
     return tuple(result)
 
 
-def bands_beyond_chance(bands: tuple[BandExcess, ...]) -> tuple[str, ...]:
+def bands_beyond_chance(bands: tuple[BandExcess, ...], chosen: WhereSettings) -> tuple[str, ...]:
     """The bands whose power is beyond chance; all of them where none is."""
-    level = LOCAL_FALSE_ALARM_RATE / max(len(bands), 1)
+    level = chosen.band_rate / max(len(bands), 1)
     found = tuple(band.band for band in bands if band.p_value < level and band.excess > 0.0)
     return found or tuple(band.band for band in bands)
 
@@ -175,9 +175,9 @@ class Profile:
     mean: Array
     std: Array
 
-    def interval(self) -> tuple[float, float] | None:
-        """The shortest interval that holds `MOST` of the excess; None where there is no excess."""
-        return shortest_interval(self.edges, self.energy, MOST)
+    def interval(self, share: float) -> tuple[float, float] | None:
+        """The shortest interval that holds a share of the excess, a fraction; None where there is no excess."""
+        return shortest_interval(self.edges, self.energy, share)
 
 
 def profile(
@@ -252,7 +252,9 @@ class ResidualLine:
     amplitude: float
 
 
-def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[ResidualLine, ...]:
+def residual_lines(
+    runs: list[RunExcess], data: Sequence[RunData], chosen: WhereSettings
+) -> tuple[ResidualLine, ...]:
     """The lines that stand out of the residual of single runs: at most two in each, the stronger first."""
     lines: list[ResidualLine] = []
     for run, own in zip(runs, data, strict=True):
@@ -262,7 +264,7 @@ def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[Resi
         for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
             excess = float(local[index]) - _WIDTH
             unlikely = len(runs) * run.power.size * chance(float(local[index]), _WIDTH, run.relative)
-            if unlikely > LOCAL_FALSE_ALARM_RATE or len(found) == _PER_RUN:
+            if unlikely > chosen.line_rate or len(found) == _PER_RUN:
                 break
             close = any(abs(line.frequency - run.frequency[index]) < _APART * run.resonance for line in found)
             beside = np.concatenate(
@@ -272,7 +274,7 @@ def residual_lines(runs: list[RunExcess], data: Sequence[RunData]) -> tuple[Resi
                 ]
             )
             around = float(np.median(beside)) if beside.size else 0.0
-            if not open_to[index] or close or local[index] < LINE_CONTRAST * around:
+            if not open_to[index] or close or local[index] < chosen.line_contrast * around:
                 continue
             near = slice(max(index - _WIDTH // 2, 0), min(index + _WIDTH // 2 + 1, run.power.size))
             whole = max(float(run.power.sum()) - run.power.size, excess)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis import policy
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.settings import WhereSettings
 from diagnosis.where.along_motion import drift
 from diagnosis.where.excess import RunExcess, band_excesses, run_excesses, shortest_interval
 from diagnosis.where.survey import Survey, survey
@@ -56,7 +56,8 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
     """
     data, residuals = nominal.problem.data, nominal.residuals
     if hum_removed:
-        given = prepare(campaign, {run.id: run.noise_variance for run in data.runs}, data.similarity)
+        variance = {run.id: run.noise_variance for run in data.runs}
+        given = prepare(campaign, variance, data.similarity, model=data.model, settings=data.settings)
         readings = {run.id: run.reading for run in given.runs}
         # the fit may leave a record's start out; both end together
         residuals = [
@@ -65,36 +66,32 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
         ]
     scaled = replace(nominal, residuals=[r * np.sqrt(noise_ratio) for r in residuals])
     excesses = run_excesses(campaign, scaled)
-    runs = runs_beyond_chance(excesses)
+    runs = runs_beyond_chance(excesses, nominal.settings.where)
     found = survey(nominal, scaled, excesses, runs)
     condition = infer_condition(campaign, nominal, found)
     return Place(found, runs, infer_channel(nominal, found, condition.value), condition)
 
 
-def runs_beyond_chance(excesses: Sequence[RunExcess]) -> tuple[str, ...]:
-    """The runs beyond chance (1 % over all) that have a tenth or more of the largest excess among them."""
-    clear = {
-        run.id: run.excess
-        for run in excesses
-        if run.p_value() * len(excesses) < policy.LOCAL_FALSE_ALARM_RATE
-    }
-    least = policy.SMALL_SHARE * max(clear.values(), default=0.0)
+def runs_beyond_chance(excesses: Sequence[RunExcess], chosen: WhereSettings) -> tuple[str, ...]:
+    """The runs beyond chance that have a good part of the largest excess among them."""
+    clear = {run.id: run.excess for run in excesses if run.p_value() * len(excesses) < chosen.run_rate}
+    least = chosen.named_run * max(clear.values(), default=0.0)
     return tuple(name for name, excess in clear.items() if excess > least)
 
 
 def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     """Whether the gap needs wind: ``wind_on`` where the wind-off runs, fitted alone, show no gap."""
-    runs, shown = nominal.problem.data.runs, found.maps.runs
+    runs, shown, chosen = nominal.problem.data.runs, found.maps.runs, nominal.settings.where
     off = tuple(run.id for run in runs if not run.wind_on)
     if len(off) == len(runs):
         return Finding("always", "it is there with the wind off")
     undetermined = "whether it needs wind cannot be determined"
     if not off:
         return Finding(None, f"{undetermined}, since the wind is on in every run")
-    if min(run.p_value for run in shown) * len(runs) > policy.LOCAL_FALSE_ALARM_RATE:
+    if min(run.p_value for run in shown) * len(runs) > chosen.run_rate:
         return Finding(None, f"{undetermined}, since no single run shows it")
     most = max(shown, key=lambda run: run.share)
-    if len(shown) >= 3 and most.share > policy.MOST and most.id not in off:
+    if len(shown) >= chosen.one_run_of and most.share > chosen.one_run and most.id not in off:
         return Finding(None, f"{undetermined} from one run alone ({most.id})")
     # without coefficients and a gain that these runs lack
     data = nominal.problem.data.alone(off)
@@ -107,12 +104,12 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     tests += [band.p_value for band in band_excesses(excesses)]
     count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
     show = f"{count}, fitted alone, show{'s' * (len(off) == 1)}"
-    if min(tests) * len(tests) < policy.LOCAL_FALSE_ALARM_RATE:
+    if min(tests) * len(tests) < chosen.still_rate:
         return Finding("always", f"{show} it too")
     return Finding("wind_on", f"{show} no gap")
 
 
-def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | None:
+def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[float, float] | None:
     """The time in which most of the missing moment acts, where that is a small part of the record.
 
     Args:
@@ -124,16 +121,17 @@ def blow_interval(found: Survey, share: float = 0.5) -> tuple[float, float] | No
     """
     edges = found.maps.time.edges
     interval = shortest_interval(edges, found.moment_energy, share)
-    if interval is None or found.moment_z < policy.CLEAR_MOMENT:
+    if interval is None or found.moment_z < chosen.blow_stds:
         return None
     length = float(edges[-1])
-    brief = interval[1] - interval[0] <= policy.SMALL_SHARE * length
-    return interval if brief and interval[0] > 0.05 * length else None
+    brief = interval[1] - interval[0] <= chosen.blow_length * length
+    return interval if brief and interval[0] > chosen.blow_after * length else None
 
 
 def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding:
     """What the gap acts on, from features of the residual; the condition is the one inferred."""
-    blow = blow_interval(found)
+    chosen = nominal.settings.where
+    blow = blow_interval(found, chosen.blow_share, chosen)
     if blow is not None:
         return Finding(
             "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
@@ -141,23 +139,23 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
-    lines = [line for line in found.maps.lines if line.share > 0.5 * policy.GREATER_PART]
-    if lines and len(lines) >= max(1, len(found.maps.runs) // 3):
+    lines = [line for line in found.maps.lines if line.share > chosen.line_share]
+    if lines and len(lines) >= max(1, len(found.maps.runs) // chosen.line_one_in):
         hertz = float(np.median([line.frequency for line in lines]))
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Finding(
-            "forcing" if similar < policy.FASTEST_MOMENT else "sensor",
+            "forcing" if similar < chosen.fastest_moment else "sensor",
             f"it is a spectral line near {hertz:.3g} Hz",
         )
-    if excess.get("above", 0.0) > policy.GREATER_PART * whole:
+    if excess.get("above", 0.0) > chosen.fast_share * whole:
         return Finding("sensor", "most of it is faster than the rig can move")
-    if excess.get("0", 0.0) > policy.GREATER_PART * whole:
-        if excess.get("2f0", 0.0) > policy.WORTH_NAMING * whole:
+    if excess.get("0", 0.0) > chosen.slow_share * whole:
+        if excess.get("2f0", 0.0) > chosen.shifted_centre * whole:
             return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
         if condition == "wind_on":
             return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
         return Finding("sensor", "most of it is a slow shift of the centre")
-    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > policy.GREATER_PART * whole:
+    if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > chosen.harmonic_share * whole:
         return Finding(
             "sensor", "it contains harmonics of the motion, without a shift of frequency or damping"
         )
@@ -167,9 +165,9 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     if all(run.drive is not None for run in nominal.problem.data.runs):
         return Finding(None, "every run is driven, so that no decay shows it")
     frequency, damping = drift(list(found.maps.backbones))
-    if frequency > policy.CLEARLY_MORE * max(damping, 0.0) and frequency > 0.0:
+    if frequency > chosen.drift_ratio * max(damping, 0.0) and frequency > 0.0:
         return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
-    if damping > policy.CLEARLY_MORE * max(frequency, 0.0) and damping > 0.0:
+    if damping > chosen.drift_ratio * max(frequency, 0.0) and damping > 0.0:
         return Finding("damping", "the damping shifts along the decay more than the frequency does")
     return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
 
@@ -185,7 +183,7 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         frequency = curve.alone_frequency / curve.nominal_frequency - 1.0
         shifts.append((frequency, curve.alone_zeta - curve.nominal_zeta))
     whole = sum(max(run.excess, 0.0) * n for run, n in zip(found.excesses, sizes, strict=True))
-    if len(sizes) < 2 or left > (1.0 - policy.MOST) * whole:
+    if len(sizes) < 2 or left > nominal.settings.where.alone_leaves * whole:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several

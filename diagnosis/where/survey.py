@@ -84,7 +84,8 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     """
     runs, similarity = nominal.problem.data.runs, nominal.problem.data.similarity
     bands = band_excesses(excesses)
-    beyond = bands_beyond_chance(bands)
+    settings = nominal.settings.where
+    beyond = bands_beyond_chance(bands, settings)
     inside = [within_bands(r, run, beyond) for r, run in zip(scaled.residuals, excesses, strict=True)]
     samples = _Samples(
         [_times(nominal, i) for i in range(len(runs))],
@@ -132,7 +133,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         bands=bands,
         lines=tuple(
             replace(line, frequency=similarity.own(line.frequency, "Hz"))
-            for line in residual_lines(excesses, runs)
+            for line in residual_lines(excesses, runs, settings)
         ),
         backbones=tuple(backbones(nominal)),
         phase_plane=phase_plane(nominal, chosen),
@@ -146,7 +147,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     # no bin is narrower than the shortest record resolves
     resolved = max(float(run.frequency[1]) for run in excesses)
     fine = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
-    interval = _spectrum(kept, fine).interval()
+    interval = _spectrum(kept, fine).interval(settings.interval)
     if interval is not None:
         interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
     return Survey(maps, excesses, interval, energy, z)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
-from diagnosis import policy
-from diagnosis.printing import plain
+from diagnosis.printing import part, plain
 from diagnosis.result import Where
+from diagnosis.settings import Settings
 from diagnosis.where.place import Finding
 from diagnosis.where.survey import Survey
 from identification.printing import p_text
 from tunnel_sim.effects import Effect
 
-_LISTED = 12  # ids listed in a sentence at most
-_NEARLY_NOTHING = 0.02  # of the power of the other runs
 _BAND_WORDS = {
     "0": "slower than the oscillation",
     "f0": "at the oscillation itself",
@@ -48,13 +46,18 @@ def nowhere(found: Survey, *, within_step: bool) -> str:
 
 
 def describe(
-    where: Where, found: Survey, bands: tuple[str, ...], channel: Finding, condition: Finding
+    where: Where,
+    found: Survey,
+    bands: tuple[str, ...],
+    channel: Finding,
+    condition: Finding,
+    settings: Settings,
 ) -> str:
     """Where the gap is, in sentences; the bands are those that show it."""
     # which runs show the gap, and how much more of it is with the wind on or off
-    count, rate = len(found.maps.runs), 100.0 * policy.LOCAL_FALSE_ALARM_RATE
+    count, rate, chosen = len(found.maps.runs), 100.0 * settings.where.run_rate, settings.words
     share = sum(run.share for run in found.maps.runs if run.id in where.runs)
-    named = f" ({', '.join(where.runs)})" if len(where.runs) <= _LISTED else ""
+    named = f" ({', '.join(where.runs)})" if len(where.runs) <= chosen.runs_listed else ""
     if not where.runs:
         text = (
             f"No single run is beyond chance (false-alarm rate {rate:.0f} % over all runs); "
@@ -69,24 +72,24 @@ def describe(
     groups = {group.label: group.excess for group in found.maps.groups if group.by == "wind"}
     if where.runs and len(groups) == 2:
         more, less = sorted(("on", "off"), key=lambda wind: -groups[wind])
-        if groups[less] < _NEARLY_NOTHING * groups[more]:
+        if groups[less] < chosen.one_wind * groups[more]:
             text += f"; nearly all of it with the wind {more}"
         else:
             ratio = groups[more] / groups[less]
             text += f"; {ratio:.2g} times as much power with the wind {more} as with it {less}"
     parts, places = [f"{text}."], []
     length, greatest = float(found.maps.time.edges[-1]), float(found.maps.amplitude.edges[-1])
-    if where.time_s is not None and where.time_s[1] - where.time_s[0] < policy.MOST * length:
+    if where.time_s is not None and where.time_s[1] - where.time_s[0] < chosen.interval_located * length:
         places.append(f"between {where.time_s[0]:.1f} and {where.time_s[1]:.1f} s of the record")
     amplitude = where.amplitude_rad
-    if amplitude is not None and amplitude[1] - amplitude[0] < policy.MOST * greatest:
+    if amplitude is not None and amplitude[1] - amplitude[0] < chosen.interval_located * greatest:
         places.append(f"at amplitudes from {degrees(amplitude[0]):.2g}° to {degrees(amplitude[1]):.2g}°")
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
     if places:
-        parts.append(f"Four fifths of it lie {', '.join(places)}.")
+        parts.append(f"{part(settings.where.interval).capitalize()} of it lie {', '.join(places)}.")
     whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
-    shown = [b for b in found.maps.bands if b.band in bands and b.excess > policy.WORTH_NAMING * whole]
+    shown = [b for b in found.maps.bands if b.band in bands and b.excess > chosen.band_listed * whole]
     if shown and whole > 0.0:
         shown.sort(key=lambda band: -band.excess)
         listed = (f"{100.0 * band.excess / whole:.0f} % {_BAND_WORDS[band.band]}" for band in shown)

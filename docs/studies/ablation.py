@@ -27,14 +27,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from diagnosis.policy import DECIDED_FROM
 from scipy.optimize import minimize
 
 from diagnosis import diagnose, policy
 from diagnosis.likelihood.residuals import ChannelMisfit
-from diagnosis.policy import DECIDED_FROM
 from diagnosis.search import investigate as investigation
 from diagnosis.search import weigh as decide
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
+from diagnosis.settings import Settings
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -96,7 +97,9 @@ class Case:
         """
         if self.nominal is None:
             return [(self.causes, 1.0)]
-        found = decide.weigh([s for s in self.sets if withheld not in s.effects], self.nominal)
+        found = decide.weigh(
+            [s for s in self.sets if withheld not in s.effects], self.nominal, Settings().weighing
+        )
         return [
             (UNKNOWN if a.effects == UNKNOWN else tuple(sorted({*self.read_off, *a.effects})), a.probability)
             for a in found

@@ -24,6 +24,7 @@ from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
+from diagnosis.settings import Settings
 from identification import identify
 from tunnel_lab.plotting.style import save
 from tunnel_sim.effects.registry import answering_with
@@ -72,7 +73,7 @@ def fitted(campaign: Campaign, document: Mapping[str, Any]) -> tuple[Fit, Fit]:
     }
     kinds = vocabulary(list(dict.fromkeys(name.split(".")[0] for name in parameters)))
     with answering_with(kinds):
-        chosen = choose(campaign, kinds)
+        chosen = choose(campaign, kinds, Settings().selection)
         study = nominal_study(chosen.campaign, chosen.kinds)
     nominal = study.nominal
     infos = {f"{kind.name}.{info.name}": info for kind in kinds for info in kind.parameters()}

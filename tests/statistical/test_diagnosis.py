@@ -14,8 +14,8 @@ from scipy.stats import binom
 
 from diagnosis import diagnose
 from diagnosis.blind.sets import make_blind
-from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import investigate
+from diagnosis.settings import Settings
 from tests.reference.free_decays import RESOLUTION, Setting, campaign, with_records
 from tests.reference.rigs import rig
 from tunnel_reference import draw
@@ -47,7 +47,7 @@ def gap_free(seed, stated=NOISE, **changes):
 def test_a_gap_free_campaign_is_given_no_cause(stated, record_property):
     alarms = [seed for seed in range(CAMPAIGNS) if investigate(gap_free(seed, stated), ()).test.detected]
     record_property("alarms", f"{len(alarms)} of {CAMPAIGNS}: {alarms}")
-    assert len(alarms) <= binom.isf(1e-3, CAMPAIGNS, FALSE_ALARM_RATE)
+    assert len(alarms) <= binom.isf(1e-3, CAMPAIGNS, Settings().gap.detection_rate)
 
 
 def test_the_whole_answer_to_a_gap_free_campaign_is_no_cause():

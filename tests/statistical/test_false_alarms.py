@@ -11,6 +11,7 @@ from diagnosis.noise import gap
 from diagnosis.noise.gap import level_p_value, trend_p_values
 from diagnosis.noise.sensor_noise import campaign_noise, noise_trend
 from diagnosis.search.investigate import fit_nominal
+from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 
@@ -38,7 +39,7 @@ def decays(seed, *, noise=NOISE, **options):
 
 def judged(data):
     """All tests of a campaign."""
-    noise = campaign_noise(data)
+    noise = campaign_noise(data, Settings().noise)
     nominal = fit_nominal(prepare(data, noise.variance))
     return gap.gap_test(nominal, noise, noise_trend(data), coarse_step=False, errors=None)
 
@@ -88,7 +89,7 @@ def with_bursts(data, share, size, seed=5):
 @pytest.mark.parametrize(("share", "size", "alarm"), [(0.0, 0.0, False), (0.1, 0.3, False), (0.1, 3.0, True)])
 def test_bursts_are_distinguished_from_noise_that_is_nearly_steady(share, size, alarm):
     data = with_bursts(decays(2), share, size)
-    noise = campaign_noise(data)
+    noise = campaign_noise(data, Settings().noise)
     p = trend_p_values(noise_trend(data), fit_nominal(prepare(data, noise.variance)), noise)
     assert (p["noise in bursts"] < 1e-6) == alarm
     assert 0.0 < p["noise in bursts"] <= 1.0
@@ -105,9 +106,9 @@ def test_a_level_is_as_certain_as_its_record_is_long():
                                   rng=np.random.default_rng(4))  # fmt: skip
     values = []
     for data in (short, longer):
-        noise = campaign_noise(data)
+        noise = campaign_noise(data, Settings().noise)
         values.append(level_p_value(fit_nominal(prepare(data, noise.variance)), noise))
     assert 1.0 > values[0] > values[1]
     assert values[1] < 1e-9
-    noise = campaign_noise(decays(4))
+    noise = campaign_noise(decays(4), Settings().noise)
     assert level_p_value(fit_nominal(prepare(decays(4), noise.variance)), noise) > 0.999

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.policy import FALSE_ALARM_RATE
+from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
 from tests.unit.gap_campaigns import judged
@@ -35,7 +35,7 @@ def decays(per_cycle, seed, *, step=None):
 
 def most_alarms(trials):
     """As many as a test of exactly the stated rate exceeds with a chance of one in ten thousand."""
-    return binom.ppf(0.9999, trials, FALSE_ALARM_RATE)
+    return binom.ppf(0.9999, trials, Settings().gap.detection_rate)
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study, fit_nominal
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
@@ -122,8 +123,15 @@ def with_blow(data: Campaign, impulse: float, when: float) -> Campaign:
 
 def nominal(data: Campaign) -> Fit:
     """The nominal model fitted."""
-    prepared = prepare(data, campaign_noise(data).variance)
+    prepared = prepare(data, campaign_noise(data, Settings().noise).variance)
     return fit(Problem(prepared), nominal_start(prepared))
+
+
+def with_settings(fitted: Fit, values: dict[str, float]) -> Fit:
+    """The fit with other settings, by name with their stage."""
+    data = fitted.problem.data
+    data = dataclasses.replace(data, settings=data.settings.changed(values))
+    return dataclasses.replace(fitted, problem=dataclasses.replace(fitted.problem, data=data))
 
 
 def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fit | None = None) -> Study:
@@ -133,7 +141,7 @@ def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fi
         data,
         Similarity(),
         data,
-        campaign_noise(data),
+        campaign_noise(data, Settings().noise),
         NoiseTrend(0.0, 0.0, 0.0),
         step=0.0,
         coarse=COARSE_STEP.name in causes,
@@ -147,6 +155,6 @@ def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fi
 
 def judged(data: Campaign) -> GapTest:
     """Fit, noise and verdict."""
-    noise = campaign_noise(data)
+    noise = campaign_noise(data, Settings().noise)
     fitted = fit_nominal(prepare(data, noise.variance))
     return gap_or_colour(fitted, noise, noise_trend(data), step=reading_step(data), coarse_step=False)

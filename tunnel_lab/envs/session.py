@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import Study, investigate
 from identification.campaign.belief import (
     Belief,
@@ -251,7 +250,8 @@ def probabilities(known: Knowledge) -> Array:
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
     if not known.study.weighed:
-        shares[0], shares[-1] = 1.0 - FALSE_ALARM_RATE, FALSE_ALARM_RATE
+        rate = known.study.settings.gap.detection_rate
+        shares[0], shares[-1] = 1.0 - rate, rate
         return shares
     for answer in known.study.weighed:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnosis.printing import LISTED, excess_std, plain, probability
+from diagnosis.printing import excess_std, plain, probability
+from diagnosis.settings import settings_of
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
@@ -182,7 +183,8 @@ def _place_texts(axes: Axes, words: Sequence[str], ends: Sequence[float], marks:
 @styled
 def candidates_figure(document: Document) -> Figure | None:
     """The answers that are not improbable; None where there are fewer than two, which words say better."""
-    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= LISTED]
+    least = settings_of(document).words.answer_drawn
+    shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= least]
     if len(shown) < 2:
         return None
     names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]

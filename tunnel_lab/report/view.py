@@ -9,7 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.printing import LISTED, misfit_text, noise_powers, plain, probability, run_words, share
+from diagnosis.printing import misfit_text, noise_powers, plain, probability, run_words, share
+from diagnosis.settings import settings_of
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -251,7 +252,8 @@ def others(document: Document) -> str:
 
 
 def _listed(document: Document) -> int:
-    probable = [c for c in document["candidates"] if c["probability"] >= LISTED]
+    least = settings_of(document).words.answer_drawn
+    probable = [c for c in document["candidates"] if c["probability"] >= least]
     return max(3, len(probable))
 
 

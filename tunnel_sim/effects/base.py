@@ -29,9 +29,6 @@ SPRING_TOLERANCE = 1e-6
 NEAR_MOTION = 0.3
 """Distance from the motion's frequency or a multiple within which a line is the motion's own, as a share of it."""
 
-IN_RUNS = 0.5
-"""Least share of the runs in which a line must be beside the motion."""
-
 MULTIPLES = (1.0, 2.0, 3.0)
 """Multiples of the motion's frequency at which its harmonics lie."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference.rigs import rig
 from tests.unit.gap_campaigns import campaign, nominal
@@ -328,7 +330,8 @@ def test_terms_of_the_state_are_taken_where_those_of_angle_or_rate_close_less(
     }
     monkeypatch.setattr("diagnosis.remainder.formula._chosen", lambda _, of, __: formulas[of])
     expected = {"own": formulas[kind], "wider": formulas["state"], None: None}[chosen]
-    assert choose(None, kind, 10.0) is expected
+    unexplained = SimpleNamespace(fit=SimpleNamespace(settings=Settings()))
+    assert choose(unexplained, kind, 10.0) is expected
 
 
 def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
@@ -352,14 +355,14 @@ def test_the_share_closed_is_a_ratio_of_sums_with_its_standard_error():
 )
 def test_the_simplest_kind_that_closes_as_much_is_chosen(common, single, kind):
     given = [{name: evidence(name, share) for name, share in kinds.items()} for kinds in (common, single)]
-    assert chosen_kind(*given) == kind
+    assert chosen_kind(*given, Settings().remainder) == kind
 
 
 def test_a_kind_whose_share_is_not_determined_is_not_chosen():
     common, single = {"angle": evidence("angle", 1.0, std=0.9)}, {"event": evidence("event", 0.6, std=0.1)}
-    assert chosen_kind(common, single) == "event"
-    assert chosen_kind(common, {}) is None
-    assert chosen_kind(common, {"event": evidence("event", 0.01)}) is None
+    assert chosen_kind(common, single, Settings().remainder) == "event"
+    assert chosen_kind(common, {}, Settings().remainder) is None
+    assert chosen_kind(common, {"event": evidence("event", 0.01)}, Settings().remainder) is None
     table = closable_table({"closable": {"ceilings": [asdict(common["angle"].ceiling)]}})
     assert table.rows[0][1] == "not determined"
 

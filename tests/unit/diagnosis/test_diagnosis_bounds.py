@@ -12,6 +12,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.result import ParameterEstimate
+from diagnosis.settings import Settings
 from identification.printing import estimated
 from tests.unit.gap_campaigns import INTERVAL, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class
@@ -59,7 +60,7 @@ def test_the_frequency_of_a_hum_scatters_as_stated():
         humming = replace(sound, runs=runs)
         found = refine_frequency(humming, 50.0)
         errors.append(found - 50.003)
-        stds.append(remove_hum(humming, found, NOISE**2)[1].frequency_std)
+        stds.append(remove_hum(humming, found, NOISE**2, Settings().read_off)[1].frequency_std)
     ratio = float(np.std(errors)) / float(np.median(stds))
     assert ratio == pytest.approx(1.0, abs=0.7)  # 12 draws know it to a fifth; 3.5 of these
 

@@ -8,6 +8,7 @@ import pytest
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import comparable_runs
 from diagnosis.likelihood.nondimensional import frequency
+from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of
 from tunnel_sim.vocabulary.record import Record
@@ -29,13 +30,13 @@ PAIR = [Setting(spring, speed) for spring in STIFFNESSES for speed in (0.0, 0.0,
 
 
 def kept(data):
-    found, said = comparable_runs(data)
+    found, said = comparable_runs(data, Settings().selection)
     return [run.id for run in found.runs], said
 
 
 def test_runs_that_all_state_their_spring_stay():
     data = decays(PAIR)
-    found, said = comparable_runs(data)
+    found, said = comparable_runs(data, Settings().selection)
     assert found.runs == data.runs
     assert said == ()
 
@@ -129,7 +130,7 @@ def test_unlike_springs_that_are_not_stated_are_no_gap():
 def test_a_wind_on_run_in_another_mode_is_left_out():
     data = decays(PAIR[:3])
     fast = replace(data.runs[2], record=Record(0.5 * data.runs[2].record.time_s, data.runs[2].record.yaw_rad))
-    found, (said,) = comparable_runs(replace(data, runs=(*data.runs[:2], fast)))
+    found, (said,) = comparable_runs(replace(data, runs=(*data.runs[:2], fast)), Settings().selection)
     assert [run.id for run in found.runs] == ["r01", "r02"]
     assert "another mode" in said
     assert "r03" in said

@@ -17,7 +17,7 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
 from diagnosis.noise.sensor_noise import campaign_noise
-from diagnosis.policy import SMALL_SHARE
+from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -56,9 +56,13 @@ def test_the_two_models_predict_the_same_readings(name, values):
     found = compare(made, np.array([*NOMINAL, *values]), RELEASE)
     assert [d.shape for d in found.differences] == [(1000,), (1000,)]
     assert max(np.max(np.abs(d)) for d in found.differences) < 3e-5
-    verdict = confirm([found])
+    verdict = confirm([found], Settings().answer.integrator_tolerance)
     assert verdict.agrees
-    assert verdict.rms_difference < verdict.tolerance == pytest.approx(SMALL_SHARE * NOISE / 2.0)
+    assert (
+        verdict.rms_difference
+        < verdict.tolerance
+        == pytest.approx(Settings().answer.integrator_tolerance * NOISE / 2.0)
+    )
 
 
 def test_every_run_may_have_parameters_of_its_own():
@@ -84,29 +88,31 @@ def test_campaigns_that_do_not_state_their_sizes_are_predicted_too(sizes, inerti
         data=dataclasses.replace(made.data, frontal_area=sizes[0], reference_length=sizes[1], width=sizes[2]),
     )
     common = np.array([inertia, DAMPING, 0.02, -0.01, 0.001])
-    assert confirm([compare(made, common, RELEASE)]).agrees
+    assert confirm([compare(made, common, RELEASE)], Settings().answer.integrator_tolerance).agrees
 
 
 def test_what_the_sensor_does_to_samples_is_not_done_to_their_means():
     """A clipped reading bends inside a block; the mean of a block cannot show that by being clipped."""
     found = compare(problem("sensor_clipping"), np.array([*NOMINAL, 0.25]), RELEASE)
-    verdict = confirm([found])
+    verdict = confirm([found], Settings().answer.integrator_tolerance)
     assert not verdict.agrees
     assert verdict.run == "r1"  # the one that swings beyond the limit
     exact = compare(problem("sensor_clipping", block=1), np.array([*NOMINAL, 0.25]), RELEASE)
-    assert confirm([exact]).rms_difference < 0.2 * verdict.rms_difference
+    assert (
+        confirm([exact], Settings().answer.integrator_tolerance).rms_difference < 0.2 * verdict.rms_difference
+    )
 
 
 def test_the_largest_difference_and_the_run_closest_to_its_tolerance_are_said():
     small, large = np.full(100, 1e-6), np.zeros(100)
     large[3] = 5e-6
     found = Comparison(("quiet", "loud"), [small, large], [small, large], (1e-5, 1e-3))
-    verdict = confirm([found])
+    verdict = confirm([found], Settings().answer.integrator_tolerance)
     assert (verdict.agrees, verdict.run) == (True, "quiet")
     assert verdict.largest_difference == pytest.approx(5e-6)
     assert (verdict.rms_difference, verdict.tolerance) == (pytest.approx(1e-6), pytest.approx(1e-6))
     worse = dataclasses.replace(found, differences=[1.01 * small, large])
-    assert not confirm([found, worse]).agrees
+    assert not confirm([found, worse], Settings().answer.integrator_tolerance).agrees
 
 
 def test_a_motion_that_mujoco_cannot_follow_is_said(monkeypatch):
@@ -116,21 +122,34 @@ def test_a_motion_that_mujoco_cannot_follow_is_said(monkeypatch):
     monkeypatch.setattr(module, "mujoco_blocks", refuse)
     found = compare(problem(), np.array(NOMINAL), RELEASE)
     assert not np.any(found.differences)
-    verdict = confirm([found])
+    verdict = confirm([found], Settings().answer.integrator_tolerance)
     assert not verdict.agrees
     assert verdict.failure == "the motion grows without bound"
     data = campaign()
-    said = cautions(data, campaign_noise(data), (), verdict, named=False)
+    said = cautions(
+        data, campaign_noise(data, Settings().noise), (), verdict, named=False, settings=Settings()
+    )
     assert any("MuJoCo model could not follow" in text for text in said)
     assert verdict.failure in " ".join(said)
 
 
 def test_a_disagreement_is_a_caution_and_agreement_is_none():
     data = campaign()
-    good = confirm([Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))])
-    bad = confirm([Comparison(("r1",), [np.zeros(9)], [np.full(9, 2e-5)], (1e-4,))])
-    assert cautions(data, campaign_noise(data), (), good, named=False) == ()
-    (said,) = cautions(data, campaign_noise(data), (), bad, named=False)
+    good = confirm(
+        [Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))],
+        Settings().answer.integrator_tolerance,
+    )
+    bad = confirm(
+        [Comparison(("r1",), [np.zeros(9)], [np.full(9, 2e-5)], (1e-4,))],
+        Settings().answer.integrator_tolerance,
+    )
+    assert (
+        cautions(data, campaign_noise(data, Settings().noise), (), good, named=False, settings=Settings())
+        == ()
+    )
+    (said,) = cautions(
+        data, campaign_noise(data, Settings().noise), (), bad, named=False, settings=Settings()
+    )
     assert "2.0e-05 rad" in said
     assert "r1" in said
 
@@ -138,12 +157,20 @@ def test_a_disagreement_is_a_caution_and_agreement_is_none():
 def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
     data = campaign()
     alone = dataclasses.replace(data, runs=data.runs[:1])
-    good = confirm([Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))])
+    good = confirm(
+        [Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))],
+        Settings().answer.integrator_tolerance,
+    )
     found = {}
     for speed in (0.0, 10.0):
         run = dataclasses.replace(alone.runs[0], wind_speed=speed, air_density=1.2)
         (said,) = cautions(
-            dataclasses.replace(alone, runs=(run,)), campaign_noise(alone), (), good, named=False
+            dataclasses.replace(alone, runs=(run,)),
+            campaign_noise(alone, Settings().noise),
+            (),
+            good,
+            named=False,
+            settings=Settings(),
         )
         runs = tuple(dataclasses.replace(r, wind_speed=speed) for r in problem().data.runs)
         found[speed] = (

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit
-from diagnosis.policy import MODEL_ERROR, SET_PRICE, STEEPNESS, WORTH_NAMING
 from diagnosis.search.weigh import UNKNOWN, FittedSet, log_weight, main_effect, misfit_scale, weigh
+from diagnosis.settings import Settings
 
 NAMES = ("a", "b", "c", "d", "e")
 COUNT = np.array([200.0, 200.0, 24.0, 24.0, 210.0, 29_000.0])
@@ -29,7 +29,10 @@ def fitted(left, gap, numbers=0):
 
 
 def probabilities(left, gap, **kwargs):
-    return {w.effects: w.probability for w in weigh(fitted(left, gap), nominal(gap, **kwargs))}
+    return {
+        w.effects: w.probability
+        for w in weigh(fitted(left, gap), nominal(gap, **kwargs), Settings().weighing)
+    }
 
 
 def channels(**values):
@@ -39,7 +42,7 @@ def channels(**values):
 
 @given(SETS, GAP)
 def test_probabilities_are_probabilities_and_in_order(left, gap):
-    found = weigh(fitted(left, gap), nominal(gap))
+    found = weigh(fitted(left, gap), nominal(gap), Settings().weighing)
     assert sum(w.probability for w in found) == pytest.approx(1.0)
     assert all(0.0 < w.probability <= 1.0 for w in found)
     first, *others = found
@@ -79,9 +82,9 @@ def test_an_error_of_the_frequency_does_not_hide_a_cause_in_the_damping():
 @pytest.mark.parametrize("channel", ["zero", "harmonics"])
 def test_a_misfit_of_the_zero_or_the_harmonics_does_not_hide_a_cause_in_the_damping(channel):
     """A quadratic damping closes all of its channel beside lost encoder counts that no set explains."""
-    scale = misfit_scale(nominal(channels(damping=3e4, **{channel: 3e6})))
-    dry = log_weight(channels(damping=3e3, **{channel: 3e6}), scale, 1, 0)
-    both = log_weight(channels(**{channel: 3e6}), scale, 2, 0)
+    scale = misfit_scale(nominal(channels(damping=3e4, **{channel: 3e6})), Settings().weighing)
+    dry = log_weight(channels(damping=3e3, **{channel: 3e6}), scale, 1, 0, Settings().weighing)
+    both = log_weight(channels(**{channel: 3e6}), scale, 2, 0, Settings().weighing)
     assert both > dry
 
 
@@ -89,8 +92,10 @@ def test_a_misfit_of_the_zero_or_the_harmonics_does_not_hide_a_cause_in_the_damp
 def test_a_further_effect_must_close_its_price(margin):
     """In the two channels that exchange nothing, alike."""
     gap, single = np.full(6, 1e6), 1e4
-    scale = misfit_scale(nominal(gap))[0]
-    pair = (single + scale) * np.exp(-margin * SET_PRICE / STEEPNESS / 2.0) - scale
+    scale = misfit_scale(nominal(gap), Settings().weighing)[0]
+    pair = (single + scale) * np.exp(
+        -margin * Settings().weighing.set_price / Settings().weighing.steepness / 2.0
+    ) - scale
     left = {key: channels(zero=x, harmonics=x) for key, x in ((("a",), single), (("a", "b"), pair))}
     found = probabilities(left, gap)
     assert (found[("a", "b")] > found[("a",)]) == (margin > 1.0)
@@ -99,7 +104,7 @@ def test_a_further_effect_must_close_its_price(margin):
 @given(st.floats(0.0, 0.1))
 def test_what_a_thousandth_of_the_motion_leaves_needs_no_cause(part):
     motion, gap = 1e12, channels(damping=1e10, zero=1e9)
-    small = part * MODEL_ERROR**2 * motion
+    small = part * Settings().weighing.model_error ** 2 * motion
     left = {("a",): channels(zero=small), ("a", "b"): channels()}
     found = probabilities(left, gap, motion=motion)
     assert found[("a",)] > found[("a", "b")]
@@ -128,8 +133,8 @@ def test_what_chance_adds_is_common_to_all_sets():
     left = {("a",): channels(damping=5.0), ("b",): channels(damping=900.0)}
     lower = {key: x - channels(damping=100.0) for key, x in left.items()}
     one, other = probabilities(left, gap), probabilities(lower, gap)
-    assert one[("b",)] < WORTH_NAMING
-    assert other[("b",)] < WORTH_NAMING
+    assert one[("b",)] < Settings().answer.rivals_from
+    assert other[("b",)] < Settings().answer.rivals_from
 
 
 def test_a_set_that_leaves_a_significant_channel_untouched_loses_to_unknown():
@@ -150,13 +155,13 @@ def test_a_gross_gap_may_leave_more_than_a_small_one():
 
 
 def test_without_sets_the_answer_is_unknown():
-    assert [w.effects for w in weigh([], nominal(channels(damping=1e4)))] == [UNKNOWN]
+    assert [w.effects for w in weigh([], nominal(channels(damping=1e4)), Settings().weighing)] == [UNKNOWN]
 
 
 def test_of_two_fits_of_the_same_effects_the_better_one_counts():
     gap = channels(damping=1e4)
     worse, better = FittedSet(("a", "b"), 0.5, channels(damping=5e3)), FittedSet(("b", "a"), 0.0, channels())
-    found = weigh([worse, better], nominal(gap))
+    found = weigh([worse, better], nominal(gap), Settings().weighing)
     assert {w.effects: w.share for w in found if w.effects != UNKNOWN} == {("a", "b"): 0.0}
 
 

@@ -9,7 +9,7 @@ from scipy.stats import binom, kstest
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.noise import gap
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend
-from diagnosis.policy import FALSE_ALARM_RATE
+from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import campaign, nominal
 
 STEADY = NoiseTrend(0.0, 0.0, 0.0, judged=False)
@@ -40,7 +40,7 @@ def test_white_residuals_raise_no_more_alarms_than_stated(fitted):
     rng = np.random.default_rng(12)
     trials = 2000
     alarms = sum(verdict(white(fitted, rng)).detected for _ in range(trials))
-    assert alarms <= binom.ppf(0.9999, trials, FALSE_ALARM_RATE)
+    assert alarms <= binom.ppf(0.9999, trials, Settings().gap.detection_rate)
 
 
 def test_p_values_of_white_residuals_are_uniform(fitted):
@@ -119,7 +119,7 @@ def test_noise_that_misbehaves_is_a_gap_unless_a_coarse_step_explains_it(fitted)
 def test_the_p_value_counts_the_tests(fitted):
     found = verdict(white(fitted, np.random.default_rng(18)))
     assert found.p_value == pytest.approx(min(1.0, min(found.tests.values()) * len(found.tests)))
-    assert found.detected == (found.p_value < FALSE_ALARM_RATE)
+    assert found.detected == (found.p_value < Settings().gap.detection_rate)
 
 
 def test_a_step_in_the_reading_a_thousandth_of_a_swing_is_seen():

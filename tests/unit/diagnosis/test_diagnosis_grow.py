@@ -11,11 +11,11 @@ from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
-from diagnosis.policy import MOST_CAUSES
 from diagnosis.search import grow as growth
 from diagnosis.search.grow import exchange, grow, prune, without
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.weigh import weigh
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.unit import gap_campaigns
 from tests.unit.gap_campaigns import INTERVAL, nominal
@@ -98,9 +98,12 @@ def test_a_set_of_three_is_found(of_three):
     for name, value in THREE.items():
         key = f"{name}.{effect_class(name).parameters()[0].name}"
         assert abs(three.fit.value(key) - value) < 4.0 * three.fit.std(key)
-    assert max(len(h.effects) for h in ranked) == 3 < MOST_CAUSES
+    assert max(len(h.effects) for h in ranked) == 3 < Settings().search.most_causes
     assert any(line.count(" + ") == 2 for line in steps)
-    assert weigh([h.fitted_set(base) for h in ranked], misfit(base))[0].effects == three.names
+    assert (
+        weigh([h.fitted_set(base) for h in ranked], misfit(base), Settings().weighing)[0].effects
+        == three.names
+    )
 
 
 def test_growth_ends_where_a_further_effect_closes_nothing():
@@ -116,7 +119,10 @@ def test_growth_ends_where_a_further_effect_closes_nothing():
 def left(*effects, damping):
     """A set that leaves χ² in the damping; nothing else is read of it."""
     return SimpleNamespace(
-        effects=effects, excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]), further_numbers=0
+        effects=effects,
+        excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        further_numbers=0,
+        fit=SimpleNamespace(settings=Settings()),
     )
 
 

@@ -8,8 +8,8 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.mains_lines import mains_line, mains_lines
 from diagnosis.noise.mains import find_hum, hum_remarks, refine_frequency, remove_hum
-from diagnosis.policy import FALSE_ALARM_RATE
 from diagnosis.search.investigate import nominal_study
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
@@ -49,7 +49,7 @@ def test_a_hum_is_found_and_taken_out_whole(frequency):
     assert line is not None
     refined = refine_frequency(data, line)
     assert abs(refined - frequency) < 3e-3
-    cleaned, hum = remove_hum(data, refined, NOISE**2)
+    cleaned, hum = remove_hum(data, refined, NOISE**2, Settings().read_off)
     assert abs(hum.amplitude - amplitude) < 4.0 * hum.std + 0.01 * amplitude
     assert hum.excess == pytest.approx(0.5 * amplitude**2 * (1.0 + 0.3**2) / NOISE**2, rel=0.1)
     left = [
@@ -173,7 +173,9 @@ def test_white_noise_is_a_hum_no_oftener_than_stated(runs, rate):
     for _ in range(trials):
         fit = noise_only(base, rng)
         lines = mains_lines(fit)
-        beyond += any(line.drop > chdtri(line.freedom, FALSE_ALARM_RATE / line.trials) for line in lines)
+        beyond += any(
+            line.drop > chdtri(line.freedom, Settings().read_off.hum_rate / line.trials) for line in lines
+        )
         found += find_hum(fit) is not None
     assert beyond <= 4  # of a Poisson variable of mean 0.6, five or more in 2500
     assert found <= beyond
@@ -183,7 +185,7 @@ def test_white_noise_is_a_hum_no_oftener_than_stated(runs, rate):
 def test_the_amplitude_s_error_is_as_stated():
     pulls = []
     for seed in range(20):
-        _, hum = remove_hum(humming(decays(seed), 3e-4), 50.0, NOISE**2)
+        _, hum = remove_hum(humming(decays(seed), 3e-4), 50.0, NOISE**2, Settings().read_off)
         pulls.append((hum.amplitude - 3e-4) / hum.std)
     assert 0.25 < np.mean(np.square(pulls)) < 2.6  # of χ²(20)/20: one in 10 000 on either side
 
@@ -260,7 +262,7 @@ def swelling(data, amplitude, depth):
 def test_a_hum_that_swells_is_taken_out_too_and_a_steady_one_costs_no_more(depth):
     clean = decays()
     data = swelling(clean, 1e-3, depth)
-    cleaned, hum = remove_hum(data, 50.0, NOISE**2)
+    cleaned, hum = remove_hum(data, 50.0, NOISE**2, Settings().read_off)
     left = [
         np.mean((a.record.yaw_rad - b.record.yaw_rad) ** 2)
         for a, b in zip(cleaned.runs, clean.runs, strict=True)

@@ -15,6 +15,7 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     trend_statistics,
 )
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
@@ -66,12 +67,12 @@ def test_the_periodogram_keeps_the_power():
 
 def test_quantisation_adds_a_twelfth_of_its_square():
     step = 1.5e-3
-    found = campaign_noise(decays(resolution=step))
+    found = campaign_noise(decays(resolution=step), Settings().noise)
     assert np.mean(list(found.variance.values())) == pytest.approx(NOISE**2 + step**2 / 12.0, rel=0.1)
 
 
 def test_stated_noise_that_the_records_bear_out_is_used():
-    found = campaign_noise(decays())
+    found = campaign_noise(decays(), Settings().noise)
     assert (found.source, found.stated_variance) == ("stated", NOISE**2)
     assert set(found.variance.values()) == {NOISE**2}
     assert found.used == NOISE**2
@@ -84,14 +85,14 @@ def test_stated_noise_may_be_that_before_rounding_or_after():
     step = 1.5e-3
     total = np.sqrt(NOISE**2 + step**2 / 12.0)
     for stated in (NOISE, total):
-        found = campaign_noise(decays(resolution=step, stated_noise=stated))
+        found = campaign_noise(decays(resolution=step, stated_noise=stated), Settings().noise)
         assert found.source == "stated"
         assert found.used == pytest.approx(total**2)
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.9, 1.1, 2.0])
 def test_stated_noise_that_the_records_contradict_is_not_used(factor):
-    found = campaign_noise(decays(stated_noise=factor * NOISE))
+    found = campaign_noise(decays(stated_noise=factor * NOISE), Settings().noise)
     assert (found.source, found.stated_variance) == ("estimated", pytest.approx((factor * NOISE) ** 2))
     assert found.used == found.estimated == pytest.approx(NOISE**2, rel=0.1)
     assert f"contradict the stated {factor * NOISE:.3g} rad: they contain 0.000" in found.reason
@@ -99,7 +100,7 @@ def test_stated_noise_that_the_records_contradict_is_not_used(factor):
 
 def test_where_no_noise_is_stated_it_is_estimated():
     for stated in (None, 0.0):
-        found = campaign_noise(decays(stated_noise=stated))
+        found = campaign_noise(decays(stated_noise=stated), Settings().noise)
         assert (found.source, found.stated_variance) == ("estimated", None)
         assert found.reason == "the campaign states no noise"
 
@@ -108,10 +109,11 @@ def test_where_no_noise_is_stated_it_is_estimated():
 def test_true_statements_are_borne_out_as_often_as_said():
     """Beyond three standard deviations of the estimate: 0.27 % of true statements, and none of 10 % errors."""
     trials = 400
-    kept = sum(campaign_noise(decays(seed)).source == "stated" for seed in range(trials))
+    kept = sum(campaign_noise(decays(seed), Settings().noise).source == "stated" for seed in range(trials))
     assert kept >= binom.ppf(1e-4, trials, chi2.cdf(9.0, 1))
     wrong = sum(
-        campaign_noise(decays(seed, stated_noise=1.2 * NOISE)).source == "stated" for seed in range(20)
+        campaign_noise(decays(seed, stated_noise=1.2 * NOISE), Settings().noise).source == "stated"
+        for seed in range(20)
     )
     assert wrong == 0
 
@@ -119,7 +121,7 @@ def test_true_statements_are_borne_out_as_often_as_said():
 @pytest.mark.parametrize(("rate", "stated"), [(1000.0, None), (200.0, None), (1000.0, 5e-4)])
 def test_records_without_noise_are_held_to_the_fits_own_accuracy(rate, stated):
     data = free_decays.campaign(rate=rate, stated_noise=stated)
-    found = campaign_noise(data)
+    found = campaign_noise(data, Settings().noise)
     assert found.source == "floor"
     assert "less than the accuracy of the fits" in found.reason
     assert np.sqrt(found.estimated) < 1e-7 < 1e-5 < np.sqrt(found.used) < 1e-4
@@ -136,13 +138,13 @@ def test_noise_of_a_sensor_is_far_above_the_floor():
 
 def test_runs_of_equal_noise_share_its_estimate_and_others_keep_their_own():
     quiet = decays()
-    assert len(set(campaign_noise(quiet).variance.values())) == 1
+    assert len(set(campaign_noise(quiet, Settings().noise).variance.values())) == 1
     rng = np.random.default_rng(8)
     runs = list(quiet.runs)
     record = runs[2].record
     louder = record.yaw_rad + rng.normal(0.0, 3.0 * NOISE, record.yaw_rad.size)
     runs[2] = replace(runs[2], record=Record(record.time_s, louder))
-    variance = campaign_noise(replace(quiet, runs=tuple(runs))).variance
+    variance = campaign_noise(replace(quiet, runs=tuple(runs)), Settings().noise).variance
     assert variance[runs[2].id] == pytest.approx(10.0 * NOISE**2, rel=0.3)
     assert variance[runs[0].id] == pytest.approx(NOISE**2, rel=0.3)
 

@@ -7,17 +7,16 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from diagnosis import policy
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.noise import gap
 from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
-from diagnosis.policy import FALSE_ALARM_RATE
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.unit.diagnosis.test_diagnosis_process_noise import buffeted
-from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow
+from tests.unit.gap_campaigns import NOISE, campaign, nominal, with_blow, with_settings
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.record import Record
 
@@ -54,7 +53,11 @@ def with_zero(data, zero, seed=1):
 def judged(data):
     """Fit, noise and verdict."""
     return gap.gap_or_colour(
-        nominal(data), campaign_noise(data), noise_trend(data), step=reading_step(data), coarse_step=False
+        nominal(data),
+        campaign_noise(data, Settings().noise),
+        noise_trend(data),
+        step=reading_step(data),
+        coarse_step=False,
     )
 
 
@@ -97,7 +100,7 @@ def test_coloured_noise_is_taken_for_a_wandering_zero_no_more_often_than_stated(
     trials = 60
     fits = [nominal(coloured(campaign(seed=seed), name, seed=seed)) for seed in range(trials)]
     alarms = sum(zero_wanders(before, noise_colour(before)) for before in fits)
-    assert alarms <= binom.ppf(1.0 - 1e-4, trials, FALSE_ALARM_RATE)
+    assert alarms <= binom.ppf(1.0 - 1e-4, trials, Settings().noise.wandering_rate)
 
 
 def warming(count, _rng):
@@ -113,9 +116,9 @@ def test_a_drift_that_every_run_repeats_is_a_gap_and_no_colour():
 
 
 @pytest.mark.parametrize("name", COLOURS)
-def test_noise_of_any_colour_repeats_itself_at_the_stated_rate_at_most(name, monkeypatch):
-    monkeypatch.setattr(policy, "FALSE_ALARM_RATE", 0.05)
-    fitted, rng, trials = nominal(campaign()), np.random.default_rng(4), 200
+def test_noise_of_any_colour_repeats_itself_at_the_stated_rate_at_most(name):
+    fitted = with_settings(nominal(campaign()), {"noise.repeated_rate": 0.05})
+    rng, trials = np.random.default_rng(4), 200
     draws = [[colour(name, r.size, rng) for r in fitted.residuals] for _ in range(trials)]
     alarms = sum(alike_in_all_runs(dataclasses.replace(fitted, residuals=noise)) for noise in draws)
     assert binom.ppf(1e-3, trials, 0.05) <= alarms <= binom.ppf(1.0 - 1e-3, trials, 0.05)
@@ -171,7 +174,11 @@ def test_white_noise_is_left_alone(seed):
     data = campaign(seed=seed)
     before = nominal(data)
     fit, noise, _ = gap.gap_or_colour(
-        before, campaign_noise(data), noise_trend(data), step=reading_step(data), coarse_step=False
+        before,
+        campaign_noise(data, Settings().noise),
+        noise_trend(data),
+        step=reading_step(data),
+        coarse_step=False,
     )
     assert fit is before
     assert noise.colour is None
@@ -212,7 +219,10 @@ def test_the_spectrum_and_its_uncertainty_are_those_of_the_noise():
     frequency = np.array([1.0, 3.0, 10.0, 60.0])
     turn = np.exp(-2j * np.pi * frequency * 4e-3)
     density = 1.0 + size**2 * (1.0 - pole**2) / np.abs(1.0 - pole * turn) ** 2
-    assumed = [campaign_noise(coloured(campaign(seed=s), "ar1", size, seed=s)).used for s in range(12)]
+    assumed = [
+        campaign_noise(coloured(campaign(seed=s), "ar1", size, seed=s), Settings().noise).used
+        for s in range(12)
+    ]
     found = [
         found.at(frequency) + np.log(variance / NOISE**2)
         for found, variance in zip(colours, assumed, strict=True)
@@ -244,7 +254,7 @@ def test_what_is_said_of_the_noise():
     assert "too slowly" in said[1]
     within = dataclasses.replace(found, within_step=True)
     assert "less than their steps" in str(noise_remarks(noise, slow, within)[0])
-    assert noise_remarks(campaign_noise(campaign()), NoiseTrend(0.0, 0.0, 0.0), found) == ()
+    assert noise_remarks(campaign_noise(campaign(), Settings().noise), NoiseTrend(0.0, 0.0, 0.0), found) == ()
 
 
 def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():
@@ -252,12 +262,17 @@ def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():
     rng = np.random.default_rng(4)
     count = np.tile(np.array([[3.0], [5.0], [10.0], [20.0]]), 4000)
     power = rng.gamma(count) / count
-    found = _steady(power, count)
+    found = _steady(power, count, Settings().noise.colour_band_rate)
     refused = int(np.sum(~found))
     assert 17 <= refused <= 68  # of 4000 at 1 %: outside with probability 3e-5
     louder = power * np.array([[1.0], [1.0], [1.0], [10.0]])
-    assert np.mean(_steady(louder, count)) < 0.5
+    assert np.mean(_steady(louder, count, Settings().noise.colour_band_rate)) < 0.5
     with_empty = (np.vstack((values, np.zeros(4000))) for values in (louder, count))
-    assert np.array_equal(_steady(*with_empty), _steady(louder, count))
+    assert np.array_equal(
+        _steady(*with_empty, Settings().noise.colour_band_rate),
+        _steady(louder, count, Settings().noise.colour_band_rate),
+    )
     alone = np.where(np.arange(4)[:, None] == 0, count, 0.0)
-    assert not _steady(power * (alone > 0.0), alone).any()  # one part cannot show that the level is steady
+    assert not _steady(
+        power * (alone > 0.0), alone, Settings().noise.colour_band_rate
+    ).any()  # one part cannot show that the level is steady

@@ -10,7 +10,6 @@ from scipy.stats import binom
 
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.policy import NEEDLESS_CHI2
 from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.grow import grow
@@ -24,6 +23,7 @@ from diagnosis.search.process_noise import (
     with_response,
 )
 from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments, wind_off_excess
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.unit.gap_campaigns import (
     CN_BETA,
@@ -138,13 +138,13 @@ def test_a_random_moment_of_all_runs_is_taken_for_one_of_a_single_run_at_the_sta
 
 def test_turbulence_in_one_run_is_not_that_of_the_stream(found):
     assert of_all_runs(found) > 0.1
-    assert is_steady_noise(found)
-    assert not is_steady_noise(replace(found, by_run=np.array([1.0, *np.full(7, 0.01)])))
+    assert is_steady_noise(found, Settings().moment)
+    assert not is_steady_noise(replace(found, by_run=np.array([1.0, *np.full(7, 0.01)])), Settings().moment)
     blown, still = buffeted(campaign(), 0.01, 4.0), campaign()
     last = max(i for i, (_, speed) in enumerate(CONDITIONS) if speed > 0.0)
     runs = tuple(blown.runs[i] if i == last else run for i, run in enumerate(still.runs))
     base = nominal(replace(still, runs=runs))
-    assert not is_steady_noise(fit_turbulence(base))
+    assert not is_steady_noise(fit_turbulence(base), Settings().moment)
     assert weigh_random_moments(base, [], BOTH) == []
 
 
@@ -189,7 +189,7 @@ def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
     base = nominal(buffeted(campaign(), 0.002, 1.0))
     narrow = fit_wandering_shedding(base)
     assert narrow is not None
-    assert narrow.drop > NEEDLESS_CHI2
+    assert narrow.drop > Settings().moment.acts_from
     assert weigh_random_moments(base, [], BOTH[1:]) == []
 
 
@@ -380,7 +380,7 @@ def test_turbulence_and_vortices_at_once_are_one_spectrum_with_two_parts():
     """The steady filter of both parts whitens what neither of them does alone; a missing kind names neither."""
     base = nominal(with_moment(buffeted(campaign(), 0.006, 2.0), wandering_vortices(0.15, 0.05, seed=8)))
     for alone in (fit_turbulence(base), fit_turbulence(base, centred=True), fit_wandering_shedding(base)):
-        assert not is_steady_noise(alone)
+        assert not is_steady_noise(alone, Settings().moment)
     (answer,) = weigh_random_moments(base, [], BOTH)
     assert answer.effects == ("buffeting", "vortex_shedding")
     parts = {part.band: part for part in answer.process.spectrum}
@@ -429,7 +429,7 @@ def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence
         return 0.03 * found / np.std(found)
 
     base = nominal(with_moment(campaign(), octave))
-    found = pn.likeliest(pn.random_moments(base))
+    found = pn.likeliest(pn.random_moments(base), Settings().moment)
     assert [part.band for part in found.spectrum] == ["broad_band", "broad_band"]
     (answer,) = weigh_random_moments(base, [], BOTH)
     assert answer.effects == ("buffeting",)

@@ -15,6 +15,7 @@ from diagnosis.noise.sensor_noise import (
     typical_step,
 )
 from diagnosis.search.investigate import fit_nominal, investigate
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records
@@ -65,7 +66,7 @@ def test_a_gap_is_larger_than_the_error_of_the_steps(share, gap):
 
 def test_noise_that_blurs_the_steps_needs_no_allowance():
     data = decays(500.0, 4e-4, noise=4e-4)
-    noise = campaign_noise(data)
+    noise = campaign_noise(data, Settings().noise)
     fit = fit_nominal(prepare(data, noise.variance))
     assert rounding_errors(fit, noise.white(reading_step(data)), reading_step(data)) is None
     assert judged(data)[0].problem.data.runs[0].noise_variance == noise.variance["r01"] / 2
@@ -75,7 +76,7 @@ def test_noise_that_blurs_the_steps_needs_no_allowance():
 def test_noise_hidden_by_a_coarse_step_is_measured_by_the_edges_it_crosses(share):
     """Truth: the noise added before rounding. The motion crosses a step in hundreds of samples."""
     data = decays(10_000.0, DEGREE, noise=share * DEGREE, duration=2.0)
-    for white in campaign_noise(data).white(lattice_step(data)).values():
+    for white in campaign_noise(data, Settings().noise).white(lattice_step(data)).values():
         assert white == pytest.approx(share * DEGREE, rel=0.3)
 
 
@@ -86,7 +87,7 @@ def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
         small, noise=1e-6, stated_noise=None, resolution=DEGREE, rate=1000.0, duration=6.0,
         rng=np.random.default_rng(2),
     )  # fmt: skip
-    noise = campaign_noise(data)
+    noise = campaign_noise(data, Settings().noise)
     fit = fit_nominal(prepare(data, noise.variance))
     errors = rounding_errors(fit, noise.white(reading_step(data)), reading_step(data))
     allowed = with_rounding(fit.problem.data, errors)
@@ -99,7 +100,7 @@ def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
 def test_the_errors_of_stretches_are_those_of_their_runs():
     """The power of the errors does not depend on where the runs are cut."""
     data = decays(200.0, DEGREE)
-    noise = campaign_noise(data)
+    noise = campaign_noise(data, Settings().noise)
     whole = prepare(data, noise.variance)
     powers = []
     for part in (whole, in_stretches(whole).data):

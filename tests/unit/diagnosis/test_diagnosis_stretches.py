@@ -1,5 +1,7 @@
 """Runs in stretches: their boundaries, and the fits that grow from them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,8 +73,8 @@ def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
     short = in_stretches(data)
     assert spread_out(short, data).places == short.places
     sizes = [run.reading.size for run in data.runs]
-    monkeypatch.setattr("diagnosis.likelihood.prepare.GROWN_ON", sum(sizes) - 1)
-    found, long = spread_out(short, data), long_stretch(short)
+    fewer = data.settings.changed({"search.grown_on": sum(sizes) - 1})
+    found, long = spread_out(short, replace(data, settings=fewer)), long_stretch(short)
     assert {place[0] for place in found.places if place[1] == 0} == set(range(len(sizes)))
     last = {number: max(1, round(size / long)) - 1 for number, size in enumerate(sizes)}
     expected = [place for place in short.places if min(place[1] // long, last[place[0]]) % 2 == 0]
@@ -82,7 +84,7 @@ def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
 
 def test_whole_runs_are_fitted_from_some_of_their_stretches(data, monkeypatch):
     monkeypatch.setattr("diagnosis.likelihood.prepare._LONG", 6)
-    monkeypatch.setattr("diagnosis.likelihood.prepare.GROWN_ON", 1000)
+    data = replace(data, settings=data.settings.changed({"search.grown_on": 1000}))
     short = spread_out(in_stretches(data), data)
     found, longest = fit_longer(fit_nominal(short.data), short, data)
     assert longest.data is data

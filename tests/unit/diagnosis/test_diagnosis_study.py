@@ -11,12 +11,12 @@ import pytest
 
 from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.mains import Hum
-from diagnosis.policy import AS_MUCH
 from diagnosis.search import investigate as investigation
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import _noise_explains, _polished, _weighed
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
+from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_sim.effects import effect_class, effect_from
 
@@ -108,7 +108,7 @@ def _left(excess: float, block: int, chance: float = 0.01, **given: object) -> S
     fitted = SimpleNamespace(excess=excess * block, chance=chance, problem=SimpleNamespace(data=data))
     noise = SimpleNamespace(variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL})
     found = {"nominal": fitted, "noise": noise, "coarse": False, "step": 0.0, "hum": None}
-    return SimpleNamespace(**(found | given))  # type: ignore[return-value]
+    return SimpleNamespace(settings=Settings(), **(found | given))  # type: ignore[return-value]
 
 
 OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.3, 0.5)]
@@ -140,7 +140,7 @@ def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_its
     """Truth: white residuals that hold a multiple of the share of a hum's power that no pure line removes."""
     hum = Hum(50.0, 1e-3, 1e-5, None, 20.0)
     rng = np.random.default_rng(4)
-    excess = share * AS_MUCH * hum.excess
+    excess = share * Settings().weighing.hum_left * hum.excess
     residuals = [np.sqrt(1.0 + excess) * rng.normal(size=r.size) for r in study.nominal.residuals]
     base = replace(study.nominal, residuals=residuals)
     found = _weighed(replace(study, hum=hum, hypotheses=()), base)
@@ -174,7 +174,7 @@ def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leav
     monkeypatch.setattr(investigation, "grow", grown)
     nominal = SimpleNamespace(problem=SimpleNamespace(data=None), point=None)
     sets = {(name,): SimpleNamespace(fit=name) for name in powers}
-    found = SimpleNamespace(nominal=nominal, hypothesis=sets.get)
+    found = SimpleNamespace(nominal=nominal, hypothesis=sets.get, settings=Settings())
     weighed = [Weighed((name,), 0.1, 0.01) for name in dict.fromkeys((first, "a", "b"))]
     weighed = weighed if first == "unknown" else [replace(one, probability=0.3) for one in weighed]
     clock = investigation._Clock(None)

@@ -16,6 +16,7 @@ from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.noise.sensor_noise import campaign_noise, scattered_variance
+from diagnosis.settings import Settings
 from tests.reference.free_decays import AREA, LENGTH, Setting, Truth, angle_of
 from tunnel_sim.effects.sensor import DroppedSamples
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -164,7 +165,7 @@ def test_rates_and_accelerations_give_the_same_rig(derivative, noise, jitter):
 
 @pytest.mark.parametrize("how", [{}, {"jitter": 0.9, "lost": 0.3}, {"rate": 100.0}, {"gap": (2.0, 4.0)}])
 def test_the_noise_of_uneven_records(how):
-    noise = campaign_noise(uneven_campaign(**how))
+    noise = campaign_noise(uneven_campaign(**how), Settings().noise)
     freedom = 4.0 * 8.0 * min(how.get("rate", 1000.0), 250.0) * 0.4
     assert noise.used / NOISE**2 == pytest.approx(1.0, abs=0.02 + 4.0 * np.sqrt(2.0 / freedom))
 
@@ -195,7 +196,7 @@ def test_a_hum_is_removed_down_to_the_noise():
     noisy = replace(data, runs=tuple(with_hum(run) for run in data.runs))
     frequency = refine_frequency(noisy, 50.02)
     assert frequency == pytest.approx(50.03, abs=1e-3)
-    cleaned, found = remove_hum(noisy, frequency, NOISE**2)
+    cleaned, found = remove_hum(noisy, frequency, NOISE**2, Settings().read_off)
     assert found.amplitude == pytest.approx(4e-3, abs=5.0 * found.std)
     for run, before in zip(cleaned.runs, data.runs, strict=True):
         added = run.record.yaw_rad - before.record.yaw_rad

@@ -16,6 +16,7 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import nominal_start, starting_points
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from diagnosis.where.along_motion import apparent_moment, backbones, drift
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
 from diagnosis.where.place import (
@@ -166,7 +167,7 @@ def test_gap_free_runs_are_not_named():
     named = 0
     for seed in range(8):
         data = campaign(seed=100 + seed)
-        named += bool(runs_beyond_chance(run_excesses(data, nominal(data))))
+        named += bool(runs_beyond_chance(run_excesses(data, nominal(data)), Settings().where))
     assert named <= binom.ppf(0.9999, 8, 0.01)
 
 
@@ -304,7 +305,8 @@ def test_the_larger_drift_decides_from_one_and_a_half_times_the_other(
 
 
 _ONE_DECAY = SimpleNamespace(
-    problem=SimpleNamespace(data=SimpleNamespace(runs=[SimpleNamespace(reading=np.zeros(100), drive=None)]))
+    settings=Settings(),
+    problem=SimpleNamespace(data=SimpleNamespace(runs=[SimpleNamespace(reading=np.zeros(100), drive=None)])),
 )
 
 
@@ -341,7 +343,8 @@ def _curve(frequency, damping, alone):
 )
 def test_runs_that_are_linear_each_and_do_not_agree_leave_the_channel_open_or_lack_damping(curves, channel):
     runs = [SimpleNamespace(reading=np.zeros(100)) for _ in curves]
-    data = SimpleNamespace(problem=SimpleNamespace(data=SimpleNamespace(runs=runs)))
+    problem = SimpleNamespace(data=SimpleNamespace(runs=runs))
+    data = SimpleNamespace(problem=problem, settings=Settings())
     found = SimpleNamespace(
         maps=SimpleNamespace(backbones=[_curve(*values) for values in curves]),
         excesses=[SimpleNamespace(excess=1.0) for _ in curves],

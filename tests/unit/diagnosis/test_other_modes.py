@@ -8,6 +8,7 @@ import pytest
 from diagnosis.answer.other_motions import second_modes
 from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.search.investigate import investigate
+from diagnosis.settings import Settings
 from tests.marks import slow
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -29,7 +30,7 @@ MOTION = (0.3, 2.2, 0.1)
 
 @pytest.mark.parametrize("rate", [0.2, 1.0])
 def test_a_second_mode_is_named_even_where_it_decays_in_a_quarter_of_the_run(rate):
-    (words,) = second_modes(campaign(MOTION, (0.02, 2.9, rate)))
+    (words,) = second_modes(campaign(MOTION, (0.02, 2.9, rate)), Settings().words)
     assert "swing contains a second mode" in words
     assert "2.9 Hz" in words
     assert "beside 0.3 rad at 2.2 Hz" in words
@@ -37,11 +38,11 @@ def test_a_second_mode_is_named_even_where_it_decays_in_a_quarter_of_the_run(rat
 
 @pytest.mark.parametrize("others", [(), ((0.02, 6.6, 0.3),), ((0.02, 2.21, 0.1),)])
 def test_one_mode_its_harmonic_and_a_mode_that_is_not_resolved_are_not_named(others):
-    assert second_modes(campaign(MOTION, *others)) == ()
+    assert second_modes(campaign(MOTION, *others), Settings().words) == ()
 
 
 def test_what_dies_out_within_a_tenth_of_a_cycle_is_no_mode():
-    assert second_modes(campaign(MOTION, (0.1, 0.5, 5.0))) == ()
+    assert second_modes(campaign(MOTION, (0.1, 0.5, 5.0)), Settings().words) == ()
 
 
 def two_modes(derivative, share):

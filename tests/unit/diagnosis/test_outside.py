@@ -10,6 +10,7 @@ from diagnosis.likelihood.residuals import misfit
 from diagnosis.search import investigate
 from diagnosis.search.outside import AnotherSpring, two_springs
 from diagnosis.search.weigh import UNKNOWN, FittedSet, weigh
+from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_reference.draw import Mixture, draw_campaign
 from tunnel_reference.make import as_campaign, simulate_set
@@ -56,10 +57,10 @@ def test_what_is_outside_is_probable_of_unknown():
     found = misfit(base)
     gap = replace(found, chi2=found.chi2 + 1e3 * (20.0 + 1e-6 * found.motion))
     inside = FittedSet(("a", "b"), 0.01, left)
-    alone = {w.effects: w.probability for w in weigh([inside], gap)}
+    alone = {w.effects: w.probability for w in weigh([inside], gap, Settings().weighing)}
     both = {
         w.effects: w.probability
-        for w in weigh([inside, FittedSet(("c", "d"), 0.01, left, outside=True)], gap)
+        for w in weigh([inside, FittedSet(("c", "d"), 0.01, left, outside=True)], gap, Settings().weighing)
     }
     assert both.keys() == alone.keys() == {("a", "b"), UNKNOWN}
     assert sum(both.values()) == pytest.approx(1.0)

@@ -14,6 +14,7 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.printing import decision, gap_table, parameters_table, undecided_words
 from diagnosis.result import FITTED, HELD_OUT, GapSummary, ParameterEstimate, RunGap
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.gap_campaigns import campaign as campaign_with
 from tests.unit.gap_campaigns import nominal, studied
@@ -39,10 +40,11 @@ def said(
 ) -> str:
     return verdict(
         causes,
-        decision(answers or ((" + ".join(causes), 0.9), ("unknown", 0.1))),
+        decision(answers or ((" + ".join(causes), 0.9), ("unknown", 0.1)), Settings().answer),
         gap(True) if size is None else size,
         rest=Remainder(material, 0.1, 0.0, material, {}, "What remains is small."),
         both_winds=both_winds,
+        chosen=Settings().words,
     )
 
 
@@ -179,7 +181,7 @@ def test_of_many_likely_answers_five_are_said_and_the_others_counted():
 
 def test_where_no_effect_is_common_the_channel_may_be():
     answers = (("coulomb_friction", 0.45), ("quadratic_damping", 0.46), ("unknown", 0.09))
-    found = decision(answers)
+    found = decision(answers, Settings().answer)
     assert not found.effects
     assert found.channels == pytest.approx({"damping": 0.91})
     assert "act on the damping (0.91)" in said("coulomb_friction", answers=answers)
@@ -190,27 +192,29 @@ def test_where_no_effect_is_common_the_channel_may_be():
 
 
 def test_the_credible_set_is_the_smallest_with_nine_tenths():
-    assert [name for name, _ in decision(UNDECIDED).credible] == [name for name, _ in UNDECIDED[:3]]
-    assert decision((("none", 0.999), ("unknown", 0.001))).credible == (("none", 0.999),)
+    assert [name for name, _ in decision(UNDECIDED, Settings().answer).credible] == [
+        name for name, _ in UNDECIDED[:3]
+    ]
+    assert decision((("none", 0.999), ("unknown", 0.001)), Settings().answer).credible == (("none", 0.999),)
 
 
 @pytest.mark.parametrize(("closed", "decided"), [(0.0, False), (0.09, False), (0.2, True), (None, True)])
 def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
     answers = (("free_play", 0.61), ("coulomb_friction", 0.35), ("unknown", 0.04))
-    found = decision(answers, closed)
+    found = decision(answers, Settings().answer, closed)
     assert found.decided is decided
     said_so = "Free play fits best, but does not predict readings held out of the fit." in undecided_words(
-        found
+        found, Settings().words
     )
     assert said_so is not decided
-    assert decision((("unknown", 0.9), ("free_play", 0.1)), 0.0).decided
+    assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, 0.0).decided
 
 
 def test_an_undecided_answer_is_undecided_on_every_page():
     given = document()
     given["candidates"][0]["probability"] = 0.41
     answers = [(one["effect"], one["probability"]) for one in given["candidates"]]
-    given |= decision(answers).to_json_dict()
+    given |= decision(answers, Settings().answer).to_json_dict()
     assert view.headline(given) == ("Undecided", "open")
     given["common"]["channels"] = {"damping": 0.95}
     assert view.headline(given)[0] == "Undecided: the damping, and more"
@@ -229,19 +233,20 @@ def estimates(**values):
 
 def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
     before, after = estimates(cn_beta=0.5, cn_r=-0.1), estimates(cn_beta=0.5004, cn_r=-0.1003)
-    words = immaterial_words(before, after)
+    words = immaterial_words(before, after, Settings().words)
     assert (
         words
         == "The gap is immaterial: its causes change Cnβ by less than 0.08 % and Cnr by less than 0.3 %."
     )
-    assert immaterial_words(before, after | estimates(cn_r=-0.102)) == ""  # 2 %
+    assert immaterial_words(before, after | estimates(cn_r=-0.102), Settings().words) == ""  # 2 %
     assert words in verdict(
         ("coulomb_friction",),
-        decision((("coulomb_friction", 0.9), ("unknown", 0.1))),
+        decision((("coulomb_friction", 0.9), ("unknown", 0.1)), Settings().answer),
         gap(True),
         rest=Remainder(False, 0.0, 1.0, False, {}, "Explained."),
         both_winds=False,
         beside=words,
+        chosen=Settings().words,
     )
 
 
@@ -266,11 +271,12 @@ def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named():
     assert nearly(replace(first, share=0.4)) == ""
     text = verdict(
         ("unknown",),
-        decision((("unknown", 0.6), ("quadratic_damping", 0.3), ("none", 0.1))),
+        decision((("unknown", 0.6), ("quadratic_damping", 0.3), ("none", 0.1)), Settings().answer),
         gap(True),
         rest=Remainder(False, 0.0, 1.0, False, {}, "It hardly matters."),
         both_winds=False,
         beside=nearly(first),
+        chosen=Settings().words,
     )
     assert "no effect is named as its cause. Quadratic damping would explain" in text
     assert "no effect of the vocabulary explains it" not in text

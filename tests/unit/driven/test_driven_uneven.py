@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose
 from diagnosis.noise.sensor_noise import campaign_noise
+from diagnosis.settings import Settings
 from identification import identify
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -50,7 +51,7 @@ def campaign(friction: float) -> Campaign:
 
 
 def test_the_noise_of_uneven_driven_runs_is_measured() -> None:
-    found = campaign_noise(campaign(0.0))
+    found = campaign_noise(campaign(0.0), Settings().noise)
     assert all(abs(value / NOISE**2 - 1.0) < 0.15 for value in found.variance.values())
 
 

@@ -13,6 +13,7 @@ from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.noise.sensor_noise import campaign_noise
+from diagnosis.settings import Settings
 from identification import identify
 from identification.examination.examine import examine
 from identification.examination.free_motion import centre_of, with_zeros
@@ -102,7 +103,7 @@ def test_each_run_is_fitted_with_its_own_zero():
 
 def test_the_diagnosis_fits_the_zeros_among_the_runs_own_parameters():
     kept = examine(repeats(OWN)).campaign
-    prepared = prepare(kept, campaign_noise(kept).variance)
+    prepared = prepare(kept, campaign_noise(kept, Settings().noise).variance)
     found = fit(Problem(prepared), nominal_start(prepared))
     assert "zero" not in found.problem.names
     assert found.point.release.shape == (6, 3)

@@ -16,6 +16,7 @@ import pytest
 
 from diagnosis import printing
 from diagnosis.printing import decision, run_words, undecided_words
+from diagnosis.settings import Settings
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import page as report_page
@@ -114,9 +115,9 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
 ) -> None:
     given = copy.deepcopy(given)
     given["candidates"][0]["probability"] = value
-    assert undecided_words(decision([("quadratic_damping", value)])).endswith(
-        f": quadratic damping ({text})."
-    )
+    assert undecided_words(
+        decision([("quadratic_damping", value)], Settings().answer), Settings().words
+    ).endswith(f": quadratic damping ({text}).")
     assert view.facts(given)[-1].value == text
     assert view.candidate_rows(given)[0]["probability"] == text
     assert printing.candidates_table(given).rows[0][1] == text

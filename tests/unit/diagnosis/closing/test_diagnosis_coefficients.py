@@ -24,10 +24,10 @@ from diagnosis.answer.units import own_estimate
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.policy import EVEN_SHARE, FORM_CHANGE_STD
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from identification.printing import estimated
 from tests.marks import slow
 from tests.unit.gap_campaigns import CN_BETA, CN_R, campaign, nominal, precise, studied
@@ -112,7 +112,7 @@ def test_an_unlikely_rival_makes_the_interval_one_sided(data, base, best):
 
 def test_unknown_leaves_the_value_and_adds_half_the_change_from_the_nominal_model(data, base, best):
     found = coefficients(Answers((Possible(0.9, best),), 0.1, base), precise(data))["cn_r"]
-    change = FORM_CHANGE_STD * (best.value("cn_r") - base.value("cn_r"))
+    change = Settings().answer.unknown_std * (best.value("cn_r") - base.value("cn_r"))
     assert found.value == pytest.approx(best.value("cn_r"))
     assert found.std == pytest.approx(np.sqrt(best.std("cn_r") ** 2 + 0.1 * change**2))
 
@@ -136,9 +136,9 @@ def test_answers_count_without_their_part_of_the_even_share(data, base, best):
     found = possible_answers(study, ())
     assert [one.fit for one in found.possible] == [best, base]
     assert [one.probability for one in found.possible] == pytest.approx(
-        [0.8 - EVEN_SHARE / 3, 0.04 - EVEN_SHARE / 3]
+        [0.8 - Settings().weighing.even_share / 3, 0.04 - Settings().weighing.even_share / 3]
     )
-    assert found.unknown == pytest.approx(0.16 - EVEN_SHARE / 3)
+    assert found.unknown == pytest.approx(0.16 - Settings().weighing.even_share / 3)
     assert found.possible[0].small is not None
     assert found.possible[1].small is None  # too improbable
 

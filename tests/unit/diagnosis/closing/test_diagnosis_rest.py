@@ -22,6 +22,7 @@ from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.weigh import Weighed
+from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 
@@ -135,15 +136,19 @@ def test_no_gap_leaves_nothing(data, base):
 def test_a_parameter_without_an_order_of_magnitude_is_not_determined(std, determined):
     (info,) = effect_class("cubic_stiffness").parameters()[:1]
     given = ParameterEstimate(0.2, std, "1/rad2")
-    found = meant_parameter(given, replace(info, scale=0.5), 0.3)
+    found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined)
     assert (found.std == std, found.determined) == (determined, determined)
 
 
 def test_a_range_no_wider_than_chance_determines_nothing():
     info = effect_class("coulomb_friction").parameters()[0]
     bounded = replace(info, fit_lower=1.0, fit_upper=3.0, scale=100.0)
-    assert meant_parameter(ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3).determined
-    assert not meant_parameter(ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3).determined
+    assert meant_parameter(
+        ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined
+    ).determined
+    assert not meant_parameter(
+        ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined
+    ).determined
 
 
 @pytest.mark.parametrize(

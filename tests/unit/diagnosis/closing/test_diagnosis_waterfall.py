@@ -27,6 +27,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise, SpectrumPart
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.weigh import FittedSet, Weighed
+from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import NOISE, nominal, studied
 from tunnel_sim.effects import effect_class
 
@@ -141,7 +142,7 @@ def test_the_probability_of_an_effect_is_that_of_the_answers_that_name_it():
         Candidate("sensor_drift", 0.125, 0.0, 1.0),
         Candidate("unknown", 0.175, 0.0, 0.0),
     )
-    found = inclusion(weighed, (HUM,))
+    found = inclusion(weighed, (HUM,), Settings().gap)
     assert found["free_play"] == pytest.approx(0.7)
     assert found["sensor_drift"] == pytest.approx(0.625)
     assert found[HUM] == 1.0 - 1e-3

@@ -1,0 +1,204 @@
+"""Settings of what is found before any effect is fitted: runs, noise, gap, and what is read off the records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from diagnosis.settings.origin import ONE_IN_1000, setting
+
+
+@dataclass(frozen=True)
+class SelectionSettings:
+    """Which runs and which parts of them are compared."""
+
+    other_mode: float = setting(
+        1.5,
+        "Frequency with the wind on over that without, from which a run swings in another mode.",
+        "judgement",
+    )
+    same_spring: float = setting(
+        1.1,
+        "Ratio of frequencies at one wind speed above which runs have different springs.",
+        "judgement",
+        "Stiffnesses a fifth apart. What depends on amplitude changes a frequency gradually, and "
+        "seldom as much.",
+    )
+    long_rest: float = setting(
+        0.1,
+        "Share of a run at its end from which a rest is cut off.",
+        "judgement",
+        "The place where friction stops a body says little about its motion.",
+    )
+    rest_stds: float = setting(
+        5.0,
+        "Distance from the end of a run within which the body counts as at rest.",
+        "convention",
+        unit="std of a block mean",
+    )
+    gross_misfit: float = setting(
+        0.01,
+        "Share of the readings' power in the residual beyond which a fit misses the motion itself.",
+        "judgement",
+    )
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """How the noise of the sensor is found."""
+
+    stated_rate: float = setting(
+        0.001,
+        "Rate at which noise that is as stated is said to contradict the statement.",
+        "convention",
+        ONE_IN_1000,
+    )
+    own_rate: float = setting(
+        0.001,
+        "Rate at which runs of the same noise are said to have a noise of their own.",
+        "convention",
+        ONE_IN_1000,
+    )
+    colour_rate: float = setting(
+        0.001, "Rate at which white noise is said to be coloured.", "convention", ONE_IN_1000
+    )
+    colour_flat: float = setting(
+        0.03,
+        "Departure of a band from a flat spectrum that does not count as colour.",
+        "judgement",
+        "Quantisation colours the noise as much.",
+    )
+    colour_parts: int = setting(
+        4,
+        "Fewest parts of the records in which a colour is sought.",
+        "judgement",
+        "Fewer agree by chance.",
+        unit="parts",
+    )
+    colour_amplitudes: float = setting(
+        2.0,
+        "Ratio of the greatest to the smallest motion among the parts, from which noise is seen not"
+        " to follow it.",
+        "judgement",
+        "The power of noise that follows the motion then differs by a factor of four.",
+    )
+    colour_band_rate: float = setting(
+        0.01,
+        "Rate at which a steady band of the noise is left out of its spectrum as unsteady.",
+        "convention",
+        "One in a hundred.",
+    )
+    colour_bands: float = setting(
+        0.75,
+        "Share of the bands that must be steady where the colour shows in still air alone.",
+        "judgement",
+        "Few parts are compared there, so that an unsteady band is easily overlooked.",
+    )
+    colour_slope_stds: float = setting(
+        2.0,
+        "How much steeper than found the spectrum may be below its lowest band.",
+        "convention",
+        unit="std",
+    )
+    colour_beyond: float = setting(
+        3.5,
+        "Where a gap remains, noise is coloured only if its spectrum beyond this multiple of the "
+        "motion's frequency is.",
+        "judgement",
+        "The bands up to there count as the motion's.",
+    )
+    wandering_rate: float = setting(
+        0.001, "Rate at which stationary noise is said to be a wandering zero.", "convention", ONE_IN_1000
+    )
+    repeated_rate: float = setting(
+        0.001, "Rate at which noise is said to repeat itself from run to run.", "convention", ONE_IN_1000
+    )
+    oscillation_rate: float = setting(
+        0.001,
+        "Rate at which noise is said to be an oscillation that the input excites.",
+        "convention",
+        ONE_IN_1000,
+    )
+
+
+@dataclass(frozen=True)
+class GapSettings:
+    """Whether there is a gap."""
+
+    detection_rate: float = setting(
+        0.001,
+        "Rate at which a campaign without a gap is said to have one, all tests together.",
+        "convention",
+        ONE_IN_1000,
+    )
+    noise_tolerance: float = setting(
+        0.03,
+        "Share by which the noise below 60 Hz may exceed the noise measured above it.",
+        "judgement",
+        "Quantisation colours the noise.",
+    )
+    noise_tails: float = setting(
+        1.15,
+        "Factor by which tails heavier than those of white noise are accepted.",
+        "judgement",
+        "Sensor noise is not quite normal.",
+    )
+    noise_above_stated: float = setting(
+        1.5,
+        "Ratio of variances up to which noise above the stated one is none of the gap.",
+        "judgement",
+        "Stated noise is often rounded to one digit.",
+    )
+    misbehaving_rate: float = setting(
+        1e-05,
+        "Rate at which the noise itself is said to misbehave, all tests together.",
+        "judgement",
+        "A hundredth of the rate of a gap: it outweighs any cause.",
+    )
+
+
+@dataclass(frozen=True)
+class ReadOffSettings:
+    """What is read off the records before any effect is fitted."""
+
+    coarse_step: float = setting(
+        1.5,
+        "Step of the readings over the stated resolution from which it is coarser than stated.",
+        "judgement",
+    )
+    hum_rate: float = setting(
+        0.001, "Rate at which records without a hum are said to have one.", "convention", ONE_IN_1000
+    )
+    hum_run_rate: float = setting(
+        0.001, "Rate at which a run without the hum's line is said to show it.", "convention"
+    )
+    hum_runs: float = setting(0.75, "Share of the runs that must show a hum.", "judgement")
+    hum_contrast: float = setting(
+        4.0,
+        "Drop of χ² at the hum's line over the largest beside it, all runs together.",
+        "judgement",
+        "Rods and corners ring too.",
+    )
+    hum_steady: float = setting(
+        0.25,
+        "Least power of a hum's line in one half of the runs over that in the other half.",
+        "judgement",
+        "What an amplifier or a lamp lets in may change by a factor of two; a mode excited at the "
+        "release loses more.",
+    )
+    hum_alike: float = setting(
+        0.02,
+        "Share of the evidence by which two frequencies of the mains may differ and explain the lines alike.",
+        "judgement",
+    )
+    hum_swell_rate: float = setting(
+        1e-05,
+        "Rate at which a steady hum is said to swell.",
+        "judgement",
+        "A hundredth of the rate of a hum.",
+    )
+    lead_rate: float = setting(
+        0.001,
+        "Rate at which motion without a lead over its input is said to have one.",
+        "convention",
+        ONE_IN_1000,
+    )

@@ -1,0 +1,30 @@
+"""A field of the settings: its value with its unit, what it decides, and where the value comes from."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from typing import Any, Literal
+
+Origin = Literal["convention", "physics", "estimated", "tuned", "judgement"]
+"""*Convention* is a customary level or the meaning of a word; *physics* follows from the rig. *Estimated* is fitted
+to campaigns whose causes are known, *tuned* is set on such campaigns by hand; blind tests use others. *Judgement*
+is chosen by reason alone."""
+
+ONE_IN_1000 = "One campaign in a thousand."
+BY_CHANCE = "By chance alone two numbers lower χ² by more than 20 once in 22,000 effects tried."
+
+
+def setting(
+    default: float, what: str, origin: Origin, why: str = "", *, unit: str = "1", decision: str = ""
+) -> Any:
+    """A field of a dataclass of settings.
+
+    Args:
+        default: the value, in ``unit``.
+        what: what the value decides, in a sentence.
+        why: the reason for the value, or what it was fitted to, in a sentence or two.
+        unit: ``1`` of a share, a ratio or a logarithm.
+        decision: number of the document in docs/decisions that has more.
+    """
+    about = {"unit": unit, "what": what, "origin": origin, "why": why, "decision": decision}
+    return field(default=default, metadata=about)

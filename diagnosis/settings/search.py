@@ -1,0 +1,366 @@
+"""Settings of the search: which sets of effects are fitted, and how they are weighed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from diagnosis.settings.origin import BY_CHANCE, ONE_IN_1000, setting
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Which effects and sets of effects are fitted."""
+
+    always_fitted: int = setting(
+        7,
+        "Effects fitted whatever linear theory predicts.",
+        "judgement",
+        "It ranks well but cannot judge.",
+        unit="effects",
+    )
+    predicted_share: float = setting(
+        0.01, "Predicted drop, as a share of χ², from which others are fitted too.", "judgement"
+    )
+    predicted_drop: float = setting(
+        20.0,
+        "Predicted drop of χ² from which an effect is fitted beside others.",
+        "judgement",
+        BY_CHANCE,
+        unit="χ²",
+    )
+    grown_from: int = setting(
+        2,
+        "Sets of each size to which another effect is added.",
+        "judgement",
+        "Time against coverage.",
+        unit="sets",
+    )
+    grown_by: int = setting(
+        4, "Effects added to a set.", "judgement", "Time against coverage.", unit="effects"
+    )
+    fitted_longer: int = setting(
+        4,
+        "Sets of each size, found on short stretches, that are fitted to long ones.",
+        "judgement",
+        "Time against coverage.",
+        unit="sets",
+    )
+    growth_loss: float = setting(
+        2.8,
+        "Logarithm of the weight that a set may lose for an effect added, and still grow.",
+        "judgement",
+        "Less than an effect costs that closes nothing; of two equal causes one closes only half.",
+    )
+    grown_on: int = setting(
+        45_000,
+        "Readings of stretches on which sets are grown; of longer campaigns some stretches are left out.",
+        "judgement",
+        "Time. Twelve runs of 10 s are below it.",
+        unit="block means",
+    )
+    most_causes: int = setting(
+        5,
+        "Causes named at most.",
+        "convention",
+        "The vocabulary's one to four, and a small one beside them.",
+        unit="effects",
+    )
+    same_change: float = setting(
+        0.02,
+        "Share of the power by which the changes made by two sets may differ and still be the same.",
+        "judgement",
+    )
+    form_open: float = setting(
+        0.02,
+        "Share of the excess that a textbook form must leave open for forms to be freed.",
+        "judgement",
+        decision="0008",
+    )
+    form_needed: float = setting(
+        0.2,
+        "Share of the excess by which χ² must rise without a freed form for the form to be kept.",
+        "tuned",
+        decision="0008",
+    )
+    freed_hypotheses: int = setting(
+        3,
+        "Sets of one effect whose forms are freed.",
+        "judgement",
+        "Time against coverage.",
+        unit="sets",
+        decision="0008",
+    )
+    rival_forms: float = setting(
+        0.05, "Probability from which the forms of a rival set are freed.", "judgement"
+    )
+    two_springs_from: float = setting(
+        0.05,
+        "Probability of a set from which two springs off are tried in place of its effects.",
+        "judgement",
+    )
+    two_springs_of: int = setting(
+        3,
+        "Fewest springs with which two of them may be said to be off.",
+        "physics",
+        "With fewer, one effect of the vocabulary fits any frequencies.",
+        unit="springs",
+    )
+    choices_from: float = setting(
+        0.05, "Probability of an answer from which its choices of a spring are sought.", "judgement"
+    )
+    moment_noise_from: float = setting(
+        0.05,
+        "Probability of a set from which the random moment that it leaves is tried as noise.",
+        "judgement",
+    )
+    moment_left: float = setting(
+        0.25,
+        "Share of the power of the missing moment that a set may leave as a random one, on a body "
+        "that nothing holds.",
+        "judgement",
+        "Half its size: a cause is the greater part of the gap. The EMPS axis, at 0.115, was in "
+        "sight and does not test it.",
+    )
+    moment_chance: float = setting(
+        1.0,
+        "Standard deviation of a share of what the best set leaves, below which sets are weighed by the moment.",
+        "convention",
+        "As large as the share itself.",
+    )
+    resolved_stds: float = setting(
+        2.0,
+        "Distance of an effect's size from zero in half of the records from which that half shows it.",
+        "convention",
+        unit="std",
+    )
+    gravity_cancels: float = setting(
+        0.8,
+        "Share of an unstated spring up to which gravity may cancel it.",
+        "judgement",
+        "What both leave is else called a spring that is not linear. Silverbox was in sight.",
+        decision="0029",
+    )
+    plausible_runs: float = setting(
+        0.5, "Least share of the runs in which an effect must still be what its name means.", "convention"
+    )
+    mode_runs: float = setting(
+        0.5, "Least share of the runs in which a second mode must be beside the motion.", "convention"
+    )
+    turned_as_well: float = setting(
+        1.01, "Ratio of χ² up to which a fit half a turn away explains the readings as well.", "judgement"
+    )
+
+
+@dataclass(frozen=True)
+class RandomMomentSettings:
+    """Whether a random moment acts, and what acts beside it."""
+
+    acts_from: float = setting(
+        20.0,
+        "Fall of −2 ln L from which a random moment acts.",
+        "judgement",
+        BY_CHANCE,
+        unit="χ²",
+        decision="0009",
+    )
+    part_price: float = setting(
+        20.0,
+        "Fall of −2 ln L that a centre or a second part of its spectrum must bring.",
+        "judgement",
+        BY_CHANCE,
+        unit="χ²",
+    )
+    part_stds: float = setting(
+        2.0, "Scatter between the runs by which that fall must exceed its price.", "convention", unit="std"
+    )
+    effect_price: float = setting(
+        20.0, "Fall of −2 ln L that an effect beside it must bring.", "judgement", BY_CHANCE, unit="χ²"
+    )
+    evident_from: float = setting(
+        20.0,
+        "Fall of χ² from which a further effect is evident beside it.",
+        "judgement",
+        BY_CHANCE,
+        unit="χ²",
+    )
+    further_effects: int = setting(
+        2,
+        "Effects added at most so that the innovations are white.",
+        "judgement",
+        "Time against coverage.",
+        unit="effects",
+    )
+    white_innovations: float = setting(
+        10.0,
+        "Largest departure of the innovations' power from white, by band and by quarter of a record.",
+        "judgement",
+        "By chance it is below 3.5; a real spectrum is not first-order. Beside the true sets of "
+        "opened campaigns it is at most 9.0.",
+        unit="std",
+        decision="0009",
+    )
+    burst_rate: float = setting(
+        0.001, "Rate at which a steady random moment is said to come in bursts.", "convention", ONE_IN_1000
+    )
+    burst_power: float = setting(
+        1.5,
+        "Greatest power of short innovations, over what chance explains, of a steady moment.",
+        "judgement",
+        "Real turbulence is not quite steady.",
+    )
+    one_run_rate: float = setting(
+        0.001, "Rate at which a moment of all runs is said to be that of one run.", "convention", ONE_IN_1000
+    )
+    phase_rate: float = setting(
+        0.001,
+        "Rate at which a random moment is said to follow the phase of the motion.",
+        "convention",
+        ONE_IN_1000,
+    )
+    law_share: float = setting(
+        0.5,
+        "Share of what is left that a law of the wind must close on held-out runs to take its place.",
+        "convention",
+        "The greater part, by the word.",
+    )
+    law_stds: float = setting(2.0, "Scatter by which that share must be exceeded.", "convention", unit="std")
+
+
+@dataclass(frozen=True)
+class WeighingSettings:
+    """How sets of effects are weighed, and when none of them is named."""
+
+    steepness: float = setting(1.25, "Exponent of what is left in a channel.", "tuned", decision="0007")
+    set_price: float = setting(
+        3.0,
+        "Logarithm of the weight that every effect costs.",
+        "tuned",
+        "A further effect must leave less than an eleventh of one channel, or close as much of "
+        "several together.",
+        decision="0007",
+    )
+    form_price: float = setting(
+        1.0,
+        "Logarithm of the weight that every freed form and instant costs.",
+        "tuned",
+        "That an instant costs as a form does is a judgement.",
+        decision="0007",
+    )
+    model_error: float = setting(
+        0.001,
+        "Greatest misfit of a channel that needs no cause, as a share of the motion.",
+        "judgement",
+        "Sensors and springs are linear and repeat to about one part in a thousand.",
+        decision="0007",
+    )
+    form_error: float = setting(
+        0.1,
+        "Misfit of a channel that needs no cause, as a share of the gap.",
+        "judgement",
+        "The form of a real effect departs from the textbook by about a tenth of what it does. 20 "
+        "small causes and the open records, which were in sight, do not tell 0.05 from 0.3.",
+        decision="0007",
+    )
+    leak: float = setting(
+        0.02,
+        "Share of the misfit in other channels that counts in a channel.",
+        "tuned",
+        "An error of the phase, squared, is one of the amplitude. All open records were in sight.",
+        decision="0007",
+    )
+    needless_chi2: float = setting(
+        20.0,
+        "χ² of a channel by which a set with a needless effect may be better than one without.",
+        "judgement",
+        "By chance alone two numbers lower χ² by more than 20 once in 22,000 effects tried. Of 25 "
+        "effects one does in one campaign of 900.",
+        unit="χ²",
+        decision="0007",
+    )
+    own_number_gain: float = setting(
+        10.0,
+        "χ² that an instant or phase of a run's own may gain by chance.",
+        "judgement",
+        "It is one number, and the best of many tried.",
+        unit="χ²",
+    )
+    needless_spring: float = setting(
+        0.05,
+        "Stiffness of an unstated spring, as a share of that with gravity, below which the rig "
+        "needs no spring.",
+        "judgement",
+        "The set then counts as one with two numbers less: a spring would have to soften by chance,"
+        " and as much as gravity does.",
+        decision="0018",
+    )
+    chance_stds: float = setting(
+        2.0, "χ² of a channel, against an unknown cause, that is chance.", "convention", unit="std"
+    )
+    unknown_at: float = setting(
+        0.6,
+        "Logarithm of the odds that a set is the cause: the number.",
+        "tuned",
+        "Raised from a logistic regression on simulated and measured fits, with all open records in sight.",
+        decision="0007",
+    )
+    unknown_gap: float = setting(
+        0.21,
+        "How much these odds rise with the significance of the gap.",
+        "estimated",
+        "A logistic regression on fits with and without the true effects, simulated and measured.",
+        decision="0007",
+    )
+    unknown_left: float = setting(
+        2.0,
+        "How much these odds fall with the logarithm of what is left over the share closed.",
+        "estimated",
+        "A logistic regression on fits with and without the true effects, simulated and measured.",
+        decision="0007",
+    )
+    least_closed: float = setting(
+        0.02,
+        "Share added to the share closed in these odds.",
+        "judgement",
+        "It keeps the logarithm finite.",
+        decision="0007",
+    )
+    unknown_from: float = setting(
+        0.5,
+        "Probability from which an unknown cause is the answer.",
+        "convention",
+        "More probable than all sets together.",
+    )
+    even_share: float = setting(
+        0.03,
+        "Share of the probability that is spread evenly over all answers.",
+        "tuned",
+        "How often an answer of overwhelming weight was wrong, where something acted that neither "
+        "fits nor rivals know.",
+        decision="0007",
+    )
+    choice_kept: float = setting(
+        0.05, "Probability from which the choice of a spring is stated.", "judgement"
+    )
+    hum_left: float = setting(
+        0.02, "Share of a hum that a line leaves and no cause has to explain.", "judgement"
+    )
+    noise_explains: float = setting(
+        1.0,
+        "Gap below which noise that misbehaves explains all of it.",
+        "judgement",
+        "As much again as the noise itself.",
+        unit="noise variances of a sample",
+    )
+    shares_chance: float = setting(
+        1.0,
+        "Standard deviation of a share of the gap above which the shares that sets leave are chance.",
+        "convention",
+        "As large as the gap itself.",
+    )
+    noise_excused: float = setting(
+        0.8,
+        "Share of so small a gap beyond which effects that close it are no misbehaving noise.",
+        "judgement",
+        "Effects of a few numbers close little of any noise.",
+        decision="0007",
+    )
