@@ -12,12 +12,11 @@ import numpy as np
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
-from diagnosis.answer.linear_theory import coefficient_move, coefficient_names
+from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, size_note, sized_coefficients
 from diagnosis.answer.verdict import (
-    blind_spots,
     cautions,
     immaterial_words,
     nearly_words,
@@ -129,7 +128,7 @@ def assemble(
     note = " ".join(filter(None, (*caveats, identified, size_note(rig, windy="cn_beta" in before))))
     found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), note)
     seconds["coefficients"] = time.perf_counter() - begun
-    similarity, names = study.similarity, coefficient_names(chosen.problem)
+    similarity, names = study.similarity, coefficients_of(chosen)
     stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
     moved = {
         name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
@@ -172,8 +171,8 @@ def assemble(
             noise.source,
             noise.reason,
         ),
-        hidden=own_hidden(answers.hidden, after, study.campaign, similarity),
-        blind_spots=blind_spots(data),
+        hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
+        blind_spots=study.model.blind_spots(data),
         seconds=seconds,
         provenance={
             "versions": {name: version(name) for name in _PACKAGES},

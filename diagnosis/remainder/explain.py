@@ -229,7 +229,7 @@ def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> 
     rows = basis - own @ (own.T @ basis)
     variance = np.einsum("ij,jk,ik->i", rows, found.solution.covariance[free:, free:], rows)
     values, std = rows @ found.solution.solution[free:], np.sqrt(np.maximum(variance, 0.0))
-    unit = "rad/s2" if unexplained.fit.problem.data.normalised else "N m"
+    unit = unexplained.fit.problem.data.model.moment_unit
     if kind in OF_READING:
         values, std, unit = values * r.angle, std * r.angle, "rad"
 

@@ -31,7 +31,7 @@ found = diagnose("campaign", settings=Settings().changed({"gap.detection_rate": 
 
 *Convention*: a customary level, or the meaning of a word. *Physics*: follows from the rig. *Estimated*: fitted to
 campaigns whose causes are known. *Tuned*: set on such campaigns by hand. [Blind tests](../blind-check.md) use other
-campaigns. *Judgement*: chosen by reason alone. [What each setting decides](../ablation.md) says what moving them does.
+campaigns. *Judgement*: chosen by reason alone. [What each setting decides](../ablation.md): what moving them does.
 
 The page is written by `python -m docs.studies.settings_page`. Numerical constants (grids, iterations, tolerances of
 solvers) are in the code that uses them.
