@@ -17,12 +17,14 @@ from diagnosis.answer.verdict import springs_off
 from diagnosis.diagnosable import choose, gain_words, refuse_undiagnosable
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel
+from diagnosis.model.joint import recorded, with_law
+from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.mains import hum_noted
-from diagnosis.own_joint import investigate_joint, lead_words, recorded, with_law
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.investigate import Progress
+from diagnosis.search.lead import investigate_with_lead
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect, effect_class, known_effects
@@ -60,14 +62,16 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
-    campaign = campaign if model is None else with_law(campaign, model.law)
-    refuse_undiagnosable(campaign)
+    own: NominalModel | None = None
+    if model is not None:
+        campaign, own = with_law(campaign, model.law)
+    refuse_undiagnosable(campaign, own)
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
     with answering_with(kinds):
-        chosen = choose(campaign, kinds, settings.selection)
+        chosen = choose(campaign, kinds, settings.selection, own)
         try:  # noise, nominal fit, where, search
-            study = investigate_joint(chosen.campaign, chosen.kinds, progress, settings)
+            study = investigate_with_lead(chosen.campaign, chosen.kinds, progress, chosen.model, settings)
         except TunnelError as error:
             if not chosen.limit_cycles:
                 raise
@@ -85,7 +89,7 @@ def diagnose(
                 unpatched = (Fact("unpatched", {"reason": error.what}),)
         by_moment = (Fact("by moment"),) if study.by_moment else ()
         gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
-        lead = map(as_stated, lead_words(study.campaign.law, study.similarity))
+        lead = map(as_stated, study.model.lead_words(study.similarity))
         left_out = (*chosen.left_out, *by_moment, *gain, *unpatched, *lead)
         assembled = assemble(study, where, maps, said, left_out, patched, chosen.kinds)
         noted = (

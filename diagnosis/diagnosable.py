@@ -13,17 +13,20 @@ import numpy as np
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import free_frequency, response_to_input
+from diagnosis.model.choose import nominal_model
+from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES
 from diagnosis.settings import SelectionSettings
 from identification.estimate import Status
 from identification.examination.examine import examine, with_clocks
 from identification.examination.self_excited import in_limit_cycle
+from identification.printing import unit_mark
 from identification.signal.run_fit import NO_WINDOWS, identify_run
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import refuse_untreated
-from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.errors import TunnelError
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
 
@@ -71,39 +74,48 @@ class Chosen:
     Args:
         examined: all runs that show the kind of motion diagnosed.
         campaign: those of them that one model can be fitted to.
+        model: that model.
         kinds: the effects to answer with; none where all runs are in limit cycles.
         left_out: which runs and effects were left out, and why.
     """
 
     examined: Campaign
     campaign: Campaign
+    model: NominalModel
     kinds: tuple[type[Effect], ...]
     remarks: tuple[Remark, ...]
     left_out: tuple[Fact, ...]
     limit_cycles: bool
 
 
-def choose(campaign: Campaign, kinds: Sequence[type[Effect]], settings: SelectionSettings) -> Chosen:
-    """Choose the runs of a campaign that are diagnosed together, and the effects to answer with.
+def choose(
+    campaign: Campaign,
+    kinds: Sequence[type[Effect]],
+    settings: SelectionSettings,
+    given: NominalModel | None = None,
+) -> Chosen:
+    """Choose the runs that are diagnosed together, their nominal model, and the effects to answer with.
+
+    Args:
+        given: a nominal model of one's own; None: that of the campaign's kind.
 
     Raises:
         TunnelError: when the examination refuses the records, or a run shows no motion that can be diagnosed.
     """
     found = diagnosable(campaign)
     if not found.limit_cycles:
-        refuse_motionless(found.campaign)
+        refuse_motionless(found.campaign, nominal_model(found.campaign, given))
     compared, left_out = comparable_runs(found.campaign, settings)
+    model = nominal_model(compared, given)
     if compared.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
         tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
         left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
-    kinds, said_of_drive = kinds_for(compared, kinds)
-    left_out = (*left_out, *map(as_stated, said_of_drive))
-    if compared.law is not None and compared.law.slide:
-        left_out = (*left_out, Fact("slide"))
+    kinds, said_of_drive = kinds_for(compared, kinds, model)
+    left_out = (*left_out, *map(as_stated, (*said_of_drive, *model.notes())))
     known = () if found.limit_cycles else kinds
-    return Chosen(found.campaign, compared, known, found.remarks, left_out, found.limit_cycles)
+    return Chosen(found.campaign, compared, model, known, found.remarks, left_out, found.limit_cycles)
 
 
 def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[Fact, ...]]:
@@ -176,18 +188,13 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
 
 
 _MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
-_OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
-_NO_MOMENT = (
-    "Without a spring these effects have no moment, and are not tried: {}. Play shows where a spring of stated "
-    "stiffness preloads the joint."
-)
-_NO_ZERO = (
-    "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
-)
 
 
-def refuse_undiagnosable(campaign: Campaign) -> None:
-    """Refuse driven runs that the diagnosis does not treat yet, and free ones of a joint that nothing holds.
+def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:
+    """Refuse driven runs that the diagnosis does not treat yet, and runs that the nominal model cannot describe.
+
+    Args:
+        given: a nominal model of one's own; None: that of the campaign's kind.
 
     Raises:
         TunnelError: for the first such run.
@@ -197,11 +204,6 @@ def refuse_undiagnosable(campaign: Campaign) -> None:
         assert run.drive is not None
         where = f"{campaign.name}, run '{run.id}'"
         refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
-        if campaign.law is not None and campaign.sensor.derivative:
-            what = (
-                "the run is driven and its sensor reads rates, which do not say where the model's joint moves"
-            )
-            raise TunnelError(what, where=where, remedy="record the angle, or leave --model out")
         if run.spring_stiffness == 0.0 and run.wind_on:
             what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
             raise TunnelError(what, where=where, remedy="leave the run out")
@@ -212,21 +214,6 @@ def refuse_undiagnosable(campaign: Campaign) -> None:
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )
-    on_body = [run.drive for run in driven if run.drive is not None and run.drive.on_body]
-    mixed = {drive.column == "moment_nm" or drive.gain is not None for drive in on_body}
-    if len(mixed) > 1 and any(run.spring_stiffness is None for run in campaign.runs):
-        raise TunnelError(
-            "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
-            where=campaign.name,
-            remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
-        )
-    free = [run for run in campaign.runs if run.drive is None]
-    if campaign.law is not None and campaign.law.stiffness == 0.0 and free:
-        raise TunnelError(
-            f"nothing holds the joint of the model, and nothing drives {_ids(free)}",
-            where=campaign.name,
-            remedy="leave these runs out, or add the spring, or gravity, that restores it",
-        )
     loose = [run for run in campaign.runs if run.unrestrained]
     if loose and not campaign.unrestrained:
         raise TunnelError(
@@ -235,15 +222,10 @@ def refuse_undiagnosable(campaign: Campaign) -> None:
             where=campaign.name,
             remedy="diagnose the two kinds of runs separately; tunnel identify takes them together",
         )
-    if any(run.input_gain is None for run in loose):
-        raise TunnelError(
-            "without a spring, an input of unknown gain shows no inertia, and no moment in N m",
-            where=campaign.name,
-            remedy="state drive_gain, or record the moment as moment_nm",
-        )
+    nominal_model(campaign, given).refuse(campaign)
 
 
-def refuse_motionless(campaign: Campaign) -> None:
+def refuse_motionless(campaign: Campaign, model: NominalModel) -> None:
     """Refuse a run that shows no motion to diagnose; the estimators leave out the same free decays.
 
     Raises:
@@ -261,14 +243,14 @@ def refuse_motionless(campaign: Campaign) -> None:
         if run.drive is None:
             continue
         found = response_to_input(run, campaign.sensor.derivative)
-        own = campaign.law is not None  # whose resonance is known, and need not be seen
-        if (run.unrestrained or own) and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
+        known = model.resonance_known
+        if known and (found is None or not found[2] * (run.input_gain or 1.0) > 0.0):
             raise TunnelError(
                 "the motion does not follow the moment of the input",
                 where=f"run {run.id}",
                 remedy="check its sign, and that all moments on the body are in it; or leave the run out",
             )
-        if not (run.unrestrained or own) and (found is None or not found[1] > 0.0):
+        if not known and (found is None or not found[1] > 0.0):
             raise TunnelError(
                 "no resonance between input and motion",
                 where=f"run {run.id}",
@@ -277,7 +259,7 @@ def refuse_motionless(campaign: Campaign) -> None:
 
 
 def kinds_for(
-    campaign: Campaign, kinds: Sequence[type[Effect]]
+    campaign: Campaign, kinds: Sequence[type[Effect]], model: NominalModel
 ) -> tuple[tuple[type[Effect], ...], tuple[str, ...]]:
     """The effects, of those to answer with, that can be fitted to a campaign, and sentences that name the others.
 
@@ -289,27 +271,19 @@ def kinds_for(
     if any(run.drive is not None and not run.drive.on_body for run in campaign.runs):
         gone[_MOVING_ROOT] = [kind for kind in kept if kind.on_spring and kind.channel == "damping"]
         kept = tuple(kind for kind in kept if kind not in gone[_MOVING_ROOT])
-    actuator = None if campaign.law is None else campaign.law.actuator
-    if actuator is not None and actuator.servo[1] != 0.0:
-        gone[_OF_SERVO] = [kind for kind in kept if kind.on_spring]
-        kept = tuple(kind for kind in kept if kind not in gone[_OF_SERVO])
-    if campaign.unrestrained:
-        gone[_NO_MOMENT] = [kind for kind in kept if kind.on_spring]
-        gone[_NO_ZERO] = [kind for kind in kept if kind.channel == "sensor" and kind.fitted]
-        kept = tuple(kind for kind in kept if kind not in (*gone[_NO_MOMENT], *gone[_NO_ZERO]))
+    for why, some in model.untried(campaign, kept).items():
+        gone[why], kept = some, tuple(kind for kind in kept if kind not in some)
     said = [why.format(", ".join(kind.name for kind in some)) for why, some in gone.items() if some]
     return kept, tuple(said)
 
 
 def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
     """The gain of the input by the model or the fit, in a sentence; none where the campaign states it."""
-    actuator = None if campaign.law is None else campaign.law.actuator
-    if actuator is not None:
-        said = f"gives {actuator.gain:.5g} N m per unit of control"
-        return (f"By the model, actuator {one_line(actuator.name)!r} {said}.",)
+    data = fit.problem.data
+    if said := data.model.gain_words():
+        return (said,)
     if "drive_gain" not in fit.problem.names:
         return ()
-    data = fit.problem.data
     known = any(
         r.drive is not None and (r.drive.column == "moment_nm" or r.drive.gain) for r in campaign.runs
     )
@@ -318,7 +292,7 @@ def gain_words(campaign: Campaign, fit: Fit) -> tuple[str, ...]:
     value, std = (data.similarity.own(1.0, unit) ** (-1 if known else 1) * one for one in (value, std))
     if known:
         return (f"Per N m of the input the angular acceleration is {value:.5g} ± {std:.2g} rad/s².",)
-    per = "rad/s²" if data.normalised else "N m"
+    per = unit_mark(data.model.moment_unit)
     return (f"The gain of the input is {value:.5g} ± {std:.2g} {per} per unit.",)
 
 

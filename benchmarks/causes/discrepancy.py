@@ -57,11 +57,11 @@ def linear(fit: Any, along: Sequence[Path]) -> Linear:
     common = np.concatenate([p.rows(c) for p, (c, _) in zip(along, slopes, strict=True)])
     own = block_diag(*[p.rows(o) for p, (_, o) in zip(along, slopes, strict=True)])
     runs, width = len(along), slopes[0][1].shape[1]
-    first = np.arange(common.shape[1]) < len(problem.nominal_names)
+    first = np.arange(common.shape[1]) < len(problem.names) - len(problem.effect_names)
     return Linear(
         np.concatenate([p.rows(r) for p, r in zip(along, residuals, strict=True)]),
         np.column_stack([common, own]),
-        np.concatenate([first, np.tile(np.arange(width) < problem.first_phase, runs)]),
+        np.concatenate([first, np.tile(np.arange(width) < width - problem.parameters.of_effects, runs)]),
         np.concatenate([np.ones(common.shape[1]), np.full(width * runs, float(runs))]),
     )
 

@@ -140,7 +140,5 @@ def candidates() -> tuple[str, ...]:
 
 def _fitted(names: tuple[str, ...], fit: Any) -> Fitted:
     problem, runs = fit.problem, len(fit.problem.data.runs)
-    own = fit.point.release.shape[1] - problem.first_phase
-    return Fitted(
-        names, fit.total, fit.count, len(problem.names) - len(problem.nominal_names) + own * runs, fit
-    )
+    own = problem.parameters.of_effects
+    return Fitted(names, fit.total, fit.count, len(problem.effect_names) + own * runs, fit)

@@ -12,11 +12,11 @@ import numpy as np
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
-from diagnosis.answer.linear_theory import coefficient_move, coefficient_names
+from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
-from diagnosis.answer.verdict import blind_spots, cautions, immaterial, nearly, remainder, spring_choices
+from diagnosis.answer.verdict import cautions, immaterial, nearly, remainder, spring_choices
 from diagnosis.facts.closure import PATCHED
 from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
@@ -49,8 +49,9 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(found, chosen.interval, chosen) or found.maps.time.interval(chosen.interval),
-        amplitude_rad=found.maps.amplitude.interval(chosen.interval),
+        time_s=blow_interval(found, chosen.interval_share, chosen)
+        or found.maps.time.interval(chosen.interval_share),
+        amplitude_rad=found.maps.amplitude.interval(chosen.interval_share),
         frequency_hz=found.frequency_interval,
     )
     return where, maps, described(where, place, [effect_class(name) for name in compared], study.settings)
@@ -100,7 +101,7 @@ def assemble(
     before = before_the_causes(study.nominal, after) if study.causes else after
     found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
     seconds["coefficients"] = time.perf_counter() - begun
-    similarity, names = study.similarity, coefficient_names(chosen.problem)
+    similarity, names = study.similarity, coefficients_of(chosen)
     stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
     moved = {
         name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
@@ -133,8 +134,8 @@ def assemble(
             None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance)),
             noise.source,
         ),
-        hidden=own_hidden(answers.hidden, after, study.campaign, similarity),
-        blind_spots=blind_spots(data),
+        hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
+        blind_spots=study.model.blind_spots(data),
         seconds=seconds,
         provenance={
             "versions": {name: version(name) for name in _PACKAGES},

@@ -11,8 +11,8 @@ import numpy as np
 from diagnosis.answer.held_out import Base
 from diagnosis.answer.units import own_parameters
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
+from diagnosis.model.parameters import Point
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
 from diagnosis.search.investigate import COARSE_STEP, HUM, Study
 from diagnosis.search.process_noise import LONGEST_BANDWIDTH
@@ -152,7 +152,7 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
             bound = fit.bound(name)
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
-            undetermined = study.settings.answer.undetermined
+            undetermined = study.settings.answer.undetermined_from
             found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
@@ -180,7 +180,7 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
                 limit = "upper" if part.bandwidth >= _AT_LIMIT * LONGEST_BANDWIDTH else None
                 found[severity] = ParameterEstimate(intensity, intensity * relative, "1")
                 found[place] = ParameterEstimate(part.bandwidth, None, "Hz", limit)
-    own = own_parameters(found, study.campaign, study.similarity)
+    own = own_parameters(found, study.campaign, study.similarity, study.model)
     single = len({name.split(".")[0] for name in own}) == 1
     return {name.split(".")[1] if single else name: value for name, value in own.items()}
 
@@ -198,7 +198,7 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
         on a body that nothing holds: the runs simulated are free decays.
     """
     fit, data = study.chosen, study.chosen.problem.data.undriven()
-    if study.nominal.problem.data.unrestrained:
+    if not data.model.restored:
         return ()
     problem = replace(fit.problem, data=data)
     own, amplitude = study.similarity.own(1.0, study.similarity.reading), _SHARE * data.swing

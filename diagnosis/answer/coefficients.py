@@ -13,15 +13,12 @@ from scipy.special import ndtr, ndtri
 from diagnosis.answer.candidates import meant_coefficient
 from diagnosis.answer.hidden import hidden_effects
 from diagnosis.answer.linear_theory import (
-    COEFFICIENT_UNITS,
     Beside,
     alone,
     beside,
     coefficient_move,
-    coefficient_names,
-    coefficient_value,
+    coefficients_of,
     starts_beside,
-    stiffness_names,
     wind_on_runs,
 )
 from diagnosis.likelihood.least_squares import Fit
@@ -176,20 +173,20 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         campaign: gives the digits to which the air density is stated.
 
     Returns:
-        By the names of `coefficient_names`; ``omega_n`` and ``zeta`` are those of small swings. The value is the
-        mean over the answers and over the sets of small causes beside them (`diagnosis.answer.linear_theory`), with
-        their probabilities. The variance is that within and that between them (the law of total variance). Within,
-        it is the fit's own, what is left (the scatter of the runs where it is beyond chance, or half the difference
-        between two halves of the data, `coefficient_move`, if that is greater), the rounding of air density, the
-        part of the causes' forms that no free decay shows, and half the change made by freeing the forms: another
-        family of forms may change as much. By the same rule ``unknown`` adds half the change from the nominal
-        model. The effect that could hide and would move the coefficient most (`diagnosis.answer.hidden`) adds the
-        square of half that move, since its largest size is two standard deviations. The central interval is given
-        where it is not that of a normal distribution. No standard deviation is given at a bound and where
-        the runs do not determine the coefficient.
+        By the names of the nominal model's coefficients; ``omega_n`` and ``zeta`` are those of small swings. The
+        value is the mean over the answers and over the sets of small causes beside them
+        (`diagnosis.answer.linear_theory`), with their probabilities. The variance is that within and that between
+        them (the law of total variance). Within, it is the fit's own, what is left (the scatter of the runs where
+        it is beyond chance, or half the difference between two halves of the data, `coefficient_move`, if that is
+        greater), the rounding of air density, the part of the causes' forms that no free decay shows, and half the
+        change made by freeing the forms: another family of forms may change as much. By the same rule ``unknown``
+        adds half the change from the nominal model. The effect that could hide and would move the coefficient most
+        (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size is two standard
+        deviations. The central interval is given where it is not that of a normal distribution. No standard
+        deviation is given at a bound and where the runs do not determine the coefficient.
     """
     fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
-    for name in coefficient_names(fit.problem):
+    for name in coefficients_of(fit):
         if _value(fit, name) is None:
             continue  # held
         move = max((hidden.moves[name].value for hidden in answers.hidden), default=0.0)
@@ -235,7 +232,7 @@ def before_the_causes(nominal: Fit, after: Mapping[str, ParameterEstimate]) -> d
         after: the averages over the answers; the variance adds the squared difference from these to theirs.
     """
     found = {}
-    for place, name in enumerate(coefficient_names(nominal.problem)):
+    for place, name in enumerate(coefficients_of(nominal)):
         value, given = _value(nominal, name), after.get(name)
         if value is None or given is None:
             continue
@@ -259,7 +256,7 @@ def _of_answer(
     if value is None:
         return None
     small = alone(fit) if answer.small is None else answer.small
-    place = coefficient_names(fit.problem).index(name)
+    place = coefficients_of(fit).index(name)
     left = float(small.scatter[place])
     if answer.small is not None:
         left = max(left, coefficient_move(replace(fit, residuals=small.left), name))
@@ -296,12 +293,13 @@ def _estimate(fit: Fit, name: str, value: float, std: float, parts: Mapping[str,
     """A coefficient, marked where the fit stopped at a bound or the runs do not determine it."""
     whole = sum(parts.values())
     shares = {source: part / whole for source, part in parts.items()} if whole > 0.0 else {}
-    bound = fit.bound("mechanical_damping") if name in ("zeta", "mechanical_damping") else None
-    if name == "omega_n" and len(stiffness_names(fit.problem.names)) == 1:  # no gravity instead of the spring
-        bound = fit.bound("stiffness")
-    found = ParameterEstimate(value, None if bound else std, COEFFICIENT_UNITS[name], bound, shares=shares)
+    model = fit.problem.data.model
+    limiting = model.bounded_by(fit.problem.names, name)
+    bound = None if limiting is None else fit.bound(limiting)
+    unit = model.coefficient_units[name]
+    found = ParameterEstimate(value, None if bound else std, unit, bound, shares=shares)
     return meant_coefficient(found, fit, name)
 
 
 def _value(fit: Fit, name: str) -> float | None:
-    return coefficient_value(fit.problem.names, fit.point.common, name)
+    return fit.problem.data.model.coefficient(fit.problem.names, fit.point.common, name)

@@ -14,15 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.answer.linear_theory import (
-    COEFFICIENT_UNITS,
     Starts,
     coefficient_gradients,
-    coefficient_names,
+    coefficients_of,
     influences,
     size_range,
 )
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.starting_points import (
     StartingPoint,
     absorbed,
@@ -30,6 +28,7 @@ from diagnosis.likelihood.starting_points import (
     project_out,
     second_order_starts,
 )
+from diagnosis.model.parameters import Point
 from diagnosis.result import Hidden, ParameterEstimate
 from diagnosis.search.hypothesis import own_gain
 from tunnel_sim.vocabulary.record import Array
@@ -56,8 +55,8 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
     total = fit.total if left is None else sum(float(r @ r) for r in left)
     beyond = max(total - fit.count - chosen.dispersion_stds * np.sqrt(2.0 * fit.count), 0.0)
     reach = chosen.hidden_stds**2 * (1.0 + beyond / chosen.misfit_degrees)
-    names, influence = coefficient_names(fit.problem), influences(fit)
-    found = []
+    names, influence = coefficients_of(fit), influences(fit)
+    found, units = [], fit.problem.data.model.coefficient_units
     for kind, points in starts:
         sizes: list[_Size] = []
         with suppress(np.linalg.LinAlgError):
@@ -69,7 +68,7 @@ def hidden_effects(fit: Fit, starts: Starts, left: Sequence[Array] | None = None
             largest = max(sizes, key=lambda one: float(np.max(np.abs(one.moves))))
             size = ParameterEstimate(largest.size, None, severity.unit)
             moves = {
-                name: ParameterEstimate(float(abs(move)), None, COEFFICIENT_UNITS[name])
+                name: ParameterEstimate(float(abs(move)), None, units[name])
                 for name, move in zip(names, largest.moves, strict=True)
             }
             stds = chosen.hidden_stds * float(np.sqrt(max(one.drop for one in sizes) / reach))
@@ -138,7 +137,7 @@ def _within(
         return None
     outermost = max((float(np.clip(k, least, greatest)) for k in ends), key=abs)
     moved = np.array([outermost, outermost**2][: len(parts)]) @ slopes
-    by_chance = own_gain(start.problem, start.point) - own_gain(fit.problem, fit.point)
+    by_chance = own_gain(start.problem) - own_gain(fit.problem)
     return _Size(outermost * size, moved, max(-lowest - by_chance, 0.0))
 
 

@@ -11,11 +11,10 @@ from itertools import combinations
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, normal_equations
-from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, project_out, starting_points
 from identification.statistics import scatter_of_runs
-from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import WindOnRun
 from tunnel_sim.vocabulary.record import Array
 
@@ -42,80 +41,9 @@ def wind_on_runs(fit: Fit) -> list[WindOnRun]:
     return found
 
 
-#: Parameters of a joint's law, by name in a fit, and their units.
-JOINT_UNITS = {
-    "yaw_inertia": "kg m2",
-    "mechanical_damping": "N m s/rad",
-    "added_stiffness": "N m/rad",
-    "moment_offset": "N m",
-}
-
-#: Units of the coefficients that a diagnosis states, by name.
-COEFFICIENT_UNITS = {"cn_beta": "1/rad", "cn_r": "1/rad", "omega_n": "rad/s", "zeta": "1", **JOINT_UNITS}
-
-#: Parameters that add to the spring's stiffness at small amplitudes, as gravity does.
-_STIFFNESSES = tuple(
-    f"{kind.name}.{kind.parameters()[0].name}"
-    for kind in ALL_EFFECTS
-    if kind.channel == "stiffness" and kind.parameters()[0].unit == "N m/rad"
-)
-
-
-def coefficient_names(problem: Problem) -> tuple[str, ...]:
-    """The coefficients that a diagnosis states.
-
-    Returns:
-        ``omega_n`` and ``zeta`` in normalised form, else ``cn_beta`` and ``cn_r``; before these the free inertia,
-        damping and stiffness of a joint in a model of one's own. Inertia, damping and constant moment of a body
-        that nothing holds.
-    """
-    if problem.data.normalised:
-        return "omega_n", "zeta"
-    own = JOINT_UNITS if problem.data.law is not None or problem.data.unrestrained else ()
-    air = () if problem.data.unrestrained else ("cn_beta", "cn_r")
-    return *(name for name in own if name in problem.names), *air
-
-
-def stiffness_names(names: Sequence[str]) -> tuple[str, ...]:
-    """The parameters whose sum is the stiffness of small swings, in normalised form.
-
-    Those of effects that add to the spring's are among them: a pendulum's only spring is gravity.
-    """
-    return ("stiffness", *(name for name in _STIFFNESSES if name in names))
-
-
-def coefficient_value(names: Sequence[str], common: Array, name: str) -> float | None:
-    """A coefficient of a fit, in 1/rad, rad/s or 1, or in the unit of the parameter; None where it has none.
-
-    Args:
-        names: of the common parameters.
-        common: their values, shape (common,).
-    """
-    value = dict(zip(names, common.tolist(), strict=True))
-    if name not in ("omega_n", "zeta"):
-        return value.get(name)
-    omega = math.sqrt(max(sum(value[part] for part in stiffness_names(names)), 0.0))
-    return omega if name == "omega_n" else value["mechanical_damping"] / max(2.0 * omega, 1e-150)
-
-
-def coefficient_gradient(names: Sequence[str], common: Array, name: str) -> Array:
-    """Derivative of a coefficient with respect to the common parameters, shape (common,).
-
-    Args:
-        names: of the common parameters, the coefficient or those it is made of among them.
-        common: their values, shape (common,).
-    """
-    found = dict.fromkeys(names, 0.0)
-    if name in found:
-        found[name] = 1.0
-        return np.array(list(found.values()))
-    omega = max(coefficient_value(names, common, "omega_n") or 0.0, 1e-150)
-    damping = float(common[list(names).index("mechanical_damping")])
-    slope = 0.5 / omega if name == "omega_n" else -0.25 * damping / omega / omega / omega
-    found |= dict.fromkeys(stiffness_names(names), slope)
-    if name == "zeta":
-        found["mechanical_damping"] = 0.5 / omega
-    return np.array(list(found.values()))
+def coefficients_of(fit: Fit) -> tuple[str, ...]:
+    """Names of the coefficients that a diagnosis states of a fit."""
+    return fit.problem.data.model.coefficient_names(fit.problem.names)
 
 
 def coefficient_move(fit: Fit, name: str) -> float:
@@ -131,7 +59,8 @@ def coefficient_move(fit: Fit, name: str) -> float:
         The move in the coefficient's unit, reduced by what the noise alone gives (2 standard deviations, in
         quadrature); 0 where it gives as much.
     """
-    gradient, chosen = coefficient_gradient(fit.problem.names, fit.point.common, name), fit.settings.answer
+    gradient = fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name)
+    chosen = fit.settings.answer
     _, slope, solutions = normal_equations(fit.jacobian, fit.residuals)
     # the step is what the fit had still to go
     direction, step = fit.covariance @ gradient, fit.covariance @ slope
@@ -175,7 +104,7 @@ class Beside:
 
     Args:
         weights: probability of each set, the empty one first, shape (sets,).
-        moves: how far each set moves the coefficients of `coefficient_names`, shape (sets, coefficients).
+        moves: how far each set moves the coefficients of the nominal model, shape (sets, coefficients).
         noise: variances due to the noise of the readings, of that shape.
         forms: further variances due to the forms of the small causes, of that shape.
         left: scaled residuals that the sets leave on the average, by run.
@@ -331,14 +260,9 @@ def coefficient_gradients(fit: Fit) -> Array:
 
     Zero for a coefficient that a model of one's own holds.
     """
-    names, common = fit.problem.names, fit.point.common
-    held = np.zeros(len(names))
-    composed = {"omega_n", "zeta"}
+    names, model = fit.problem.names, fit.problem.data.model
     return np.array(
-        [
-            coefficient_gradient(names, common, name) if name in names or name in composed else held
-            for name in coefficient_names(fit.problem)
-        ]
+        [model.gradient(names, fit.point.common, name) for name in model.coefficient_names(names)]
     )
 
 
@@ -381,7 +305,7 @@ def _step(
 
 def _scatter(fit: Fit, influence: list[Array], residuals: list[Array]) -> Array:
     """Standard deviations from the scatter of the runs; 0 where chance explains what is left."""
-    names, runs = coefficient_names(fit.problem), fit.problem.data.runs
+    names, runs = coefficients_of(fit), fit.problem.data.runs
     excess = sum(float(residual @ residual) for residual in residuals) - fit.count
     if excess <= fit.settings.answer.scatter_stds * math.sqrt(2.0 * fit.count):
         return np.zeros(len(names))

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, project_release
-from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.run_data import RunData
+from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _ANGLES = (0.35, 0.14)  # rad
 _SPEEDS = (0.0, 10.0, 20.0, 30.0)  # m/s
-_STIFFNESS_FACTORS = (0.5, 1.0, 2.0)
 _DURATIONS = (10.0, 30.0)  # s
 _PHASES = 8  # of the true model's periodic effect, to average over
 _PHASES_TRIED = (1, 720, 72)  # of each of the rival's none, one or two, to fit
@@ -27,14 +26,11 @@ def separating_run(first: Fit, second: Fit) -> dict[str, Any] | None:
 
     Returns:
         Spring stiffness (N m/rad), wind speed (m/s), release angle (rad), duration (s) and the expected
-        separation (see `separation`) in standard deviations of the noise; None in normalised form.
+        separation (see `separation`) in standard deviations of the noise; None where no stiffness is known.
     """
     data = first.problem.data
-    if data.normalised:
-        return None
     density = max((run.air_density for run in data.runs), default=0.0) or 1.2
-    factors = _STIFFNESS_FACTORS if data.law is None else ()  # a model's spring cannot be chosen
-    springs = sorted({round(k * f, 2) for k in data.springs for f in factors} | set(data.springs))
+    springs = data.model.planned_springs(data)
     springs = springs[:: max(1, len(springs) // 4)]
     speeds = [v for v in _SPEEDS if v == 0.0 or data.wind_on]
     found = []
@@ -111,15 +107,17 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
     The response to a periodic effect is of first order in its size, so that it rotates with its phase.
     """
-    problem = dataclasses.replace(fit.problem, data=fit.problem.data.with_runs((run,)))
-    turns = np.array([bool(kind.line) for kind in problem.effects if kind.name in problem.phased], bool)
+    # one instant, however many the runs made had
+    problem = dataclasses.replace(fit.problem, data=fit.problem.data.with_runs((run,)), instants=1)
+    turns = np.array([bool(kind.line) for kind in problem.effects if kind.own_numbers(1)], bool)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])
-    start = (angle, 0.0, 0.0)[: problem.first_phase]
+    first = len(problem.parameters.own) - problem.parameters.of_effects
+    start = (angle, 0.0, 0.0)[:first]
     own = np.array([*start, *np.where(turns, 0.0, 0.5)])  # samples are skipped in the middle of the run
     rows = [own, *(own + np.eye(2, own.size) * steps[:, None])]
     for turn in (0.5 * np.pi, np.pi):
-        rows += list(own + turn * np.eye(own.size)[problem.first_phase :][turns])
+        rows += list(own + turn * np.eye(own.size)[first:][turns])
     values = np.stack([v[0] for v in problem.predict([Point(fit.point.common, row[None]) for row in rows])])
     if not np.all(np.isfinite(values)):
         return None

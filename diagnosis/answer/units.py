@@ -8,31 +8,22 @@ from dataclasses import replace
 from typing import Any
 
 from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.model.nominal import NominalModel
 from diagnosis.result import Diagnosis, Hidden, ParameterEstimate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.units import NUMBER, dimension, in_si, product
 
-#: Units of what acts on the yaw axis, and of the same per unit inertia.
-_PER_INERTIA = {
-    "N m": "rad/s2",
-    "N m/rad": "1/s2",
-    "N m s/rad": "1/s",
-    "N m s2/rad2": "1/rad",
-    "rad/(N m)": "s2",
-}
 
-
-def parameter_unit(name: str, campaign: Campaign) -> str:
+def parameter_unit(name: str, campaign: Campaign, model: NominalModel) -> str:
     """The unit of an effect's parameter as identified.
 
     Returns:
-        The parameter's own unit; over that of Izz where any run states no spring, and times those of the frontal
-        area, the reference length and the air density where these are not stated.
+        The parameter's own unit; over that of Izz where the nominal model is per unit inertia, and times those of
+        the frontal area, the reference length and the air density where these are not stated.
     """
     effect, _, parameter = name.partition(".")
     info = next(info for info in effect_class(effect).parameters() if info.name == parameter)
-    normalised = any(run.spring_stiffness is None for run in campaign.runs)
     rig = campaign.rig
     if info.per_pressure:
         dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
@@ -40,17 +31,13 @@ def parameter_unit(name: str, campaign: Campaign) -> str:
             "kg/m3": not dense,
             "m2": rig.frontal_area is None,
             "m": rig.reference_length is None,
-            "1/(kg m2)": normalised,
+            "1/(kg m2)": model.per_inertia,
         }
         within = [dimension(unit) for unit, missing in factors.items() if missing]
         return in_si(functools.reduce(product, within, NUMBER))
     if info.unit == "l/V" and rig.reference_length is None:
         return "m"  # a·l, which over V is the time
-    if not normalised:
-        return info.unit
-    of = dimension(info.unit)
-    by_mass = in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else info.unit
-    return _PER_INERTIA.get(info.unit, by_mass)
+    return model.identified_unit(info.unit)
 
 
 #: By whether area and length are not stated: name and unit of the product identified in place of a coefficient.
@@ -118,7 +105,7 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
 
 
 def own_parameters(
-    given: Mapping[str, ParameterEstimate], campaign: Campaign, similarity: Similarity
+    given: Mapping[str, ParameterEstimate], campaign: Campaign, similarity: Similarity, model: NominalModel
 ) -> dict[str, ParameterEstimate]:
     """Parameters of effects in the measured campaign's units.
 
@@ -140,7 +127,7 @@ def own_parameters(
         factor = similarity.time**-beyond
         std = None if own.std is None else own.std * factor
         # A size, density or inertia that is not stated is 1 in own units: only the name of the unit changes.
-        unit = parameter_unit(name, campaign)
+        unit = parameter_unit(name, campaign, model)
         found[name] = replace(own, value=own.value * factor, std=std, unit=unit)
     return found
 
@@ -150,6 +137,7 @@ def own_hidden(
     coefficients: Mapping[str, ParameterEstimate],
     campaign: Campaign,
     similarity: Similarity,
+    model: NominalModel,
 ) -> tuple[Hidden, ...]:
     """The effects that could hide in the measured campaign's units, the one that moves a coefficient most first.
 
@@ -164,7 +152,7 @@ def own_hidden(
     found = []
     for one in sorted(given, key=lambda one: -greatest(one)):
         name = f"{one.effect}.{one.parameter}"
-        size = own_parameters({name: one.size}, campaign, similarity)[name]
+        size = own_parameters({name: one.size}, campaign, similarity, model)[name]
         moves = sized_coefficients(one.moves, campaign.rig)
         own = {coefficient: own_estimate(move, similarity) for coefficient, move in moves.items()}
         found.append(replace(one, size=size, moves=own))

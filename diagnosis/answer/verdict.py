@@ -12,7 +12,6 @@ from diagnosis.facts.found import Fact, Nearly, SpringError, SpringsOff
 from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
-from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
 from diagnosis.result import Confirmation, Hidden, ParameterEstimate, RunGap
@@ -59,7 +58,7 @@ def cautions(
         beside = {"run": confirmation.run, "tolerance": settings.answer.integrator_tolerance}
         found.append(Fact("not confirmed", figures | beside))
     windy = any(run.wind_on for run in campaign.runs)
-    if len(campaign.runs) < chosen.few_runs:
+    if len(campaign.runs) < chosen.runs_without_caution:
         kind = {"driven": campaign.driven, "windy": windy}
         found.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
     fitted = [run.id for run in runs if not run.held_out]
@@ -101,51 +100,6 @@ def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> di
     if any(moves[name] > limit for name, limit in limits.items()):
         return {}
     return {name: moves[name] / abs(given.value) for name, given in known.items()}
-
-
-BLIND_SPOTS = (
-    "a constant sensor lag or filter: it only shifts the release",
-    "an error of the clock",
-    "a common scale on the inertia and all stiffnesses",
-)
-
-
-_OF_WIND = "a scale error of wind speed or air density: Cnβ and Cnr absorb it"
-_OF_INPUT = "a common scale on the inertia and the moment of the input"
-_OF_GAIN = "a scale on the moment of the input as opposed to one on the inertia and all moments of the model"
-
-
-def blind_spots(data: Data) -> tuple[str, ...]:
-    """What these runs cannot show: clauses, those that apply to every campaign last."""
-    springs, speeds = len(data.springs), {run.wind_speed for run in data.runs if run.wind_on}
-    found = []
-    if data.normalised:
-        found.append("an error of a single spring: the runs state no stiffness")
-    elif springs == 0:
-        found.append(
-            "the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring"
-        )
-    elif data.law is not None and data.driven:
-        found.append("structural as opposed to viscous damping: there is one spring only")
-    elif springs < 2:
-        found.append(
-            "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only"
-        )
-    if not data.wind_on:
-        found.append("any effect of the air: there is no run with the wind on")
-    elif len(speeds) < 2:
-        found.append(
-            "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
-        )
-    if data.wind_on and all(run.wind_on for run in data.runs):
-        found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
-    last = (_OF_WIND,) if data.wind_on else ()
-    if data.driven:
-        found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
-        scale = BLIND_SPOTS[2] if springs or data.normalised else _OF_INPUT
-        scale = _OF_GAIN if springs and data.law is not None else scale
-        return (*found, BLIND_SPOTS[1], scale, *last)
-    return (*found, *BLIND_SPOTS, *last)
 
 
 def springs_off(study: Study) -> SpringsOff | None:

@@ -52,7 +52,7 @@ def decision(
     for answer in sorted(answers, key=lambda given: -given[1]):
         credible.append(answer)
         together += answer[1]
-        if together >= chosen.credible:
+        if together >= chosen.credible_from:
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]

@@ -30,7 +30,7 @@ class Fact:
 
 
 def as_stated(words: str) -> Fact:
-    """A sentence that another room states, as a fact."""
+    """A sentence that a nominal model brings, as a fact."""
     return Fact("stated", {"words": words})
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import REFERENCE_STIFFNESS
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
 from tunnel_sim.vocabulary.record import Array
 
@@ -150,10 +150,6 @@ def project_release(change: Array, slopes: Array) -> Array:
 _MAX_ITERATIONS = 25
 _HOPELESS = 5  # steps after which a fit must be better than the one it adds an effect to
 _AT_BOUND = 1e-9  # relative: a step that would leave the range is cut to its end exactly
-_AIR_STIFFNESS = (
-    4.0  # N m/rad in the strongest wind: a coefficient is judged by what it does, whatever the air
-)
-_AIR_DAMPING = 0.02  # N m s/rad in the same way
 _TRIES = 9  # dampings tried in a step, each ten times the last
 
 
@@ -223,6 +219,12 @@ class Fit:
     def value(self, name: str) -> float:
         """A common parameter by name."""
         return float(self.point.common[self.problem.names.index(name)])
+
+    @property
+    def fitted_spring(self) -> float | None:
+        """Stiffness of a spring that is fitted, N m/rad; None where it is stated or there is none."""
+        named = dict(zip(self.problem.names, self.point.common.tolist(), strict=True))
+        return self.problem.data.model.fitted_spring(named)
 
     def zero(self, index: int) -> float:
         """The sensor's zero in the run of an index."""
@@ -379,40 +381,6 @@ def _cost(residuals: list[Array]) -> float:
     return total if np.isfinite(total) else np.inf
 
 
-def difference_steps(problem: Problem, common: Array) -> Array:
-    """Steps for one-sided finite differences of the common parameters, away from bounds, in the parameters' units.
-
-    Args:
-        common: their values, shape (common,).
-    """
-    data = problem.data
-    windy = [run for run in data.runs if run.wind_on]
-    stiffness_load = max((data.air_moment(run) for run in windy), default=1.0)
-    damping_load = max(
-        (data.air_moment(run) * data.reference_length / run.wind_speed for run in windy), default=1.0
-    )
-    inputs = [float(np.max(np.abs(run.drive.values))) for run in data.runs if run.drive is not None]
-    scales = {
-        "yaw_inertia": 0.1,
-        "stiffness": 10.0,
-        "added_stiffness": 1.0,
-        "mechanical_damping": 0.02,
-        "cn_beta": _AIR_STIFFNESS / stiffness_load,
-        "cn_r": _AIR_DAMPING / damping_load,
-        "zero": 1.0,
-        "moment_offset": REFERENCE_STIFFNESS * data.swing,
-        "drive_gain": 1e-2 * REFERENCE_STIFFNESS * data.swing / max(inputs, default=1.0),
-    }
-    for kind in problem.effects:
-        for info in kind.parameters():
-            scales[f"{kind.name}.{info.name}"] = info.scale
-    sizes = [max(abs(value), scales[name]) for name, value in zip(problem.names, common, strict=True)]
-    steps = 1e-5 * np.array(sizes)
-    _, upper = problem.bounds
-    steps[common + steps > upper] *= -1.0
-    return steps
-
-
 def sensitivities(
     problem: Problem, point: Point, base: Fit | None = None, prediction: list[Array] | None = None
 ) -> list[tuple[Array, Array]]:
@@ -427,7 +395,7 @@ def sensitivities(
     """
     known = 0 if base is None else len(base.problem.names)
     known_own = 0 if base is None else base.point.release.shape[1]
-    steps = difference_steps(problem, point.common)
+    steps = problem.parameters.steps(point.common)
     points = []
     for i in range(known, steps.size):
         moved = point.common.copy()
@@ -435,7 +403,7 @@ def sensitivities(
         points.append(Point(moved, point.release))
     amplitude = np.maximum(np.abs(point.release[:, 0]), 1e-3)
     own = point.release.shape[1]
-    release_steps = [1e-5 * amplitude, 1e-4 * amplitude, *[np.full_like(amplitude, 1e-5)] * (own - 2)]
+    release_steps = problem.parameters.own_steps(amplitude)
     for j in range(known_own, own):
         release = point.release.copy()
         release[:, j] += release_steps[j]

@@ -8,15 +8,13 @@ the time scale of the rig that was measured.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
 from identification.signal.driven import driven_start
 from identification.signal.frequency import peak_of_swing
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run
-from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.campaign import Run
 from tunnel_sim.vocabulary.record import Record, evenly_spaced
 from tunnel_sim.vocabulary.units import dimension
 
@@ -77,77 +75,6 @@ AS_MEASURED = Similarity()
 """The similarity of a campaign with itself."""
 
 
-def similar_campaign(campaign: Campaign) -> tuple[Campaign, Similarity]:
-    """The campaign of the similar rig.
-
-    Returns:
-        The similar campaign, and how it was made. Its wind-off runs have a median frequency of
-        `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`; where no stiffness is
-        stated the inertia is 1 before and after. Where nothing holds the body, its inertia is the one that swings
-        at that frequency on a spring of that stiffness.
-    """
-    rig, sensor = campaign.rig, campaign.sensor
-    still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
-    time = float(np.median([free_frequency(run, sensor.derivative) for run in still])) / REFERENCE_FREQUENCY
-    springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
-    if campaign.unrestrained:
-        inertia = rig.yaw_inertia
-        if not inertia:  # by the response to the known moments
-            found = [(run.input_gain or 1.0, response_to_input(run)) for run in campaign.runs]
-            inertia = float(
-                np.median([gain / response[2] for gain, response in found if response is not None])
-            )
-        moment = REFERENCE_INERTIA / (inertia * time**2)
-    elif len(springs) < len(campaign.runs):
-        moment = time**-2
-    else:
-        moment = REFERENCE_STIFFNESS / float(np.median(springs))
-    rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
-    unit = ("rad", "rad/s", "rad/s2")[sensor.derivative]
-    change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
-
-    def known(value: float | None, unit: str) -> float | None:
-        return None if value is None else change.similar(value, unit)
-
-    similar_rig = RigProperties(
-        known(rig.yaw_inertia, "kg m2"),
-        None if rig.frontal_area is None else rig.frontal_area * change.area,
-        None if rig.reference_length is None else rig.reference_length * time,
-        None if rig.width is None else rig.width * time,
-    )
-    similar_sensor = dataclasses.replace(
-        sensor,
-        sample_rate=known(sensor.sample_rate, "Hz"),
-        resolution=known(sensor.resolution, unit),
-        noise_std=known(sensor.noise_std, unit),
-    )
-    runs = []
-    for run in campaign.runs:
-        readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
-        record, spring = Record(run.record.time_s * change.time, readings), run.spring_stiffness
-        drive = None if run.drive is None else _drive(run.drive, change)
-        spring = None if spring is None else spring * change.moment
-        runs.append(dataclasses.replace(run, record=record, spring_stiffness=spring, drive=drive))
-    law = campaign.law
-    if law is not None:
-        law = dataclasses.replace(
-            law,
-            inertia=change.similar(law.inertia, "kg m2"),
-            stiffness=change.similar(law.stiffness, "N m/rad"),
-            damping=change.similar(law.damping, "N m s/rad"),
-            friction=change.similar(law.friction, "N m"),
-            rest=law.rest - change.rest,
-            step=change.similar(law.step, "s"),
-            lead=change.similar(law.lead, "s"),
-            terms=tuple(
-                dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
-                for term in law.terms
-            ),
-        )
-    similar = dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=tuple(runs), law=law)
-    return similar, change
-
-
 _PADDING = 8  # times the record, which places the peak of a few cycles to within a few per cent
 _MOST_CORNER = 8.0  # times the motion: of a body that is mostly damping the inertia hardly shows
 _MOTION = 0.999  # share of the swing's power that the lines of the motion hold: beyond them is noise
@@ -202,12 +129,3 @@ def response_to_input(run: Run, derivative: int = 0) -> tuple[float, float, floa
     return driven_start(
         record.time_s, record.yaw_rad, values, sprung=not run.unrestrained, derivative=derivative
     )
-
-
-def _drive(drive: Drive, change: Similarity) -> Drive:
-    """An input, whose own times are those of its record."""
-    if not drive.on_body:
-        return drive
-    if drive.column == "drive":
-        return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
-    return dataclasses.replace(drive, values=drive.values * change.similar(1.0, "N m"))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, damped_step, try_fit
-from diagnosis.likelihood.problem import Point
+from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _TOGETHER = 16  # points predicted at once: a campaign's predictions fill memory

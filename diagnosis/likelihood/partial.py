@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.likelihood.least_squares import Fit, clip, damped_step, scaled_residuals
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
 from tunnel_sim.vocabulary.record import Array
 
 _STEPS = 6  # Gauss–Newton steps without a group

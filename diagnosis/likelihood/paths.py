@@ -156,21 +156,27 @@ class Path:
 
     @cached_property
     def nominal(self) -> Array:
-        """Responses to a step of the model's common parameters, in their order, shape (rows, common).
+        """Responses to a step of the model's common parameters, shape (rows, common).
 
-        The moments of inertia, damping and air are those along the measured path, so that they hold however far the
-        parameters move.
+        The moments of inertia, damping and air, which come first, are those along the measured path, so that they
+        hold however far the parameters move.
         """
         data, run = self.fit.problem.data, self.run
         inertia, damping, stiffness = linear_coefficients(self.fit, self.index)
         pressure = data.air_moment(run)
         lag = pressure * data.reference_length / run.wind_speed if run.wind_on else 0.0
         swing = (stiffness * self.angle + damping * self.rate) / inertia  # the angular acceleration, reversed
-        moments = [-self.angle if data.normalised else swing, -self.rate]
-        if data.wind_on:
-            moments += [pressure * self.angle, lag * self.rate]
-        others = self.rows(self.fit.jacobian[self.index][0][:, len(moments) :])
-        return np.column_stack([self.response(np.column_stack(moments)), others])
+        moments = {
+            "yaw_inertia": swing,
+            "stiffness": -self.angle,
+            "mechanical_damping": -self.rate,
+            "cn_beta": pressure * self.angle,
+            "cn_r": lag * self.rate,
+        }
+        names = self.fit.problem.names
+        along = self.response(np.column_stack([moments[name] for name in names if name in moments]))
+        others = [place for place, name in enumerate(names) if name not in moments]
+        return np.column_stack([along, self.rows(self.fit.jacobian[self.index][0][:, others])])
 
 
 def paths(fit: Fit) -> list[Path]:

@@ -16,8 +16,10 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
-from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.run_data import Data, RunData, Samples
+from diagnosis.model.choose import nominal_model
+from diagnosis.model.nominal import NominalModel
+from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run
@@ -33,6 +35,7 @@ def prepare(
     noise_variance: dict[str, float],
     similarity: Similarity = AS_MEASURED,
     interval: float = BLOCK_INTERVAL,
+    model: NominalModel | None = None,
     settings: Settings = Settings(),
 ) -> Data:
     """Average a campaign's records in blocks.
@@ -41,16 +44,15 @@ def prepare(
         noise_variance: of one sample, rad², by run id.
         similarity: how the campaign was made from the measured one.
         interval: between the blocks, s; the nearest number of samples, at least one.
+        model: nominal model of the campaign; None: that of its kind.
         settings: of the diagnosis.
 
     Returns:
-        The prepared data. Where any run states no stiffness, all are taken in normalised form; where a wind-on run
-        states no air density, all have the density 1 kg/m³.
+        The prepared data. Where a wind-on run states no air density, all have the density 1 kg/m³.
     """
     rig = campaign.rig
-    held = {} if campaign.law is None else campaign.law.held
+    model = model or nominal_model(campaign)
     dense = all(run.air_density is not None for run in campaign.runs if run.wind_on)
-    normalised = any(run.spring_stiffness is None for run in campaign.runs)
     runs = []
     for run in campaign.runs:
         record = run.record
@@ -75,42 +77,32 @@ def prepare(
             derivative=campaign.sensor.derivative,
             samples=samples,
         )
-        lead = 0.0 if campaign.law is None else campaign.law.lead
-        runs.append(data if run.drive is None else _driven(data, run, lead, normalised=normalised))
+        runs.append(data if run.drive is None else _driven(data, run, model))
     return Data(
         runs=tuple(runs),
         frontal_area=rig.frontal_area or similarity.area,
         reference_length=rig.reference_length or similarity.time,
         width=rig.width or 0.0,
-        normalised=normalised,
-        yaw_inertia=rig.yaw_inertia,
-        own_zeros=campaign.sensor.zero == "per_run" and "zero" not in held and not campaign.unrestrained,
+        model=model,
         similarity=similarity,
-        law=campaign.law,
         settings=settings,
     )
 
 
-def _driven(data: RunData, run: Run, lead: float, *, normalised: bool) -> RunData:
-    """A driven run with its input, which acts earlier by ``lead`` (s).
-
-    Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's root
-    acts by the spring's stiffness.
-    """
+def _driven(data: RunData, run: Run, model: NominalModel) -> RunData:
+    """A driven run with its input."""
     assert run.drive is not None
-    known = run.drive.column != "drive" or run.drive.gain is not None
     record = run.record
     begun = 0.0 if record.uniform else 0.5 * record.sample_interval  # as the raster of the blocks does
     moment = DriveMoment(
         record.time_s - record.time_s[0] + begun,
         run.drive.values,
         scale=1.0 if run.drive.gain is None else run.drive.gain,
-        delay=-lead,
+        delay=-model.lead,
         held=run.drive.hold == "zero",
         on_body=run.drive.on_body,
     )
-    free = run.drive.on_body and (normalised or not known)
-    return dataclasses.replace(data, drive=moment, gain_free=free)
+    return dataclasses.replace(data, drive=moment, gain_free=model.fits_gain(run.drive))
 
 
 def without_start(data: Data) -> Data:

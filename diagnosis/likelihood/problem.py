@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -12,8 +12,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.model.parameters import Parameter, ParameterSet, Point
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.parameters import SWING
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate, slow_motion
 from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
@@ -34,22 +34,6 @@ _AIR = (
 _POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
 
 
-@dataclass(frozen=True)
-class Point:
-    """A value of every parameter of a problem.
-
-    Args:
-        common: parameters common to the runs, in the order of `Problem.names`, shape (common,).
-        release: of every run its own parameters, shape (runs, own): angle (rad) and rate (rad/s) of the sensor's
-            end at the record's start, the sensor's zero (rad) where each run has its own, then in the effects'
-            order the phase (rad) of each periodic one and the instants (shares of the run's length) of the one
-            that skips samples.
-    """
-
-    common: Array
-    release: Array
-
-
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What is fitted: prepared runs, and the effects added to the nominal model.
@@ -58,6 +42,7 @@ class Problem:
         effects: effect classes whose parameters are free.
         fixed: value of effect parameters that are held, as ``effect.parameter``.
         free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
+        instants: how many instants every run has for an effect that skips samples.
         rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
             motion, which is much faster and exact as far as the rig is linear.
     """
@@ -66,27 +51,39 @@ class Problem:
     effects: tuple[type[Effect], ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
     free_forms: tuple[str, ...] = ()
+    instants: int = 1
     rod_followed: bool = False
 
     @cached_property
-    def nominal_names(self) -> tuple[str, ...]:
-        """Names of the nominal model's common parameters."""
-        first = "stiffness" if self.data.normalised else "yaw_inertia"
-        spring = () if self.data.law is None else ("added_stiffness",)
-        air = ("cn_beta", "cn_r") if self.data.wind_on else ()
-        gain = ("drive_gain",) if self.data.gain_free else ()
-        zero = () if self.data.own_zeros else ("moment_offset",) if self.data.unrestrained else ("zero",)
-        names = (first, "mechanical_damping", *spring, *air, *gain, *zero)
-        return tuple(name for name in names if name not in self._held)
-
-    @cached_property
-    def _held(self) -> Mapping[str, float]:
-        return {} if self.data.law is None else self.data.law.held
+    def parameters(self) -> ParameterSet:
+        """All parameters: the nominal model's first, then the effects' in their order."""
+        nominal, held = self.data.model.parameters(self.data), dict(self.fixed)
+        found, swing = list(nominal), self.data.swing
+        for kind in self.effects:
+            for info in kind.parameters():
+                name = f"{kind.name}.{info.name}"
+                free = not info.of_input and (not info.form or kind.name in self.free_forms)
+                if free and name not in held and self.data.model.tells(info, swing):
+                    low, high = info.fit_range(swing)
+                    found.append(Parameter(name, info.unit, low, high, info.scale, effect=kind.name))
+            for own in kind.own_numbers(self.instants):
+                found.append(Parameter(f"{kind.name}.{own}", "1", owner="per_run", effect=kind.name))
+        return ParameterSet(tuple(found))
 
     @property
-    def first_phase(self) -> int:
-        """Place of the first phase or instant among a run's own parameters."""
-        return 3 if self.data.own_zeros else 2
+    def names(self) -> tuple[str, ...]:
+        """Names of all common parameters, the nominal ones first."""
+        return self.parameters.names
+
+    @cached_property
+    def effect_names(self) -> tuple[str, ...]:
+        """Names of the free effect parameters, as ``effect.parameter``."""
+        return tuple(one.name for one in self.parameters.common if one.effect)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and greatest values of the common parameters."""
+        return self.parameters.bounds
 
     def zero(self, common: Array, own: Array) -> float:
         """The sensor's zero in one run, in the unit of the reading.
@@ -95,61 +92,13 @@ class Problem:
             common: as in `Point`, shape (common,).
             own: of the run, a row of ``Point.release``, shape (own,).
         """
-        if self.data.own_zeros:
-            return float(own[2])
-        if self.data.unrestrained:  # it cannot be separated from the initial angle
-            return 0.0
-        return self._held["zero"] if "zero" in self._held else float(common[self.nominal_names.index("zero")])
+        return self._values(common, own).get("zero", 0.0)
 
-    @cached_property
-    def effect_names(self) -> tuple[str, ...]:
-        """Names of the free effect parameters, as ``effect.parameter``."""
-        # in small swings the rest angle of a body that nothing else holds acts as a constant moment does
-        law = self.data.law
-        hangs = law is not None and law.hangs and "zero" not in self._held
-        loose = self.data.normalised or hangs or (self.data.unrestrained and self.data.swing < SWING)
-        names = [
-            f"{kind.name}.{info.name}"
-            for kind in self.effects
-            for info in kind.parameters()
-            if not info.of_input
-            and (not info.form or kind.name in self.free_forms)
-            and not (info.beside_spring and loose)
-        ]
-        held = dict(self.fixed)
-        return tuple(name for name in names if name not in held)
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """All common parameters, the nominal ones first."""
-        return self.nominal_names + self.effect_names
-
-    @cached_property
-    def phased(self) -> tuple[str, ...]:
-        """Names of the effects that have a phase or instants of their own in every run."""
-        return tuple(kind.name for kind in self.effects if kind.line or kind.skips)
-
-    def own_places(self, width: int) -> dict[str, slice]:
-        """Where the phase or the instants of each effect are among a run's own parameters, by the effects' names.
-
-        ``width`` is the number of a run's own parameters, which gives the number of instants.
-        """
-        places, first = {}, self.first_phase
-        instants = width - first - len(self.phased) + 1
-        for kind in self.effects:
-            if kind.name in self.phased:
-                places[kind.name] = slice(first, first + (instants if kind.skips else 1))
-                first = places[kind.name].stop
-        return places
-
-    @cached_property
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest values of the common parameters."""
-        low = {"yaw_inertia": 1e-9, "stiffness": 0.0, "mechanical_damping": 0.0}
-        infos = {f"{kind.name}.{info.name}": info for kind in self.effects for info in kind.parameters()}
-        ranges = {name: info.fit_range(self.data.swing) for name, info in infos.items()}
-        found = np.array([ranges.get(name, (low.get(name, -np.inf), np.inf)) for name in self.names])
-        return found[:, 0], found[:, 1]
+    def _values(self, common: Array, own: Array) -> dict[str, float]:
+        """Values of all parameters in one run by name, those held among them; arguments as in `zero`."""
+        names, own_names = self.parameters.names, self.parameters.own_names
+        fitted = dict(zip(names, common.tolist(), strict=True))
+        return {**self.data.model.held, **fitted, **dict(zip(own_names, own.tolist(), strict=False))}
 
     def effects_at(self, common: Array) -> tuple[Effect, ...]:
         """The effects with their parameters.
@@ -170,24 +119,7 @@ class Problem:
             common: as in `Point`, shape (common,).
             release: of the run, shape (2,).
         """
-        value = {**self._held, **dict(zip(self.names, common.tolist(), strict=True))}
-        law = self.data.law
-        spring = value["stiffness"] if self.data.normalised else run.spring_stiffness
-        assert spring is not None
-        return RunSettings(
-            spring_stiffness=max(spring + value.get("added_stiffness", 0.0), 0.0),
-            derivatives=AeroDerivatives(value.get("cn_beta", 0.0), value.get("cn_r", 0.0)),
-            yaw_inertia=1.0 if self.data.normalised else value["yaw_inertia"],
-            mechanical_damping=value["mechanical_damping"],
-            wind_speed=run.wind_speed,
-            air_density=run.air_density,
-            release_angle=float(release[0]),
-            release_rate=float(release[1]),
-            duration=run.duration,
-            parameters={} if law is None else {"friction_moment": law.friction},
-            program=self.data.program,
-            drive=run.moment(value.get("drive_gain", 1.0), value.get("moment_offset", 0.0)),
-        )
+        return self.data.model.run_settings(self._values(common, release), run)
 
     def chain(
         self, common: Array, own: Array, run: RunData, effects: tuple[Effect, ...] | None = None
@@ -199,7 +131,7 @@ class Problem:
             own: the run's own parameters, a row of ``Point.release``, shape (own,).
             effects: from `effects_at`, where they are known already.
         """
-        phases = {name: own[place] for name, place in self.own_places(own.size).items()}
+        phases = {name: own[place] for name, place in self.parameters.own_places.items()}
         drawn = tuple(
             phases.get(kind.name) if kind.skips or kind.name not in phases else float(phases[kind.name][0])
             for kind in self.effects

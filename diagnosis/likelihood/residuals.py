@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.run_data import Data, RunData
 from tunnel_sim.vocabulary.record import Array
 
@@ -182,10 +181,8 @@ def shedding_line(fit: Fit) -> Line | None:
 
 def resonance(fit: Fit, run_index: int) -> float:
     """Frequency of a run's free motion in the fitted model, Hz; that of `free_frequency` without a spring."""
-    if fit.problem.data.unrestrained:
-        return REFERENCE_FREQUENCY
     inertia, _, stiffness = linear_coefficients(fit, run_index)
-    return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
+    return fit.problem.data.model.frequency(inertia, stiffness)
 
 
 def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.whitening import WHITE, colour, colouring, response, whiten
+from diagnosis.model.nominal import NominalModel
 from diagnosis.settings import Settings
-from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
-from tunnel_sim.vocabulary.rig import JointLaw
 
 FOLDS = 3  # groups of runs left out in turn
 
@@ -330,15 +329,8 @@ class Data:
         frontal_area: A, m²; 1 in the measured campaign's units where it does not state it.
         reference_length: l, m; likewise.
         width: m; likewise.
-        normalised: whether the runs are fitted per unit inertia with a common stiffness.
-        yaw_inertia: nominal Izz, kg m²; None where the campaign does not state it.
-        own_zeros: whether every run has a zero of its own.
-        windy: whether the runs are part of a campaign with the wind on, though none of these may be: the model
-            then keeps its aerodynamic parameters.
+        model: nominal model of the campaign, whose parameters a part of its runs has, too.
         similarity: how the campaign was made from the measured one.
-        law: of the joint in a model of one's own; None: spring and damper.
-        keeps_gain: whether the runs are part of a campaign with an input of unknown gain, though none of these
-            may have one: the model then keeps the gain.
         settings: of the diagnosis.
     """
 
@@ -346,36 +338,14 @@ class Data:
     frontal_area: float
     reference_length: float
     width: float
-    normalised: bool
-    yaw_inertia: float | None
-    own_zeros: bool = False
-    windy: bool = False
+    model: NominalModel
     similarity: Similarity = AS_MEASURED
-    law: JointLaw | None = None
-    keeps_gain: bool = False
     settings: Settings = field(default_factory=Settings)
-
-    @cached_property
-    def unrestrained(self) -> bool:
-        """Whether nothing holds the body: a constant moment takes the place of the sensor's zero."""
-        return all(run.spring_stiffness == 0.0 and not run.wind_on for run in self.runs)
 
     @property
     def driven(self) -> bool:
         """Whether any of the runs has an input."""
         return any(run.drive is not None for run in self.runs)
-
-    @property
-    def gain_free(self) -> bool:
-        """Whether any run of the campaign has an input of unknown gain."""
-        return self.keeps_gain or any(run.gain_free for run in self.runs)
-
-    @cached_property
-    def program(self) -> tuple[float, ...]:
-        """The moment that the law has beside its linear spring and damper, as the moment law evaluates it."""
-        if self.law is None or not self.law.terms:
-            return ()
-        return departure(self.law).program({}, {"b": "angle", "r": "rate"})
 
     @property
     def mean_block(self) -> float:
@@ -397,7 +367,7 @@ class Data:
     @property
     def wind_on(self) -> bool:
         """Whether any run of the campaign has the wind on."""
-        return self.windy or any(run.wind_on for run in self.runs)
+        return self.model.windy
 
     def air_moment(self, run: RunData | RunSettings) -> float:
         """The air's yaw moment on the model for a moment coefficient of 1, ½ρV²·A·l, N m."""
@@ -411,7 +381,7 @@ class Data:
 
     def with_runs(self, runs: tuple[RunData, ...]) -> Data:
         """Other runs of the same campaign, whose model has the same parameters."""
-        return dataclasses.replace(self, runs=runs, windy=self.wind_on, keeps_gain=self.gain_free)
+        return dataclasses.replace(self, runs=runs)
 
     def undriven(self) -> Data:
         """The same runs as free decays, whose model has the same parameters."""
@@ -422,6 +392,11 @@ class Data:
     def subset(self, keep: tuple[str, ...]) -> Data:
         """The runs of the given ids."""
         return self.with_runs(tuple(run for run in self.runs if run.id in keep))
+
+    def alone(self, keep: tuple[str, ...]) -> Data:
+        """The runs of the given ids by themselves, whose model has only the parameters that they show."""
+        runs = self.subset(keep).runs
+        return dataclasses.replace(self, runs=runs, model=self.model.among(runs))
 
 
 def folds(data: Data, count: int = FOLDS) -> list[tuple[str, ...]]:
@@ -462,13 +437,3 @@ def _covers(data: Data, left_out: list[RunData]) -> bool:
         )
 
     return kinds(data.runs) == kinds([run for run in data.runs if run.id not in gone])
-
-
-def departure(law: JointLaw) -> Expression:
-    """The moment that a joint's law has beside its linear spring, damper and friction; it has one term or more.
-
-    Returns:
-        Of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s), in N m.
-    """
-    text = "".join(f"-({term.coefficient!r})*({term.expression})" for term in law.terms)
-    return parse(text, frozenset("br"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,162 +11,28 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, clip, damped_step, normal_equations
 from diagnosis.likelihood.mains_lines import mains_line
-from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
 from diagnosis.likelihood.per_run import PerRunParameters, excited, ringing, skip
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, Line, misfit, shedding_line
-from diagnosis.likelihood.run_data import Data, RunData, departure
-from identification.signal.decay_fit import Reading, fit_run
-from identification.signal.driven import driven_start
-from identification.signal.free_decay import Decay
-from identification.signal.frequency import peak_of_swing, starting_decay
+from diagnosis.likelihood.run_data import Data
+from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array
 
-_STILL = 0.02  # of the largest swing, below which a run or a stretch of it counts as at rest
-_PHASES = 64  # of a cycle, for its mean
 _NEARER = 0.02  # of the size that linear theory gives an effect
-_FEW = 5  # blocks whose readings say how fast a run begins
-_SLOW = 0.1  # 1/s: a small decay rate of the similar rig
-_PADDING = 16  # zero padding of the spectrum that gives the first frequency
 
 
-def decays_start(data: Data) -> Point | None:
-    """A starting point for the nominal model from the runs' own decays, which `identify` gives.
-
-    A frequency that depends on the amplitude spreads the peak of a spectrum, and χ² has a minimum for every cycle
-    more or less that fits the record.
-
-    Returns:
-        As `nominal_start`; None where a run has no decay of its own.
-    """
-    if data.driven:
-        return None
-    decays = []
-    for run in data.runs:
-        record = Record(run.times, run.reading)
-        start = starting_decay(record)
-        found = None if start is None else fit_run(Reading.from_record(record), start)
-        if found is None or not found.runs or found.runs[0].decay.stiffness <= 0.0:
-            return None
-        decays.append(found.runs[0].decay)
-    return nominal_start(data, decays)
+def nominal_start(data: Data) -> Point:
+    """The first starting point of the nominal model, which the records give."""
+    return next(nominal_starts(data))
 
 
-def nominal_start(data: Data, decays: Sequence[Decay] | None = None) -> Point:
-    """A starting point for the nominal model.
-
-    Args:
-        decays: of the runs, where they are known; else their frequencies are those of their spectra, or of a
-            driven run that of the resonance between input and motion.
-
-    Returns:
-        Inertia and aerodynamic stiffness by linear regression of the runs' frequencies, a small damping, and
-        the releases from the first samples.
-    """
-    driven = [None if run.drive is None else _driven_start(run) for run in data.runs]
-    if data.unrestrained:
-        return _unrestrained_start(data, driven)
-    squares = []
-    for i, (run, response) in enumerate(zip(data.runs, driven, strict=True)):
-        if decays is not None:
-            squares.append(decays[i].stiffness)
-        elif response is not None:
-            squares.append(response[1])
-        else:
-            values = run.reading - run.reading.mean()
-            size = _PADDING * values.size
-            peak = float(peak_of_swing(values, size) / (size * run.interval))
-            squares.append((2.0 * np.pi * peak) ** 2)
-    omega2 = np.array(squares)
-    swing = np.array([float(np.std(run.reading)) for run in data.runs])
-    moving = (swing > _STILL * swing.max()).astype(np.float64)  # a body at rest has no frequency
-    typical = float(np.median(omega2[moving > 0.0]))
-    own = [float(np.mean(run.reading)) for run in data.runs]
-    common = float(np.median(own))
-    zeros = own if data.own_zeros else [common] * len(own)
-    release = np.array([[np.mean(r.reading[:3]) - z, 0.0, z] for r, z in zip(data.runs, zeros, strict=True)])
-    release, zero = (release, ()) if data.own_zeros else (release[:, :2], (common,))
-    found = [one for one in driven if one is not None]
-    losses = [2.0 * one[0] for one in found if one[0] > 0.0]
-    loss = float(np.median(losses)) if losses else 0.01 * float(np.sqrt(typical))
-    gains = [
-        response[2] / run.drive.scale
-        for run, response in zip(data.runs, driven, strict=True)
-        if response is not None and run.gain_free and run.drive is not None
-    ]
-    gain: tuple[float, ...] = ((float(np.median(gains)) if gains else 0.0),) if data.gain_free else ()
-    if data.normalised:
-        still = (0.0, 0.0) if data.wind_on else ()
-        return Point(np.array([typical, loss, *still, *gain, *zero]), release)
-    spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
-    if data.law is not None and data.law.terms:  # seen at the amplitude of every run, by harmonic balance
-        phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
-        amplitude = np.sqrt(2.0) * swing[:, None]
-        further = departure(data.law).value({"b": amplitude * np.cos(phase), "r": 0.0})
-        seen = spring - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude[:, 0], 1e-12)
-        spring = np.where(seen > 0.0, seen, spring)
-    pressure = np.array([data.air_moment(run) for run in data.runs])
-    # Kr = Izz ω² + pressure Cnβ, with equal relative errors
-    design = np.column_stack([omega2, pressure]) / spring[:, None] * moving[:, None]
-    if not data.wind_on:
-        design = design[:, :1]
-    solution = np.linalg.lstsq(design, moving, rcond=None)[0]
-    inertia = float(solution[0]) if solution[0] > 0.0 else float(np.median((spring / omega2)[moving > 0.0]))
-    air = (float(solution[1]), 0.0) if data.wind_on else ()
-    damping = inertia * loss if losses else 0.01 * inertia * float(np.sqrt(typical))
-    gain = tuple(inertia * one for one in gain)
-    names = Problem(dataclasses.replace(data, law=None)).nominal_names
-    start = dict(zip(names, [inertia, damping, *air, *gain, *zero], strict=True)) | {"added_stiffness": 0.0}
-    return Point(np.array([start[name] for name in Problem(data).nominal_names]), release)
-
-
-def _driven_start(run: RunData) -> tuple[float, float, float] | None:
-    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit); None where the run shows no resonance.
-
-    Of a body without a spring the gain must be positive, in N m of the input.
-    """
-    sprung = run.spring_stiffness != 0.0
-    found = driven_start(run.times, run.reading, run.input_means, sprung=sprung, derivative=run.derivative)
-    if found is None or run.drive is None or (found[1] if sprung else found[2] * run.drive.scale) <= 0.0:
-        return None
-    return found
-
-
-def joint_start(data: Data) -> Point | None:
-    """A starting point for driven runs of a joint of one's own, which need not show a resonance; None of others.
-
-    Inertia and damping are those of the response to known moments. The readings count as positions of the joint.
-    """
-    law = data.law
-    if law is None or not data.driven or data.unrestrained or data.own_zeros:
-        return None
-    found = [(run.drive.scale, _driven_start(run)) for run in data.runs if run.drive is not None]
-    shown = [(gain / one[2], one[0]) for gain, one in found if one is not None and gain * one[2] > 0.0]
-    inertia, loss = np.median(shown, axis=0).tolist() if shown else (law.inertia, 0.0)
-    damping = max(2.0 * loss * inertia, law.damping)
-    known = {"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}
-    release = [
-        [np.mean(r.reading[:3]) - law.rest, (r.reading[_FEW] - r.reading[0]) / (_FEW * r.interval)]
-        for r in data.runs
-    ]
-    return Point(np.array([known.get(name, 0.0) for name in Problem(data).nominal_names]), np.array(release))
-
-
-def _unrestrained_start(data: Data, driven: Sequence[tuple[float, float, float] | None]) -> Point:
-    """Inertia and damping of a body that nothing holds by its response to known moments, and no other moment."""
-    found = [
-        (run.drive.scale / response[2], 2.0 * response[0])
-        for run, response in zip(data.runs, driven, strict=True)
-        if response is not None and run.drive is not None
-    ]
-    inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
-    release = [
-        [np.mean(run.reading[:3]), (run.reading[1] - run.reading[0]) / run.interval] for run in data.runs
-    ]
-    start = {"yaw_inertia": inertia, "mechanical_damping": inertia * max(loss, _SLOW)}
-    return Point(np.array([start.get(name, 0.0) for name in Problem(data).nominal_names]), np.array(release))
+def nominal_starts(data: Data) -> Iterator[Point]:
+    """The starting points of the nominal model; the second where the fit from the first misses the motion."""
+    parameters = Problem(data).parameters
+    for start in data.model.starts(data):
+        yield parameters.point(start.common, start.own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +95,9 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         for one in filter(None, (find(base) for find in _FINDERS[kind.line or "skips"])):
             of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
             fixed = (*base.problem.fixed, *(of_input if data.driven else ()))
-            problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, kind), fixed=fixed)
+            instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
+            effects = (*base.problem.effects, kind)
+            problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, instants=instants)
             infos = zip(one.values, _own_parameters(problem, kind), strict=True)
             values = [np.clip(value, info.lower, info.upper) for value, info in infos]
             release = np.column_stack([base.point.release, one.numbers])
@@ -325,7 +193,7 @@ def _own_parameters(problem: Problem, kind: type[Effect]) -> list[ParameterInfo]
 def _circumstances(data: Data) -> Circumstances:
     greatest = max(float(np.max(np.abs(run.reading))) for run in data.runs)
     slowest = min((run.wind_speed for run in data.runs if run.wind_on), default=0.0)
-    return Circumstances(data.springs, greatest, data.normalised, slowest)
+    return Circumstances(data.springs, greatest, data.model.per_inertia, slowest)
 
 
 def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | None) -> Array:

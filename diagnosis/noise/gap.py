@@ -343,7 +343,7 @@ def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatte
     It takes arguments as in `band_p_values`, and is 1 where the runs have zeros of their own or nothing holds the
     body.
     """
-    if fit.problem.data.own_zeros or fit.problem.data.unrestrained:
+    if not fit.problem.data.model.shares_zero:
         return 1.0
     lowest = np.array([1.0 / max(run.duration for run in fit.problem.data.runs)])
     relative = float(np.hypot(spread(lowest), scatter))

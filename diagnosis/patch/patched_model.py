@@ -20,7 +20,7 @@ from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.run_data import FOLDS
-from diagnosis.own_joint import reach
+from diagnosis.model.joint import Joint, LooseJoint, reach
 from diagnosis.search.investigate import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
@@ -67,8 +67,8 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
         index: of that run, with the wind off.
     """
     data = problem.data
-    law, own = data.law, data.similarity.own
-    assert law is not None
+    assert isinstance(data.model, Joint | LooseJoint)
+    law, own = data.model.law, data.similarity.own
     chain = problem.chain(common, release, data.runs[index])
     physics = condensed(chain.physics(), data)
     zero = problem.zero(common, release)
@@ -85,8 +85,8 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     spring = np.array([-offset, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
-    program = physics.program[len(data.program) :]
-    if data.program and program:
+    program = physics.program[len(data.model.program) :]
+    if data.model.program and program:
         program = (_number("number"), 0.0, *program)
     known = {"Kr": physics.spring_stiffness, **physics.parameters}
     for terms, name, grid, forms, native in (
@@ -275,7 +275,7 @@ def engine_residual(problem: Problem, common: Array, own: Array, index: int, sim
         bare = run.moment(1.0)
         assert bare is not None
         seconds, scale = change.own(1.0, "s"), change.own(given.scale, "N m")
-        lead = 0.0 if problem.data.law is None else problem.data.law.lead  # the engine has its own
+        lead = problem.data.model.lead  # the engine has its own
         times, delay = given.time_s * seconds, (given.delay + lead) * seconds
         start = replace(
             start, drive=replace(given, time_s=times, values=bare.values, scale=scale, delay=delay)

@@ -103,7 +103,7 @@ def chosen_kind(
     most_of_all, most_of_one = (
         max((c.closed for c in kinds.values()), default=0.0) for kinds in (of_all, of_one)
     )
-    if max(most_of_all, most_of_one) < chosen.least_closed:
+    if max(most_of_all, most_of_one) < chosen.closable_from:
         return "noise" if len(of_all) + len(of_one) == len(common) + len(single) else None
     among = of_all if most_of_all >= chosen.common_first * most_of_one else of_one
     best = max(among.values(), key=lambda one: one.closed)
@@ -214,7 +214,7 @@ def curve(unexplained: Unexplained, found: Evidence, similarity: Similarity) -> 
     rows = basis - own @ (own.T @ basis)
     variance = np.einsum("ij,jk,ik->i", rows, found.solution.covariance[free:, free:], rows)
     values, std = rows @ found.solution.solution[free:], np.sqrt(np.maximum(variance, 0.0))
-    unit = "rad/s2" if unexplained.fit.problem.data.normalised else "N m"
+    unit = unexplained.fit.problem.data.model.moment_unit
     if kind in OF_READING:
         values, std, unit = values * r.angle, std * r.angle, "rad"
 

@@ -18,7 +18,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.ceiling import Normal, Ridge, Unexplained, held_out, total
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.paths import Ranges
-from diagnosis.likelihood.problem import Point
+from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
 from tunnel_sim.physics.expression import Expression, parse

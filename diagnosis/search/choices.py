@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.residuals import ChannelMisfit
+from diagnosis.model.parameters import Point
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, restricted
 from tunnel_sim.effects import Effect
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.other_minima import deepest
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, linear_coefficients, misfit, resonance
+from diagnosis.model.parameters import Point
 from diagnosis.search.weigh import FittedSet, least_excess, log_weight, misfit_scale
 from diagnosis.settings import WeighingSettings
 from tunnel_sim.vocabulary.record import Array
@@ -53,13 +54,14 @@ class Hypothesis:
         An instant follows any slow error of the phase as a form does. A spring would have to soften by chance, and
         as much as gravity does.
         """
-        problem, width = self.fit.problem, self.fit.point.release.shape[1]
-        places = problem.own_places(width)
-        skips = [places[kind.name] for kind in problem.effects if kind.skips]
-        numbers = self.forms + sum(int(place.stop) - int(place.start) for place in skips)
-        if problem.data.normalised and problem.data.law is None:
+        problem = self.fit.problem
+        numbers = self.forms + sum(
+            len(kind.own_numbers(problem.instants)) for kind in problem.effects if kind.skips
+        )
+        spring = self.fit.fitted_spring
+        if spring is not None:
             needless = self.fit.settings.weighing.needless_spring * linear_coefficients(self.fit, 0)[2]
-            numbers -= 2 * (self.fit.value("stiffness") < needless)
+            numbers -= 2 * (spring < needless)
         return numbers
 
     @cached_property
@@ -69,13 +71,12 @@ class Hypothesis:
         What instants of the runs gain by chance counts as left in the frequency, and what phases gain in the
         harmonics.
         """
-        problem, width = self.fit.problem, self.fit.point.release.shape[1]
+        problem = self.fit.problem
         found, gain = misfit(self.fit).excess, self.fit.settings.weighing.own_number_gain
         for kind in problem.effects:
-            if kind.name in problem.phased:
-                place = problem.own_places(width)[kind.name]
+            count = len(kind.own_numbers(problem.instants)) * len(problem.data.runs)
+            if count:
                 channel = "frequency" if kind.skips else "harmonics"
-                count = (place.stop - place.start) * len(problem.data.runs)
                 found[CHANNELS.index(channel)] += gain * count
         return found
 
@@ -84,7 +85,7 @@ class Hypothesis:
 
         What instants and phases of the runs gain by chance counts as left.
         """
-        by_chance = own_gain(self.fit.problem, self.fit.point) / self.fit.count
+        by_chance = own_gain(self.fit.problem) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
         return FittedSet(self.effects, share, self.excess, self.further_numbers, outside)
 
@@ -133,10 +134,10 @@ def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit
     return max(one, other, key=Scale.of((one, other), gap, other.fit.settings.weighing).weight)
 
 
-def own_gain(problem: Problem, point: Point) -> float:
+def own_gain(problem: Problem) -> float:
     """χ² by which the instants and phases of the runs' own may lower it by chance."""
     gain = problem.data.settings.weighing.own_number_gain
-    return float(gain * (point.release.shape[1] - problem.first_phase) * len(problem.data.runs))
+    return float(gain * problem.parameters.of_effects * len(problem.data.runs))
 
 
 def is_plausible(fitted: Fit) -> bool:
@@ -147,10 +148,9 @@ def is_plausible(fitted: Fit) -> bool:
     """
     problem, effects = fitted.problem, fitted.problem.effects_at(fitted.point.common)
     chosen = fitted.settings.search
-    if problem.data.normalised and problem.data.law is None:
-        spring, gravity = fitted.value("stiffness"), sum(effect.stiffness_at_rest for effect in effects)
-        if -gravity > chosen.gravity_cancels * spring:
-            return False
+    spring, gravity = fitted.fitted_spring, sum(effect.stiffness_at_rest for effect in effects)
+    if spring is not None and -gravity > chosen.gravity_cancels * spring:
+        return False
     exponents = [
         f"{kind.name}.{info.name}" for kind in problem.effects for info in kind.parameters() if info.exponent
     ]
@@ -198,11 +198,11 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
         tuple(kind for kind in large.effects if kind.name in names),
         tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
         tuple(name for name in large.free_forms if name in names),
+        large.instants,
         large.rod_followed,
     )
     common = [large.names.index(name) for name in problem.names]
-    places = large.own_places(whole.point.release.shape[1])
-    own = [*range(large.first_phase), *(i for name in problem.phased for i in np.r_[places[name]].tolist())]
+    own = [large.parameters.own_names.index(name) for name in problem.parameters.own_names]
     return dataclasses.replace(
         whole,
         problem=problem,

@@ -12,12 +12,15 @@ import numpy as np
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals, try_fit
 from diagnosis.likelihood.mains_lines import fastest, mains_interval
-from diagnosis.likelihood.nondimensional import Similarity, similar_campaign
+from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, by_moment, misfit
 from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.starting_points import decays_start, joint_start, misses_motion, nominal_start
+from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
+from diagnosis.model.choose import nominal_model
+from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similar import similar_campaign
 from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
 from diagnosis.noise.sensor_noise import (
@@ -97,6 +100,11 @@ class Study:
     weighed: tuple[Weighed, ...] = ()
     random: tuple[RandomAnswer, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def model(self) -> NominalModel:
+        """The nominal model."""
+        return self.nominal.problem.data.model
 
     @property
     def settings(self) -> Settings:
@@ -180,19 +188,21 @@ def investigate(
     campaign: Campaign,
     kinds: Sequence[type[Effect]] = ALL_EFFECTS,
     progress: Progress | None = None,
+    model: NominalModel | None = None,
     settings: Settings = Settings(),
 ) -> Study:
     """Test a campaign for a gap, and weigh the effects that may cause it, in the units of the similar campaign.
 
     Args:
         progress: called with the name of each step.
+        model: the nominal model of the campaign; None: that of its kind.
         settings: of the diagnosis.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
     clock = _Clock(progress)
-    found = _test(*similar_campaign(campaign), kinds, clock, settings)
+    found = _test(campaign, model or nominal_model(campaign), kinds, clock, settings)
     if found.test.detected:
         with clock.step("where"):
             found = replace(found, place=located(found))
@@ -214,7 +224,7 @@ def nominal_study(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    return _test(*similar_campaign(campaign), kinds, _Clock(None), settings)
+    return _test(campaign, nominal_model(campaign), kinds, _Clock(None), settings)
 
 
 def fit_nominal(data: Data) -> Fit:
@@ -224,11 +234,9 @@ def fit_nominal(data: Data) -> Fit:
         TunnelError: when the nominal model cannot be fitted.
     """
     try:
-        own = joint_start(data)
-        found = fit(Problem(data), nominal_start(data) if own is None else own)
-        nearer = None
-        if misses_motion(found):
-            nearer = decays_start(data) if own is None else nominal_start(data)
+        starts = nominal_starts(data)
+        found = fit(Problem(data), next(starts))
+        nearer = next(starts, None) if misses_motion(found) else None
         if nearer is not None:
             found = min(found, fit(Problem(data), nearer), key=lambda one: one.total)
     except (FitError, np.linalg.LinAlgError) as error:
@@ -241,13 +249,15 @@ def fit_nominal(data: Data) -> Fit:
 
 
 def _test(
-    campaign: Campaign,
-    similarity: Similarity,
+    measured: Campaign,
+    model: NominalModel,
     kinds: Sequence[type[Effect]],
     clock: _Clock,
     settings: Settings,
 ) -> Study:
     """The study up to the test of the gap: noise, hum and nominal fit."""
+    campaign, similarity = similar_campaign(measured, model)
+    model = model.similar(similarity)
     allowed = {kind.name for kind in kinds}
     with clock.step("noise"):
         noise = campaign_noise(campaign, settings.noise)
@@ -256,12 +266,12 @@ def _test(
         least = settings.read_off.coarse_step
         coarse = COARSE_STEP.name in allowed and stated is not None and step > least * stated
     with clock.step("nominal fit"):
-        nominal = fit_nominal(prepare(campaign, noise.variance, similarity, settings=settings))
+        nominal = fit_nominal(prepare(campaign, noise.variance, similarity, model=model, settings=settings))
         cleaned, hum, line = campaign, None, None
         if HUM.name in allowed:
             # block means short enough to show every line of the mains that the samples show
             interval = mains_interval(similarity)
-            problem = Problem(prepare(campaign, noise.variance, similarity, interval, settings))
+            problem = Problem(prepare(campaign, noise.variance, similarity, interval, model, settings))
             residuals = scaled_residuals(problem, nominal.point)
             line = find_hum(replace(nominal, problem=problem, residuals=residuals))
         if line is not None:
@@ -271,7 +281,9 @@ def _test(
                 variance = float(np.mean(list(noise.variance.values())))
                 cleaned, hum = remove_hum(campaign, frequency, variance, settings.read_off, motion)
                 noise = campaign_noise(cleaned, settings.noise)
-            nominal = fit_nominal(prepare(cleaned, noise.variance, similarity, settings=settings))
+            nominal = fit_nominal(
+                prepare(cleaned, noise.variance, similarity, model=model, settings=settings)
+            )
         # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
         missed = misses_motion(nominal) and not campaign.driven
         cut = missed and second_mode_alone(nominal, kinds) is None
@@ -306,7 +318,7 @@ def _weigh_effects(found: Study, kinds: Sequence[type[Effect]], clock: _Clock) -
     found = replace(found, random=tuple(random), hypotheses=tuple(sets))
     found = _compared(found, found.nominal, clock)
     found, weighed = _resolved(found, found.nominal)
-    best = _best(found, weighed) if found.campaign.unrestrained else None
+    best = None if found.model.restored else _best(found, weighed)
     if best is not None and best.fit.chance < found.settings.search.moment_chance:
         again = _weigh_by_moment(found, weighed, fitted, clock)
         if again is not None:

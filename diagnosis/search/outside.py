@@ -38,7 +38,7 @@ def two_springs(answers: Iterable[Hypothesis], found: Sequence[Hypothesis], nomi
         Fitted hypotheses that lower χ² by more than needless effects would; none with too few springs.
     """
     data = nominal.problem.data
-    if data.normalised or len(data.springs) < data.settings.search.two_springs_of:
+    if len(data.springs) < data.settings.search.two_springs_of:
         return []
     known = {hypothesis.names: hypothesis for hypothesis in found} | {(): Hypothesis((), nominal)}
     pairs: dict[tuple[str, ...], Hypothesis] = {}

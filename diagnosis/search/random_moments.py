@@ -17,10 +17,11 @@ from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.parameters import Point
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import (
@@ -283,11 +284,11 @@ def _sought_again(hypothesis: Hypothesis) -> Hypothesis:
         if start is None:
             continue
         sought = fit(start.problem, start.point)
-        tried, width = [known, sought], known.point.release.shape[1]
-        if sought.point.release.shape[1] == width:  # else another number of instants
+        tried = [known, sought]
+        if sought.point.release.shape == known.point.release.shape:  # else another number of instants
             release = sought.point.release.copy()
             kept = known.chi2 < sought.chi2
-            old, new = (f.problem.own_places(width)[kind.name] for f in (known, sought))
+            old, new = (f.problem.parameters.own_places[kind.name] for f in (known, sought))
             release[kept, new] = known.point.release[kept, old]
             tried.append(fit(sought.problem, Point(sought.point.common, release)))
         known = min(tried, key=lambda f: f.total)

@@ -62,8 +62,7 @@ def backbones(fit: Fit) -> list[Backbone]:
     seconds, hertz = (fit.problem.data.similarity.own(1.0, unit) for unit in ("s", "Hz"))
     for index, run in enumerate(fit.problem.data.runs):
         inertia, damping, stiffness = linear_coefficients(fit, index)
-        if fit.problem.data.unrestrained:
-            stiffness = inertia * (2.0 * np.pi * resonance(fit, index)) ** 2
+        stiffness = fit.problem.data.model.restoring(inertia, stiffness)
         decay = Decay(0.5 * damping / inertia, max(stiffness, 1e-12) / inertia)
         nominal = decay.omega_n / (2.0 * np.pi) * hertz, decay.zeta
         if run.drive is not None:
@@ -220,7 +219,7 @@ def phase_plane(fit: Fit, run_ids: tuple[str, ...]) -> PhasePlane | None:
     columns = [np.clip(np.digitize(a.angle, edges) - 1, 0, _BINS - 1) for a in runs]
     rows = [np.clip(np.digitize(a.rate, edges) - 1, 0, _BINS - 1) for a in runs]
     cells = [r * _BINS + c for r, c in zip(rows, columns, strict=True)]
-    unit = "rad/s2" if data.normalised else "N m"
+    unit = data.model.moment_unit
     factor = data.similarity.own(1.0, unit)
     plane, plane_std = (
         values.reshape(_BINS, _BINS) for values in _binned(runs, cells, _BINS * _BINS, factor)

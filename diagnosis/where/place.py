@@ -58,7 +58,7 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
     data, residuals = nominal.problem.data, nominal.residuals
     if hum_removed:
         variance = {run.id: run.noise_variance for run in data.runs}
-        given = prepare(campaign, variance, data.similarity, settings=data.settings)
+        given = prepare(campaign, variance, data.similarity, model=data.model, settings=data.settings)
         readings = {run.id: run.reading for run in given.runs}
         # the fit may leave a record's start out; both end together
         residuals = [
@@ -94,7 +94,7 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     if len(shown) >= chosen.one_run_of and most.share > chosen.one_run and most.id not in off:
         return Finding(None, Fact("one run", {"run": most.id}))
     # without coefficients and a gain that these runs lack
-    data = replace(nominal.problem.data.subset(off), windy=False, keeps_gain=False)
+    data = nominal.problem.data.alone(off)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:

@@ -70,7 +70,6 @@ CAUTIONS: Mapping[str, Sentence] = {
     "the wind off or faster: {runs}. Diagnose these separately.",
     "no sensor effect tried": "No effect of the sensor is tried on {quantity}s.",
     "only a second mode tried": "A second mode is the only effect of the sensor that is tried on {quantity}s.",
-    "slide": "The joint slides: read m for rad, N for N m and kg for kg m2 throughout.",
     "by moment": "Nothing holds the body, so that small errors of the moment add up in its angle, which departs "
     "from every model. Effects are therefore compared by the moment that they leave. It counts as random noise "
     "beside the answer: parameters, coefficients and the shares in the table of answers come from fits with that "

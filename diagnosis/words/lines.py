@@ -74,7 +74,7 @@ def where_line(document: Document) -> str:
 
 def listed_answers(document: Document) -> int:
     """Number of the answers that are listed: the probable ones, at least three."""
-    least = settings_of(document).words.answer_drawn
+    least = settings_of(document).words.answer_described
     probable = [c for c in document["candidates"] if c["probability"] >= least]
     return max(3, len(probable))
 

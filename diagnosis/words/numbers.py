@@ -28,9 +28,9 @@ def part(share: float) -> str:
     if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
         return f"{100.0 * share:.3g} %"
     ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
-    return (
-        f"a {ordinal}".replace("a eighth", "an eighth") if count == 1 else f"{_CARDINALS[count]} {ordinal}s"
-    )
+    if count > 1:
+        return f"{_CARDINALS[count]} {ordinal}s"
+    return ordinal if ordinal == "half" else f"{'an' if ordinal == 'eighth' else 'a'} {ordinal}"
 
 
 def share(value: float) -> str:

@@ -65,7 +65,7 @@ def where_words(document: Document) -> str:
     settings = settings_of(document)
     parts = [f"{_which_runs(where, place, settings.words)}."]
     if places := _places(where, place):
-        most = part(settings.where.interval).capitalize()
+        most = part(settings.where.interval_share).capitalize()
         parts.append(f"{most} of it lie {', '.join(places)}.")
     if place["bands"]:
         listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in place["bands"].items())

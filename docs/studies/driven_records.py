@@ -22,7 +22,7 @@ from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import choose
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.partial import fit_seen
-from diagnosis.likelihood.problem import Point
+from diagnosis.model.parameters import Point
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from identification import identify

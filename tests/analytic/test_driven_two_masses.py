@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.model.parameters import Point
+from diagnosis.model.rig import Rig
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -92,7 +94,7 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool) -> None:
     )
     body = RIG.body
     problem = Problem(
-        Data((data,), body.frontal_area, body.length, body.width, False, None),
+        Data((data,), body.frontal_area, body.length, body.width, Rig().among((data,))),
         (effect_class("rod_flexibility"),),
         rod_followed=followed,
     )
@@ -105,7 +107,7 @@ def test_a_rod_too_stiff_to_ring_acts_by_its_first_order() -> None:
     """Steps of a fit would not follow its ringing; the rigid rod of the same first order moves alike."""
     kind, drive = effect_class("rod_flexibility"), DriveMoment(TIME, MOMENT)
     data = RunData("r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, 1e-8, SPRING, 0.0, 0.0, TIME[-1], drive=drive)
-    problem = Problem(Data((data,), 1.0, 1.0, 1.0, False, None), (kind,))
+    problem = Problem(Data((data,), 1.0, 1.0, 1.0, Rig()), (kind,))
     release = np.array([[0.1, 0.3]])
 
     def moved(compliance: float) -> Array:

@@ -10,9 +10,11 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.prepare import prepare
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.parameters import Point
+from diagnosis.model.rig import Rig
 from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
@@ -66,7 +68,7 @@ def campaign(
     shaped = tuple(
         e.name for e in effects if any(i.form and getattr(e, i.name) != i.default for i in e.parameters())
     )
-    problem = Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds, free_forms=shaped)
+    problem = Problem(Data(runs, 0.036, 0.625, 0.225, Rig().among(runs)), kinds, free_forms=shaped)
     values = [
         getattr(e, i.name)
         for e in effects
@@ -74,9 +76,8 @@ def campaign(
         if not i.of_input and (not i.form or e.name in shaped)
     ]
     common = np.array([INERTIA, damping, CN_BETA, CN_R, 0.001, *values])
-    own = [np.linspace(0.2, 0.8, len(runs))] * len(
-        problem.phased
-    )  # phases (rad) or instants (shares of the run)
+    # phases (rad) or instants (shares of the run)
+    own = [np.linspace(0.2, 0.8, len(runs))] * problem.parameters.of_effects
     release = np.column_stack([np.array([[0.35, 0.0]] * len(runs)), *own])
     rng = np.random.default_rng(seed)
     time = INTERVAL * np.arange(count)

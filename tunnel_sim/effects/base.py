@@ -130,6 +130,17 @@ class Effect:
         """Value of the first parameter, in its unit."""
         return float(getattr(self, self.parameters()[0].name))
 
+    @classmethod
+    def own_numbers(cls, instants: int) -> tuple[str, ...]:
+        """Names of what every run has of its own for the effect: the phase of a periodic one, or instants.
+
+        Args:
+            instants: how many there are of an effect that skips samples.
+        """
+        if cls.skips:
+            return tuple(f"instant_{number + 1}" for number in range(instants))
+        return ("phase",) if cls.line else ()
+
     @property
     def is_null(self) -> bool:
         """Whether the effect does nothing."""

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
 from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.result import ParameterEstimate
 from diagnosis.settings import Settings

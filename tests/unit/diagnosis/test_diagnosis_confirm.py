@@ -8,13 +8,15 @@ import pytest
 from diagnosis.answer import reported as module
 from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
-from diagnosis.answer.verdict import blind_spots, cautions
+from diagnosis.answer.verdict import cautions
 from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
 from diagnosis.likelihood.partial import refit_releases
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.parameters import Point
+from diagnosis.model.rig import Rig
 from diagnosis.noise.sensor_noise import campaign_noise
 from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
@@ -33,7 +35,7 @@ def problem(*names, block=4, duration=4.0, **held):
         for i, (spring, speed) in enumerate(((16.12, 0.0), (21.02, 20.0)), 1)
     )
     kinds = tuple(effect_class(name) for name in names)
-    return Problem(Data(runs, 0.036, 0.625, 0.225, False, INERTIA), kinds, tuple(held.items()))
+    return Problem(Data(runs, 0.036, 0.625, 0.225, Rig().among(runs)), kinds, tuple(held.items()))
 
 
 @pytest.mark.parametrize(
@@ -162,7 +164,9 @@ def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
             settings=Settings(),
         )
         runs = tuple(dataclasses.replace(r, wind_speed=speed) for r in problem().data.runs)
-        found[speed] = (said, " ".join(blind_spots(dataclasses.replace(problem().data, runs=runs))))
+        model = Rig().among(runs)
+        spots = model.blind_spots(dataclasses.replace(problem().data, runs=runs, model=model))
+        found[speed] = (said, " ".join(spots))
     assert found[0.0][0].figures == {"runs": 1, "driven": False, "windy": False}
     assert found[10.0][0].figures == {"runs": 1, "driven": False, "windy": True}
     assert "Cnβ" not in found[0.0][1]

@@ -43,7 +43,7 @@ def test_slow_records_are_taken_sample_by_sample():
 
 def test_a_run_without_stiffness_makes_the_campaign_normalised():
     data = free_decays.campaign((Setting(None, 0.0), Setting(16.12, 0.0)))
-    assert prepare(data, {run.id: 1e-6 for run in data.runs}).normalised
+    assert prepare(data, {run.id: 1e-6 for run in data.runs}).model.per_inertia
 
 
 def test_wind_off_runs_of_a_windy_campaign_keep_its_model():

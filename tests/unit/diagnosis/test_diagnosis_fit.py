@@ -18,8 +18,9 @@ from diagnosis.likelihood.least_squares import (
     sensitivities,
 )
 from diagnosis.likelihood.prepare import prepare
-from diagnosis.likelihood.problem import Point, Problem, condensed
+from diagnosis.likelihood.problem import Problem, condensed
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.parameters import Point
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
@@ -97,7 +98,10 @@ SMOOTH = {
 def test_sensitivities_agree_with_central_differences(name):
     problem = Problem(prepared(settings=SIX[:2]), (effect_class(name),))
     common = np.array([0.1014, 0.012, 0.49, -0.11, 0.004, *SMOOTH[name].values()])
-    own = [[0.35, 0.1, *[0.7] * len(problem.phased)], [0.3, -0.2, *[0.4] * len(problem.phased)]]
+    own = [
+        [0.35, 0.1, *[0.7] * problem.parameters.of_effects],
+        [0.3, -0.2, *[0.4] * problem.parameters.of_effects],
+    ]
     point = Point(common, np.array(own))
     for r, (by_common, by_own) in enumerate(sensitivities(problem, point)):
         for columns, which in ((by_common, "common"), (by_own, "release")):
@@ -275,7 +279,11 @@ def test_a_stiff_rod_condensed_moves_as_the_two_inertias_do(speed, share):
     """What is dropped is of the square of c Kr = 9e-4, and the ringing after the release."""
     compliance = 2e-5
     data = prepared(settings=(Setting(44.84, speed),))
-    data = replace(data, runs=tuple(replace(run, reading=run.reading[:500]) for run in data.runs), windy=True)
+    data = replace(
+        data,
+        runs=tuple(replace(run, reading=run.reading[:500]) for run in data.runs),
+        model=replace(data.model, windy=True),
+    )
     problem = Problem(data, (effect_class("rod_flexibility"),))
     truth = Truth()
     common = [truth.yaw_inertia, truth.mechanical_damping, truth.cn_beta, truth.cn_r, 0.0, compliance, share]
@@ -299,7 +307,7 @@ def test_an_effect_at_its_null_predicts_as_without(kind):
     common = np.array([0.1014, 0.012, 0.49, -0.11, 0.004])
     release = np.array([[0.35, 0.0], [0.35, 0.0]])
     problem = Problem(data, (kind,))
-    own = np.column_stack([release, *[np.zeros(2)] * len(problem.phased)])
+    own = np.column_stack([release, *[np.zeros(2)] * problem.parameters.of_effects])
     with_effect = problem.predict([Point(np.append(common, values), own)])[0]
     without = Problem(data).predict([Point(common, release)])[0]
     for one, other in zip(with_effect, without, strict=True):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.problem import Point
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.parameters import Point
 from diagnosis.search import grow as growth
 from diagnosis.search.grow import exchange, grow, prune, without
 from diagnosis.search.hypothesis import Hypothesis, with_forms
@@ -208,7 +208,7 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
     ringing = fit(first.problem, first.point, base=base)
     second = starting_points(ringing, effect_class("quadratic_damping"))[0]
     both = fit(second.problem, second.point, base=ringing)
-    assert both.problem.phased == ("second_mode",)
+    assert list(both.problem.parameters.own_places) == ["second_mode"]
     left = without(both, effect_class("second_mode"))
     direct = starting_points(base, effect_class("quadratic_damping"))[0]
     assert left.problem.effects == (effect_class("quadratic_damping"),)

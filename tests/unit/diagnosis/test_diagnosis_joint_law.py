@@ -9,10 +9,11 @@ import pytest
 
 from diagnosis import read_model
 from diagnosis.likelihood.least_squares import scaled_residuals
-from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.likelihood.prepare import prepare
-from diagnosis.likelihood.problem import Point, Problem
-from diagnosis.own_joint import with_law
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.joint import with_law
+from diagnosis.model.parameters import Point
+from diagnosis.model.similar import similar_campaign
 from diagnosis.patch.patched_model import engine_residual, found_law
 from tunnel_sim.effects import Effect, effect_class
 from tunnel_sim.effects.expression_effect import Quantity, expression_effect
@@ -71,9 +72,11 @@ def test_the_patched_model_moves_as_the_fit_does(
 ) -> None:
     data, path = pendulum(tmp_path)
     model = read_model(path, "hinge", data)
-    similar, change = similar_campaign(with_law(data, model.law))
+    stated, joint = with_law(data, model.law)
+    similar, change = similar_campaign(stated, joint)
+    joint = joint.of(stated).similar(change)
     effect = effect_class(kind) if isinstance(kind, str) else kind
-    prepared = prepare(similar, {"r1": NOISE**2}, change)
+    prepared = prepare(similar, {"r1": NOISE**2}, change, model=joint)
     held = dict(zip((info.name for info in effect.parameters()), values, strict=False))
     fixed = tuple((f"{effect.name}.{key}", value) for key, value in held.items())
     free = (effect.name,) if len(values) == len(effect.parameters()) else ()
@@ -105,7 +108,9 @@ def test_the_patched_model_moves_as_the_fit_does(
 def test_the_models_own_friction_is_part_of_the_nominal_model(tmp_path: Path) -> None:
     data, path = pendulum(tmp_path, friction=0.05)
     model = read_model(path, "hinge", data)
-    similar, change = similar_campaign(with_law(data, model.law))
-    prepared = prepare(similar, {"r1": NOISE**2}, change)
+    stated, joint = with_law(data, model.law)
+    similar, change = similar_campaign(stated, joint)
+    joint = joint.of(stated).similar(change)
+    prepared = prepare(similar, {"r1": NOISE**2}, change, model=joint)
     patch = found_law(Problem(prepared), np.array([0.1, 0.02, 0.0]), np.array([1.1, 0.0]), 0.0).patch
     assert patch.friction == pytest.approx(0.05)

@@ -7,8 +7,9 @@ import pytest
 
 from diagnosis.answer.next_run import planned_run, separating_run, separation
 from diagnosis.likelihood.least_squares import fit, normal_equations, sensitivities
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.parameters import Point
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_sim.effects import effect_class, effect_from
 

@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.facts.patch import NativeClosure
-from diagnosis.likelihood.nondimensional import similar_campaign
 from diagnosis.likelihood.prepare import prepare
-from diagnosis.own_joint import reach, with_law
+from diagnosis.model.joint import reach, with_law
+from diagnosis.model.similar import similar_campaign
 from diagnosis.search.investigate import fit_nominal, investigate
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
@@ -76,8 +76,10 @@ def test_the_reach_of_a_sensor_of_any_quantity_is_in_radians(quantity: Quantity)
 def test_a_pendulum_is_no_gap_to_its_own_model(tmp_path: Path, ref: float) -> None:
     data = campaign(inertia=1.04 * INERTIA, damping=0.001, rest=math.radians(ref))
     model = own_model(tmp_path, data, ref)
-    similar, change = similar_campaign(with_law(data, model.law))
-    found = fit_nominal(prepare(similar, {run.id: NOISE**2 for run in data.runs}, change))
+    stated, joint = with_law(data, model.law)
+    similar, change = similar_campaign(stated, joint)
+    joint = joint.of(stated).similar(change)
+    found = fit_nominal(prepare(similar, {run.id: NOISE**2 for run in data.runs}, change, model=joint))
     assert abs(found.excess) < 0.15
     for name, unit, truth in (
         ("yaw_inertia", "kg m2", 1.04 * INERTIA),
@@ -97,8 +99,10 @@ def test_without_its_model_the_same_pendulum_is_a_gap() -> None:
 def test_what_is_not_free_is_held_at_the_models_value(tmp_path: Path) -> None:
     data = campaign(inertia=INERTIA, damping=0.001)
     model = own_model(tmp_path, data, free=("damping",))
-    similar, change = similar_campaign(with_law(data, model.law))
-    found = fit_nominal(prepare(similar, {run.id: NOISE**2 for run in data.runs}, change))
+    stated, joint = with_law(data, model.law)
+    similar, change = similar_campaign(stated, joint)
+    joint = joint.of(stated).similar(change)
+    found = fit_nominal(prepare(similar, {run.id: NOISE**2 for run in data.runs}, change, model=joint))
     assert found.problem.names == ("mechanical_damping",)
     stated = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
     assert change.own(stated.yaw_inertia, "kg m2") == pytest.approx(INERTIA)

@@ -11,9 +11,10 @@ from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.likelihood.paths import COMMON, SINGLE, paths, ranges
 from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import misses_motion, starting_points
+from diagnosis.model.parameters import Point
 from diagnosis.search.grow import _of_each, grow_in_stretches
 from diagnosis.search.hypothesis import Hypothesis, is_plausible
 from diagnosis.search.investigate import fit_nominal, investigate

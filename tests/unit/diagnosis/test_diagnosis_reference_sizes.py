@@ -7,7 +7,9 @@ import pytest
 
 from diagnosis._diagnose import diagnose, vocabulary
 from diagnosis.answer.units import own_parameters, parameter_unit, sized_coefficients
-from diagnosis.likelihood.nondimensional import similar_campaign
+from diagnosis.model.choose import nominal_model
+from diagnosis.model.rig import PerInertia
+from diagnosis.model.similar import similar_campaign
 from diagnosis.result import ParameterEstimate
 from identification import identify
 from tests.marks import slow
@@ -77,11 +79,11 @@ def test_units_without_springs_and_sizes(data):
         "sensor_drift.drift": ("rad", "rad", "rad"),
     }
     for name, units in cases.items():
-        assert tuple(parameter_unit(name, d) for d in (data, bare, small)) == units
+        assert tuple(parameter_unit(name, d, nominal_model(d)) for d in (data, bare, small)) == units
     nothing = replace(bare, rig=RigProperties())
-    assert parameter_unit("buffeting.intensity", nothing) == "m/kg"
+    assert parameter_unit("buffeting.intensity", nothing, PerInertia()) == "m/kg"
     thin = replace(nothing, runs=tuple(replace(run, air_density=None) for run in nothing.runs))
-    assert parameter_unit("buffeting.intensity", thin) == "1/m2"  # the density is within it
+    assert parameter_unit("buffeting.intensity", thin, PerInertia()) == "1/m2"  # the density is within it
 
 
 @pytest.mark.parametrize("quantity", ["angle", "rate", "acceleration"])
@@ -96,7 +98,8 @@ def test_every_parameter_is_given_in_a_unit_that_can_be_read_and_in_own_units(da
     for kind in ALL_EFFECTS:
         infos = {f"{kind.name}.{info.name}": info for info in kind.parameters()}
         given = {key: ParameterEstimate(info.default + 0.7, 0.1, info.unit) for key, info in infos.items()}
-        found = own_parameters({k: v for k, v in given.items() if not infos[k].form}, stated, change)
+        textbook = {k: v for k, v in given.items() if not infos[k].form}
+        found = own_parameters(textbook, stated, change, nominal_model(stated))
         for key, own in found.items():
             factor = own.value / given[key].value
             dimension(own.unit)
@@ -142,4 +145,4 @@ def test_no_unit_of_a_moment_is_left_in_normalised_form(data):
     bare = replace(data, runs=tuple(replace(run, spring_stiffness=None) for run in data.runs))
     for kind in ALL_EFFECTS:
         for info in kind.parameters():
-            assert "N m" not in parameter_unit(f"{kind.name}.{info.name}", bare)
+            assert "N m" not in parameter_unit(f"{kind.name}.{info.name}", bare, PerInertia())

@@ -12,8 +12,8 @@ from diagnosis.likelihood.nondimensional import (
     REFERENCE_STIFFNESS,
     Similarity,
     frequency,
-    similar_campaign,
 )
+from diagnosis.model.similar import similar_campaign
 from diagnosis.search.investigate import investigate
 from tests.marks import slow
 from tests.reference import free_decays

@@ -7,9 +7,11 @@ import pytest
 
 from diagnosis.likelihood.least_squares import fit, fit_at
 from diagnosis.likelihood.prepare import prepare
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import residual_spectra, resonance, shedding_line
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, project_out, starting_points
+from diagnosis.model.joint import Joint
+from diagnosis.model.parameters import Point
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal
@@ -58,8 +60,8 @@ def test_the_nominal_start_sees_the_stiffness_of_a_joints_law_at_the_amplitude(c
         runs.append(replace(run, reading=amplitude * np.cos(np.sqrt(seen / inertia) * time)))
     terms = (Term("b^3", cubic, "N m/rad3"), Term("b*abs(b)", square, "N m/rad2"))
     law = JointLaw(inertia, 16.12, terms=terms)
-    start = nominal_start(replace(data.with_runs(tuple(runs)), law=law))
-    names = Problem(replace(data, law=law)).nominal_names
+    data = replace(data.with_runs(tuple(runs)), model=Joint(law=law))
+    start, names = nominal_start(data), Problem(data).names
     assert start.common[names.index("yaw_inertia")] == pytest.approx(inertia, rel=0.01)
 
 

@@ -8,7 +8,8 @@ import pytest
 from diagnosis.likelihood.least_squares import FitError, fit
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.prepare import fit_longer, in_stretches, long_stretch, spread_out
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
 from diagnosis.search.grow import grow_in_stretches
 from diagnosis.search.investigate import fit_nominal
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal

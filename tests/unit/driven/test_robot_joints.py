@@ -16,7 +16,7 @@ import pytest
 
 from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.diagnosable import refuse_undiagnosable
-from diagnosis.own_joint import with_law
+from diagnosis.model.joint import with_law
 from diagnosis.result import Diagnosis
 from tests.marks import slow
 from tests.reference.robot_joints import (
@@ -89,7 +89,7 @@ def test_the_gain_of_an_actuator_and_what_a_servo_adds_to_the_law(
     assert law.actuator.servo == pytest.approx(servo)
     assert (law.stiffness, law.damping) == pytest.approx((stiffness, damping))
     assert law.inertia == pytest.approx(inertia(robot()), rel=1e-9)
-    run = with_law(swung, law).runs[0]
+    run = with_law(swung, law)[0].runs[0]
     assert run.input_gain == pytest.approx(gain)
 
 
@@ -165,18 +165,18 @@ def test_inputs_that_are_not_the_joints_are_refused_in_one_line(tmp_path: Path, 
         TunnelError, match=r"drive_gain = 3 is stated, and actuator 'motor' gives 20 N m per unit"
     ):
         with_law(changed(swung, gain=3.0), law)
-    assert with_law(changed(swung, gain=GEAR), law).runs[0].input_gain == GEAR
+    assert with_law(changed(swung, gain=GEAR), law)[0].runs[0].input_gain == GEAR
     with pytest.raises(TunnelError, match="the joint of a model has no root that moves"):
         with_law(changed(swung, column="base_rad"), law)
     loose = own_model(tmp_path, swung, robot(actuators="")).law
-    assert with_law(changed(swung, gain=3.0), loose).runs[0].input_gain == 3.0
+    assert with_law(changed(swung, gain=3.0), loose)[0].runs[0].input_gain == 3.0
     free = replace(swung, runs=(*swung.runs, replace(swung.runs[0], id="free", drive=None)))
     with pytest.raises(TunnelError, match="nothing holds the joint of the model, and nothing drives free"):
-        refuse_undiagnosable(with_law(free, law))
+        refuse_undiagnosable(*with_law(free, law))
     rates = replace(swung, sensor=replace(swung.sensor, quantity="rate"))
     sprung = replace(law, stiffness=5.0)  # else the spring is missing
     with pytest.raises(TunnelError, match="do not say where the model's joint moves"):
-        refuse_undiagnosable(with_law(rates, sprung))
+        refuse_undiagnosable(*with_law(rates, sprung))
 
 
 def test_a_step_has_the_mean_of_the_input_over_it() -> None:

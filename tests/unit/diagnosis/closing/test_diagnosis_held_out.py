@@ -11,6 +11,7 @@ from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.run_data import Data, RunData, folds
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.rig import Rig
 from diagnosis.patch.patched_model import native_closure
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import effect_class
@@ -34,7 +35,7 @@ RUNS = st.lists(st.tuples(st.sampled_from([16.0, 21.0, 45.0]), st.sampled_from([
 @settings(max_examples=300)
 def test_what_is_kept_has_every_spring_and_both_winds(conditions, count):
     runs = tuple(one_run(f"r{i}", *condition) for i, condition in enumerate(conditions))
-    groups = folds(Data(runs, 1.0, 1.0, 0.0, False, None), count)
+    groups = folds(Data(runs, 1.0, 1.0, 0.0, Rig()), count)
     left_out = [name for group in groups for name in group]
     assert len(left_out) == len(set(left_out))
     assert len(groups) <= count
@@ -48,14 +49,14 @@ def test_every_run_of_a_full_plan_is_left_out_once():
     conditions = [(spring, speed) for spring in (16.0, 21.0, 45.0) for speed in (0.0, 15.0, 25.0)] + [
         (16.0, 0.0), (16.0, 25.0), (21.0, 20.0)]  # fmt: skip
     runs = tuple(one_run(f"r{i}", *condition) for i, condition in enumerate(conditions))
-    groups = folds(Data(runs, 1.0, 1.0, 0.0, False, None))
+    groups = folds(Data(runs, 1.0, 1.0, 0.0, Rig()))
     assert sorted(name for group in groups for name in group) == sorted(run.id for run in runs)
     assert [len(group) for group in groups] == [4, 4, 4]
 
 
 def test_one_run_of_each_spring_leaves_nothing_to_hold_out():
     runs = (one_run("a", 16.0, 0.0), one_run("b", 21.0, 15.0))
-    assert folds(Data(runs, 1.0, 1.0, 0.0, False, None)) == []
+    assert folds(Data(runs, 1.0, 1.0, 0.0, Rig())) == []
 
 
 @pytest.fixture(scope="module")

@@ -11,15 +11,15 @@ import pytest
 from diagnosis.answer.candidates import meant_coefficient, meant_parameter
 from diagnosis.answer.coefficients import Answers, Possible, coefficients
 from diagnosis.answer.linear_theory import (
-    coefficient_gradient,
     coefficient_move,
-    coefficient_value,
     wind_on_runs,
 )
 from diagnosis.answer.verdict import remainder
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.parameters import Point
+from diagnosis.model.rig import PerInertia
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
@@ -144,7 +144,7 @@ def test_no_gap_leaves_nothing(data, base):
 def test_a_parameter_without_an_order_of_magnitude_is_not_determined(std, determined):
     (info,) = effect_class("cubic_stiffness").parameters()[:1]
     given = ParameterEstimate(0.2, std, "1/rad2")
-    found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined)
+    found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined_from)
     assert (found.std == std, found.determined) == (determined, determined)
 
 
@@ -152,10 +152,10 @@ def test_a_range_no_wider_than_chance_determines_nothing():
     info = effect_class("coulomb_friction").parameters()[0]
     bounded = replace(info, fit_lower=1.0, fit_upper=3.0, scale=100.0)
     assert meant_parameter(
-        ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined
+        ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined_from
     ).determined
     assert not meant_parameter(
-        ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined
+        ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined_from
     ).determined
 
 
@@ -210,7 +210,9 @@ def test_the_zero_of_a_run_does_not_move_a_coefficient(base):
     def move(zeros):
         runs = base.problem.data.runs
         shifted = tuple(replace(run, reading=run.reading + z) for run, z in zip(runs, zeros, strict=True))
-        data = replace(base.problem.data, own_zeros=True).with_runs(shifted)
+        data = replace(
+            base.problem.data, runs=shifted, model=replace(base.problem.data.model, own_zeros=True)
+        )
         return coefficient_move(fit(Problem(data), nominal_start(data)), "cn_r")
 
     assert move((0.0, 0.3, -0.2, 0.1, -0.4, 0.2)) == pytest.approx(move((0.0,) * 6), rel=1e-3)
@@ -228,11 +230,11 @@ NAMES = (
 @pytest.mark.parametrize("name", ["omega_n", "zeta", "zero"])
 def test_small_swings_have_the_stiffness_of_spring_and_gravity(name):
     common = np.array([30.0, 0.5, 0.01, 91.0, 7.0])
-    value = coefficient_value(NAMES, common, name)
+    value = PerInertia().coefficient(NAMES, common, name)
     assert value == pytest.approx({"omega_n": 11.0, "zeta": 0.5 / 22.0, "zero": 0.01}[name])
-    gradient = coefficient_gradient(NAMES, common, name)
+    gradient = PerInertia().gradient(NAMES, common, name)
     for i, step in enumerate(1e-6 * np.eye(5)):
-        up, down = (coefficient_value(NAMES, common + s, name) for s in (step, -step))
+        up, down = (PerInertia().coefficient(NAMES, common + s, name) for s in (step, -step))
         assert gradient[i] == pytest.approx((up - down) / 2e-6, abs=1e-8)
 
 

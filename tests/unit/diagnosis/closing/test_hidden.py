@@ -10,7 +10,8 @@ from diagnosis.answer.coefficients import Answers, Possible, coefficients, possi
 from diagnosis.answer.hidden import hidden_effects
 from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.problem import Point, Problem
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
 from diagnosis.words.lines import diagnosis_parts, hidden_line
 from diagnosis.words.tables import hidden_table
 from tests.unit.diagnosis.test_diagnosis_noise_colour import colour, with_zero

@@ -1,0 +1,17 @@
+"""The kinds of rig, and the nominal model of a campaign."""
+
+from __future__ import annotations
+
+from diagnosis.model.loose import LooseBody
+from diagnosis.model.nominal import NominalModel
+from diagnosis.model.rig import PerInertia, Rig
+from tunnel_sim.vocabulary.campaign import Campaign
+
+#: In the order in which they are asked whether a campaign is theirs.
+KINDS: tuple[type[NominalModel], ...] = (LooseBody, PerInertia, Rig)
+
+
+def nominal_model(campaign: Campaign, given: NominalModel | None = None) -> NominalModel:
+    """The nominal model of a campaign: the one given, or the kind that describes its runs."""
+    kind = given or next(kind for kind in KINDS if kind.describes(campaign))()
+    return kind.of(campaign)

@@ -1,0 +1,345 @@
+"""The joint of a model of one's own: its law and its actuator take the place of spring, damper and input gain."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from diagnosis.likelihood.nondimensional import Similarity, frequency
+from diagnosis.model.loose import LooseBody
+from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.parameters import Parameter
+from diagnosis.model.rig import Rig
+from diagnosis.model.starts import Shown, responses
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.physics.expression import Expression, parse
+from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError, one_line
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import JointLaw
+
+if TYPE_CHECKING:
+    from diagnosis.likelihood.run_data import Data, RunData
+    from tunnel_sim.engine.joint_model import Recorded
+
+_SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
+_PHASES = 64  # of a cycle, for its mean
+_FEW = 5  # blocks whose readings say how fast a run begins
+_OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
+_SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
+
+
+@dataclass(frozen=True)
+class _OfLaw(NominalModel):
+    """What every joint with a law has.
+
+    Args:
+        law: of the similar campaign, as all values.
+    """
+
+    law: JointLaw = field(kw_only=True)
+
+    resonance_known: ClassVar[bool] = True
+
+    @property
+    def held(self) -> Mapping[str, float]:
+        """What the model holds, and how the user wants it."""
+        return self.law.held
+
+    def similar(self, change: Similarity) -> NominalModel:
+        """The joint of the similar campaign."""
+        law = self.law
+        similar = dataclasses.replace(
+            law,
+            inertia=change.similar(law.inertia, "kg m2"),
+            stiffness=change.similar(law.stiffness, "N m/rad"),
+            damping=change.similar(law.damping, "N m s/rad"),
+            friction=change.similar(law.friction, "N m"),
+            rest=law.rest - change.rest,
+            step=change.similar(law.step, "s"),
+            lead=change.similar(law.lead, "s"),
+            terms=tuple(
+                dataclasses.replace(term, coefficient=change.similar(term.coefficient, term.unit))
+                for term in law.terms
+            ),
+        )
+        return replace(self, law=similar)
+
+    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+        """The rig's, and a stiffness beside that of the law."""
+        return *super().inertial(data), Parameter("added_stiffness", "N m/rad")
+
+    @property
+    def law_parameters(self) -> Mapping[str, float]:
+        """Its dry friction."""
+        return {"friction_moment": self.law.friction}
+
+    @property
+    def program(self) -> tuple[float, ...]:
+        """The terms of its law."""
+        return departure(self.law).program({}, {"b": "angle", "r": "rate"}) if self.law.terms else ()
+
+    @property
+    def lead(self) -> float:
+        """By which its motion leads its input, s."""
+        return self.law.lead
+
+    def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
+        """Effects of a spring that is the servo of an actuator."""
+        actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
+        if actuator is not None and actuator.servo[1] != 0.0:
+            gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring]
+        left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
+        return gone | super().untried(campaign, left)
+
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse driven runs of rates, and free ones of a joint that nothing holds.
+
+        Raises:
+            TunnelError: for the first such run.
+        """
+        if campaign.driven and campaign.sensor.derivative:
+            (run, *_) = (run for run in campaign.runs if run.drive is not None)
+            raise TunnelError(
+                "the run is driven and its sensor reads rates, which do not say where the model's joint moves",
+                where=f"{campaign.name}, run '{run.id}'",
+                remedy="record the angle, or leave --model out",
+            )
+        free = [run.id for run in campaign.runs if run.drive is None]
+        if self.law.stiffness == 0.0 and free:
+            raise TunnelError(
+                f"nothing holds the joint of the model, and nothing drives {', '.join(free)}",
+                where=campaign.name,
+                remedy="leave these runs out, or add the spring, or gravity, that restores it",
+            )
+        super().refuse(campaign)
+
+    def possible_leads(self) -> tuple[float, ...]:
+        """None, a quarter and half of the model's step, s; none where it has none."""
+        return tuple(0.5 * self.law.step * share for share in (0.0, 0.5, 1.0)) if self.law.step else ()
+
+    def with_lead(self, lead: float) -> NominalModel:
+        """The same with another lead, s."""
+        return replace(self, law=replace(self.law, lead=lead))
+
+    def notes(self) -> tuple[str, ...]:
+        """How to read the units of a joint that slides."""
+        return (_SLIDE,) if self.law.slide else ()
+
+    def gain_words(self) -> str:
+        """The gain of the actuator, in a sentence."""
+        actuator = self.law.actuator
+        if actuator is None:
+            return ""
+        said = f"gives {actuator.gain:.5g} N m per unit of control"
+        return f"By the model, actuator {one_line(actuator.name)!r} {said}."
+
+    def lead_words(self, change: Similarity) -> tuple[str, ...]:
+        """The lead of the motion, in a sentence."""
+        if self.law.lead == 0.0:
+            return ()
+        lead, step = (1e3 * change.own(value, "s") for value in (self.law.lead, self.law.step))
+        return (
+            f"The motion leads its input by {lead:.2g} ms, at most half of the model's step of {step:.3g} ms, as "
+            "that of MuJoCo's integrators of first order does. This is taken off and is not counted as a cause.",
+        )
+
+    def spring(self, values: Mapping[str, float], run: RunData) -> float:
+        """The slope of the law, and what is added to it."""
+        return super().spring(values, run) + values.get("added_stiffness", 0.0)
+
+
+@dataclass(frozen=True)
+class Joint(_OfLaw, Rig):
+    """A joint that its law restores."""
+
+    coefficient_units: ClassVar[Mapping[str, str]] = {
+        **LooseBody.coefficient_units, **Rig.coefficient_units,
+    }  # fmt: skip
+
+    def starts(self, data: Data) -> Iterator[Start]:
+        """Of driven runs, which need not show a resonance, from the response to known moments; then as a rig."""
+        if data.driven and not self.own_zeros:
+            yield self._driven_start(data)
+            yield self._start(data, Shown.of(data))
+        else:
+            yield from super().starts(data)
+
+    def _driven_start(self, data: Data) -> Start:
+        """The readings count as positions of the joint."""
+        law = self.law
+        found = [
+            (run.drive.scale, one)
+            for run, one in zip(data.runs, responses(data), strict=True)
+            if run.drive is not None
+        ]
+        shown = [(gain / one[2], one[0]) for gain, one in found if one is not None and gain * one[2] > 0.0]
+        inertia, loss = np.median(shown, axis=0).tolist() if shown else (law.inertia, 0.0)
+        damping = max(2.0 * loss * inertia, law.damping)
+        own = [
+            {
+                "release_angle": float(np.mean(r.reading[:3]) - law.rest),
+                "release_rate": float((r.reading[_FEW] - r.reading[0]) / (_FEW * r.interval)),
+            }
+            for r in data.runs
+        ]
+        return Start({"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}, own)
+
+    def springs_at(self, data: Data, amplitude: Array) -> Array:
+        """Stiffness by the law at the amplitude of every run, by harmonic balance, N m/rad, shape (runs,)."""
+        spring = super().springs_at(data, amplitude)
+        if not self.law.terms:
+            return spring
+        phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+        swing = amplitude[:, None]
+        further = departure(self.law).value({"b": swing * np.cos(phase), "r": 0.0})
+        seen = spring - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude, 1e-12)
+        return np.where(seen > 0.0, seen, spring)
+
+    def tells(self, info: ParameterInfo, swing: float) -> bool:
+        """Where gravity alone restores the joint, its rest is one with the sensor's zero."""
+        del swing
+        return not (info.beside_spring and self.law.hangs and "zero" not in self.held)
+
+    def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
+        """The free inertia, damping and stiffness, then the aerodynamic derivatives."""
+        own = (name for name in LooseBody.coefficient_units if name in names)
+        return *own, *Rig.coefficient_units
+
+    def unseen(self, data: Data) -> Sequence[str]:
+        """What one spring does not show."""
+        if data.driven:
+            return ("structural as opposed to viscous damping: there is one spring only",)
+        return super().unseen(data)
+
+    @property
+    def unseen_scale(self) -> str:
+        """The clause on a common scale that driven runs cannot show."""
+        return (
+            "a scale on the moment of the input as opposed to one on the inertia and all moments of the model"
+        )
+
+    def planned_springs(self, data: Data) -> tuple[float, ...]:
+        """That of the law, which cannot be chosen."""
+        return data.springs
+
+
+@dataclass(frozen=True)
+class LooseJoint(_OfLaw, LooseBody):
+    """A driven joint that nothing holds."""
+
+    @property
+    def held(self) -> Mapping[str, float]:
+        """Without a rest, of which a constant moment takes the place."""
+        return {name: value for name, value in self.law.held.items() if name != "zero"}
+
+
+def reach(campaign: Campaign) -> float:
+    """The greatest displacement in the records, rad; by way of the frequency where the sensor reads a rate."""
+    found = []
+    for run in campaign.runs:
+        readings = run.record.yaw_rad[np.isfinite(run.record.yaw_rad)]
+        turn = 2.0 * np.pi * frequency(run.record) if campaign.sensor.derivative else 1.0
+        found.append(float(np.max(np.abs(readings - np.mean(readings)))) / turn**campaign.sensor.derivative)
+    return max(found)
+
+
+def recorded(campaign: Campaign, actuator: str | None = None) -> Recorded:
+    """What the records say of the motion of a joint: where it moves, and whether a control drives it.
+
+    Args:
+        actuator: its name; None: the only one of the joint.
+    """
+    from tunnel_sim.engine.joint_model import Recorded  # only here: MuJoCo is slow to load
+
+    controlled = any(run.drive is not None and run.drive.column == "drive" for run in campaign.runs)
+    if not campaign.driven or campaign.sensor.derivative:  # driven runs of rates are refused later
+        return Recorded(reach(campaign), 0.0 if campaign.driven else None, controlled, actuator)
+    means = [np.nanmean(run.record.yaw_rad) for run in campaign.runs]
+    middle = float(np.median(means))  # which similar campaigns take off
+    far = max(float(np.nanmax(np.abs(run.record.yaw_rad - middle))) for run in campaign.runs)
+    return Recorded(far, middle, controlled, actuator)
+
+
+def with_law(campaign: Campaign, law: JointLaw) -> tuple[Campaign, NominalModel]:
+    """The campaign with a joint's law in place of a spring, and its nominal model.
+
+    The runs state the stiffness at rest, and the gain of a control is that of the model's actuator.
+
+    Raises:
+        TunnelError: when the runs state more than one spring, the wind blows and a reference size is missing, or an
+            input cannot be that of the joint.
+    """
+    springs = {run.spring_stiffness for run in campaign.runs} - {None}
+    if len(springs) > 1:
+        raise TunnelError(
+            f"the runs state {len(springs)} springs, and a model has one",
+            where="--model",
+            remedy="diagnose the runs of each spring separately",
+        )
+    rig = campaign.rig
+    if any(run.wind_on for run in campaign.runs) and None in (rig.frontal_area, rig.reference_length):
+        raise TunnelError(
+            "runs with a wind speed need the rig's sizes beside the model",
+            where="--model",
+            remedy="state frontal_area and reference_length under [rig] in campaign.toml",
+        )
+    runs = tuple(
+        replace(run, spring_stiffness=law.stiffness, drive=run.drive and _of_joint(run, run.drive, law))
+        for run in campaign.runs
+    )
+    found = replace(campaign, runs=runs, law=law)
+    return found, (LooseJoint if found.unrestrained else Joint)(law=law)
+
+
+def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
+    """The input of a run with the gain of the joint's actuator; refused where the actuator could not follow it."""
+    where, actuator = f"run {run.id}", law.actuator
+    if drive.column == "base_rad":
+        what, remedy = "the joint of a model has no root that moves", "name the input moment_nm or drive"
+        raise TunnelError(f"{what}, and the input is base_rad", where=where, remedy=remedy)
+    if drive.column == "moment_nm":
+        return drive
+    if actuator is None:
+        if drive.gain is None:
+            what = "the joint has no actuator in the model that the column drive could be the control of"
+            raise TunnelError(
+                what, where=where, remedy="add it to the model, state drive_gain, or give moment_nm"
+            )
+        return drive
+    said = f"actuator {one_line(actuator.name)!r}"
+    if drive.gain is not None and abs(drive.gain - actuator.gain) > _SAME_GAIN * abs(actuator.gain):
+        what = f"drive_gain = {drive.gain:g} is stated, and {said} gives {actuator.gain:g} N m per unit of control"
+        raise TunnelError(
+            what, where=where, remedy="leave drive_gain out, or correct gear and gain of the model"
+        )
+    moments = actuator.gain * drive.values + actuator.servo[0] + actuator.servo[1] * run.record.yaw_rad
+    for values, (low, high), name, unit in (
+        (drive.values, actuator.control, "control", "of its ctrlrange"),
+        (moments, actuator.moment, "moment", "N m of its force range"),
+    ):
+        slack = _SAME_GAIN * max(abs(low), abs(high))
+        far = values[np.argmax(np.maximum(values - high, low - values))]
+        if not low - slack <= far <= high + slack:
+            what = f"the {name} of {said} reaches {far:.4g}, outside {low:.4g} to {high:.4g} {unit}"
+            remedy = (
+                "correct the range or the unit of the input, or leave out the run: clipping is not diagnosed"
+            )
+            raise TunnelError(what, where=where, remedy=remedy)
+    return replace(drive, gain=actuator.gain)
+
+
+def departure(law: JointLaw) -> Expression:
+    """The moment that a joint's law has beside its linear spring, damper and friction; it has one term or more.
+
+    Returns:
+        Of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s), in N m.
+    """
+    text = "".join(f"-({term.coefficient!r})*({term.expression})" for term in law.terms)
+    return parse(text, frozenset("br"))

@@ -1,0 +1,138 @@
+"""A body that nothing holds: a constant moment takes the place of the sensor's zero."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from diagnosis.likelihood.nondimensional import (
+    REFERENCE_FREQUENCY,
+    REFERENCE_INERTIA,
+    REFERENCE_STIFFNESS,
+    response_to_input,
+)
+from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.parameters import Parameter
+from diagnosis.model.starts import responses
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.parameters import SWING, ParameterInfo
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+if TYPE_CHECKING:
+    from diagnosis.likelihood.run_data import Data
+
+_SLOW = 0.1  # 1/s: a small decay rate of the similar rig
+_NO_MOMENT = (
+    "Without a spring these effects have no moment, and are not tried: {}. Play shows where a spring of stated "
+    "stiffness preloads the joint."
+)
+_NO_ZERO = (
+    "Without a spring the sensor's zero is not determined, and these effects of the sensor are not tried: {}."
+)
+
+
+@dataclass(frozen=True)
+class LooseBody(NominalModel):
+    """A driven body that nothing holds: Izz β̈ + C β̇ = M + M0."""
+
+    restored: ClassVar[bool] = False
+    resonance_known: ClassVar[bool] = True
+    coefficient_units: ClassVar[Mapping[str, str]] = {
+        "yaw_inertia": "kg m2",
+        "mechanical_damping": "N m s/rad",
+        "added_stiffness": "N m/rad",
+        "moment_offset": "N m",
+    }
+
+    @classmethod
+    def describes(cls, campaign: Campaign) -> bool:
+        """Where every run states a stiffness of 0, and the wind is off."""
+        return campaign.unrestrained
+
+    def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
+        """Effects of a spring, and of the sensor's zero."""
+        del campaign
+        of_spring = [kind for kind in kinds if kind.on_spring]
+        of_sensor = [k for k in kinds if k.channel == "sensor" and k.fitted and k not in of_spring]
+        return {_NO_MOMENT: of_spring, _NO_ZERO: of_sensor}
+
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse an input of unknown gain.
+
+        Raises:
+            TunnelError: for the campaign.
+        """
+        if any(run.input_gain is None for run in campaign.runs):
+            raise TunnelError(
+                "without a spring, an input of unknown gain shows no inertia, and no moment in N m",
+                where=campaign.name,
+                remedy="state drive_gain, or record the moment as moment_nm",
+            )
+
+    def moment_factor(self, campaign: Campaign, time: float) -> float:
+        """So that its inertia swings at the reference frequency on a spring of the reference stiffness."""
+        inertia = campaign.rig.yaw_inertia
+        if not inertia:  # by the response to the known moments
+            found = [(run.input_gain or 1.0, response_to_input(run)) for run in campaign.runs]
+            inertia = float(
+                np.median([gain / response[2] for gain, response in found if response is not None])
+            )
+        return REFERENCE_INERTIA / (inertia * time**2)
+
+    def offset(self, data: Data) -> tuple[Parameter, ...]:
+        """A constant moment; the zero cannot be separated from the initial angle."""
+        return (Parameter("moment_offset", "N m", size=REFERENCE_STIFFNESS * data.swing),)
+
+    @property
+    def shares_zero(self) -> bool:
+        """The means of the runs differ."""
+        return False
+
+    def starts(self, data: Data) -> Iterator[Start]:
+        """Inertia and damping by the response to known moments, and no other moment."""
+        found = [
+            (run.drive.scale / response[2], 2.0 * response[0])
+            for run, response in zip(data.runs, responses(data), strict=True)
+            if response is not None and run.drive is not None
+        ]
+        inertia, loss = np.median(found or [(REFERENCE_INERTIA, 0.0)], axis=0).tolist()
+        own = [
+            {
+                "release_angle": float(np.mean(run.reading[:3])),
+                "release_rate": float((run.reading[1] - run.reading[0]) / run.interval),
+            }
+            for run in data.runs
+        ]
+        yield Start({"yaw_inertia": inertia, "mechanical_damping": inertia * max(loss, _SLOW)}, own)
+
+    def frequency(self, inertia: float, stiffness: float) -> float:
+        """That of the reference rig, Hz."""
+        del inertia, stiffness
+        return REFERENCE_FREQUENCY
+
+    def restoring(self, inertia: float, stiffness: float) -> float:
+        """The stiffness with which it would swing at the reference frequency, N m/rad."""
+        del stiffness
+        return inertia * (2.0 * np.pi * REFERENCE_FREQUENCY) ** 2
+
+    def tells(self, info: ParameterInfo, swing: float) -> bool:
+        """In small swings the rest angle of a body that nothing else holds acts as a constant moment does."""
+        return not (info.beside_spring and swing < SWING)
+
+    def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Inertia, damping and constant moment, as far as they are fitted."""
+        return tuple(name for name in self.coefficient_units if name in names)
+
+    def unseen(self, data: Data) -> Sequence[str]:
+        """The zero."""
+        del data
+        return ("the sensor's zero, and a drift of it as opposed to a constant moment: there is no spring",)
+
+    @property
+    def unseen_scale(self) -> str:
+        """The clause on a common scale that driven runs cannot show."""
+        return "a common scale on the inertia and the moment of the input"

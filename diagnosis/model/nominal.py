@@ -1,0 +1,382 @@
+"""What a nominal model is: the parameters, equations, starting points, coefficients and sentences of a kind of rig.
+
+One type describes one kind of rig, in one file. It is chosen once for a campaign, and nothing else in the package
+asks which kind it is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from diagnosis.likelihood.nondimensional import REFERENCE_STIFFNESS, Similarity
+from diagnosis.model.parameters import Parameter, released
+from tunnel_sim.effects import Effect
+from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from diagnosis.likelihood.run_data import Data, RunData
+
+#: Moments of the air in the strongest wind, by which a coefficient's size is judged whatever the air.
+_AIR_STIFFNESS, _AIR_DAMPING = 4.0, 0.02  # N m/rad and N m s/rad
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a fit of the nominal model starts.
+
+    Args:
+        common: values of the common parameters by name; 0 where not given.
+        own: by run, values of its own parameters by name.
+    """
+
+    common: Mapping[str, float]
+    own: Sequence[Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class NominalModel:
+    """The model of a kind of rig, without any effect.
+
+    A kind overrides what is different for it. All values are those of the similar campaign
+    (`diagnosis.likelihood.nondimensional`), whose inertia is 1 where it is not known.
+
+    Args:
+        windy: whether the wind is on in any run of the campaign.
+        own_zeros: whether every run has a zero of the sensor of its own.
+        unknown_gain: whether a run of the campaign has an input whose gain is fitted.
+    """
+
+    windy: bool = False
+    own_zeros: bool = False
+    unknown_gain: bool = False
+
+    #: Whether moments are per unit inertia, since no run shows them in N m.
+    per_inertia: ClassVar[bool] = False
+    #: Whether anything restores the body, so that it swings about a place and its angle does not drift away.
+    restored: ClassVar[bool] = True
+    #: Whether the resonance of a driven run is known, and need not show in it.
+    resonance_known: ClassVar[bool] = False
+    #: Units of the coefficients that it states, by name.
+    coefficient_units: ClassVar[Mapping[str, str]] = {"cn_beta": "1/rad", "cn_r": "1/rad"}
+
+    # ---- how it is chosen ----
+
+    @classmethod
+    def describes(cls, campaign: Campaign) -> bool:
+        """Whether it is the model of a campaign for which none is given."""
+        del campaign
+        return False
+
+    def of(self, campaign: Campaign) -> NominalModel:
+        """The model with what it depends on in a campaign."""
+        return dataclasses.replace(
+            self,
+            windy=any(run.wind_on for run in campaign.runs),
+            own_zeros=campaign.sensor.zero == "per_run" and self.restored and "zero" not in self.held,
+            unknown_gain=any(run.drive is not None and self.fits_gain(run.drive) for run in campaign.runs),
+        )
+
+    def among(self, runs: Sequence[RunData]) -> NominalModel:
+        """The model of some runs by themselves, without the parameters that these runs do not have."""
+        return dataclasses.replace(
+            self, windy=any(run.wind_on for run in runs), unknown_gain=any(run.gain_free for run in runs)
+        )
+
+    def fits_gain(self, drive: Drive) -> bool:
+        """Whether the gain of an input is fitted.
+
+        Per unit inertia, a known moment has an unknown gain too: one over the inertia. The motion of the spring's
+        root acts by the spring's stiffness.
+        """
+        known = drive.column != "drive" or drive.gain is not None
+        return drive.on_body and (self.per_inertia or not known)
+
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse runs that it cannot describe.
+
+        Raises:
+            TunnelError: for the first of them.
+        """
+        del campaign
+
+    def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
+        """The effects that it cannot have, by the sentence that says why, with a place for their names."""
+        del campaign, kinds
+        return {}
+
+    # ---- its scale ----
+
+    def moment_factor(self, campaign: Campaign, time: float) -> float:
+        """The factor on moments that makes the campaign similar to the reference rig, dimensionless.
+
+        Args:
+            time: the factor on times, dimensionless.
+        """
+        del time
+        springs = [run.spring_stiffness for run in campaign.runs if run.spring_stiffness is not None]
+        return REFERENCE_STIFFNESS / float(np.median(springs))
+
+    def similar(self, change: Similarity) -> NominalModel:
+        """The model with constants of its own in the units of the similar campaign."""
+        del change
+        return self
+
+    # ---- its parameters and equations ----
+
+    @property
+    def held(self) -> Mapping[str, float]:
+        """Values of parameters that are not fitted, by name."""
+        return {}
+
+    def parameters(self, data: Data) -> tuple[Parameter, ...]:
+        """Its parameters, those common to the runs in the order of a fit's vectors."""
+        named = (*self.inertial(data), *self.air(data), *self.input_gain(data), *self.offset(data))
+        own_zero = Parameter("zero", "rad", owner="per_run") if self.own_zeros else None
+        return *(one for one in named if one.name not in self.held), *released(own_zero)
+
+    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+        """Inertia, damping and stiffness, as far as they are fitted."""
+        del data
+        return (
+            Parameter("yaw_inertia", "kg m2", lower=1e-9, size=0.1),
+            Parameter("mechanical_damping", "N m s/rad", lower=0.0, size=0.02),
+        )
+
+    def air(self, data: Data) -> tuple[Parameter, ...]:
+        """The aerodynamic derivatives; none in still air."""
+        if not self.windy:
+            return ()
+        runs = [run for run in data.runs if run.wind_on]
+        stiffness = max((data.air_moment(run) for run in runs), default=1.0)
+        damping = max(
+            (data.air_moment(run) * data.reference_length / run.wind_speed for run in runs), default=1.0
+        )
+        return (
+            Parameter("cn_beta", "1/rad", size=_AIR_STIFFNESS / stiffness),
+            Parameter("cn_r", "1/rad", size=_AIR_DAMPING / damping),
+        )
+
+    def input_gain(self, data: Data) -> tuple[Parameter, ...]:
+        """The gain of an input, where it is not known."""
+        if not self.unknown_gain:
+            return ()
+        inputs = [float(np.max(np.abs(run.drive.values))) for run in data.runs if run.drive is not None]
+        size = 1e-2 * REFERENCE_STIFFNESS * data.swing / max(inputs, default=1.0)
+        return (Parameter("drive_gain", "N m", size=size),)
+
+    def offset(self, data: Data) -> tuple[Parameter, ...]:
+        """The sensor's zero, where the runs have one in common."""
+        del data
+        return () if self.own_zeros else (Parameter("zero", "rad"),)
+
+    @property
+    def shares_zero(self) -> bool:
+        """Whether the runs have one zero of the sensor, to which their means can be compared."""
+        return not self.own_zeros
+
+    def run_settings(self, values: Mapping[str, float], run: RunData) -> RunSettings:
+        """The physics of one run.
+
+        Args:
+            values: of all parameters by name, those of the run and those held among them.
+        """
+        spring = self.spring(values, run)
+        return RunSettings(
+            spring_stiffness=max(spring, 0.0),
+            derivatives=AeroDerivatives(values.get("cn_beta", 0.0), values.get("cn_r", 0.0)),
+            yaw_inertia=values.get("yaw_inertia", 1.0),
+            mechanical_damping=values["mechanical_damping"],
+            wind_speed=run.wind_speed,
+            air_density=run.air_density,
+            release_angle=values["release_angle"],
+            release_rate=values["release_rate"],
+            duration=run.duration,
+            parameters=self.law_parameters,
+            program=self.program,
+            drive=run.moment(values.get("drive_gain", 1.0), values.get("moment_offset", 0.0)),
+        )
+
+    def spring(self, values: Mapping[str, float], run: RunData) -> float:
+        """Stiffness of the spring in a run, N m/rad."""
+        del values
+        assert run.spring_stiffness is not None
+        return run.spring_stiffness
+
+    @property
+    def law_parameters(self) -> Mapping[str, float]:
+        """Parameters of the moment law beside a linear spring and damper."""
+        return {}
+
+    @property
+    def program(self) -> tuple[float, ...]:
+        """The moment beside a linear spring and damper, as the moment law evaluates it; empty: none."""
+        return ()
+
+    @property
+    def lead(self) -> float:
+        """Time by which the motion leads its input, s."""
+        return 0.0
+
+    def possible_leads(self) -> tuple[float, ...]:
+        """Leads that may explain more than it does without one, s, the first of them 0; none: it has no lead."""
+        return ()
+
+    def with_lead(self, lead: float) -> NominalModel:
+        """The same with another lead, s."""
+        del lead
+        return self
+
+    def notes(self) -> tuple[str, ...]:
+        """How to read the answer, in sentences."""
+        return ()
+
+    def gain_words(self) -> str:
+        """The gain of the input that the model states, in a sentence; empty: none."""
+        return ""
+
+    def lead_words(self, change: Similarity) -> tuple[str, ...]:
+        """The lead of the motion, in a sentence; none where there is none.
+
+        Args:
+            change: how the campaign was made similar.
+        """
+        del change
+        return ()
+
+    def springs_at(self, data: Data, amplitude: Array) -> Array:
+        """Stiffness of every run's spring at an amplitude, N m/rad, shape (runs,).
+
+        Args:
+            amplitude: rad, shape (runs,).
+        """
+        del amplitude
+        return np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+
+    # ---- its starting points ----
+
+    def starts(self, data: Data) -> Iterator[Start]:
+        """Starting points for its fit; the second where the fit from the first misses the motion."""
+        raise NotImplementedError
+
+    # ---- what it says of a motion ----
+
+    def frequency(self, inertia: float, stiffness: float) -> float:
+        """Frequency of the free motion, Hz; of a body that nothing restores that of the reference rig."""
+        return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
+
+    def restoring(self, inertia: float, stiffness: float) -> float:
+        """The stiffness of that frequency, N m/rad."""
+        del inertia
+        return stiffness
+
+    def fitted_spring(self, value: Mapping[str, float]) -> float | None:
+        """Stiffness of a spring that is fitted, N m/rad; None where it is stated or there is none."""
+        del value
+        return None
+
+    def tells(self, info: ParameterInfo, swing: float) -> bool:
+        """Whether the runs tell a parameter of an effect from the model's own.
+
+        Args:
+            swing: largest angle of the motion, rad.
+        """
+        del info, swing
+        return True
+
+    # ---- its coefficients ----
+
+    @property
+    def moment_unit(self) -> str:
+        """Unit of a moment as it is identified."""
+        return "rad/s2" if self.per_inertia else "N m"
+
+    def identified_unit(self, unit: str) -> str:
+        """The unit in which a quantity of a unit is identified."""
+        return unit
+
+    def coefficient_names(self, names: Sequence[str]) -> tuple[str, ...]:
+        """The coefficients that a diagnosis states.
+
+        Args:
+            names: of the common parameters of the fit.
+        """
+        del names
+        return tuple(self.coefficient_units)
+
+    def coefficient(self, names: Sequence[str], common: Array, name: str) -> float | None:
+        """A coefficient of a fit in its unit; None where it has none.
+
+        Args:
+            names: of the common parameters.
+            common: their values, shape (common,).
+        """
+        return dict(zip(names, common.tolist(), strict=True)).get(name)
+
+    def gradient(self, names: Sequence[str], common: Array, name: str) -> Array:
+        """Derivative of a coefficient with respect to the common parameters, shape (common,).
+
+        Zero for a coefficient that is held. Arguments as in `coefficient`.
+        """
+        del common
+        return np.array([float(one == name) for one in names])
+
+    def bounded_by(self, names: Sequence[str], name: str) -> str | None:
+        """The parameter at whose bound a coefficient is at a bound, too; None where there is none."""
+        del names
+        return name if name == "mechanical_damping" else None
+
+    # ---- what its runs cannot show, and what to do next ----
+
+    def blind_spots(self, data: Data) -> tuple[str, ...]:
+        """What these runs cannot show: clauses, those that apply to every campaign last."""
+        speeds = {run.wind_speed for run in data.runs if run.wind_on}
+        found = [*self.unseen(data)]
+        if not data.wind_on:
+            found.append("any effect of the air: there is no run with the wind on")
+        elif len(speeds) < 2:
+            found.append(
+                "a lag or a wind-speed offset: there is one wind speed only, and Cnβ and Cnr absorb them"
+            )
+        if data.wind_on and all(run.wind_on for run in data.runs):
+            found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
+        last = (_OF_WIND,) if data.wind_on else ()
+        if data.driven:
+            found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")
+            return *found, ALWAYS_BLIND[1], self.unseen_scale, *last
+        return *found, *ALWAYS_BLIND, *last
+
+    def unseen(self, data: Data) -> Sequence[str]:
+        """Clauses on what the springs of these runs cannot show."""
+        if len(data.springs) > 1:
+            return ()
+        return (
+            "structural as opposed to viscous damping, gravity, or a wrong stiffness: there is one spring only",
+        )
+
+    @property
+    def unseen_scale(self) -> str:
+        """The clause on a common scale that driven runs cannot show."""
+        return ALWAYS_BLIND[2]
+
+    def planned_springs(self, data: Data) -> tuple[float, ...]:
+        """Stiffnesses of the springs with which a further run can be made, ascending, N m/rad."""
+        return tuple(sorted({round(k * f, 2) for k in data.springs for f in _FACTORS} | set(data.springs)))
+
+
+_FACTORS = (0.5, 1.0, 2.0)  # on the stiffnesses of the campaign's springs
+ALWAYS_BLIND = (
+    "a constant sensor lag or filter: it only shifts the release",
+    "an error of the clock",
+    "a common scale on the inertia and all stiffnesses",
+)
+_OF_WIND = "a scale error of wind speed or air density: Cnβ and Cnr absorb it"

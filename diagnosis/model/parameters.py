@@ -1,0 +1,153 @@
+"""The parameters of a fit: names, units, ranges, steps and places in its vectors, said once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from tunnel_sim.vocabulary.record import Array
+
+_RELATIVE_STEP = 1e-5  # of finite differences, in a parameter's size
+
+#: Whether the runs share a parameter, or each of them has its own.
+Owner = Literal["common", "per_run"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a fit.
+
+    Args:
+        name: that of the nominal model's parameter, or ``effect.parameter``.
+        unit: SI, angles in rad; that of the readings where a parameter has it.
+        lower: least value allowed, in the unit.
+        upper: greatest value allowed, in the unit.
+        size: a typical value, below which steps of finite differences shrink no further, in the unit.
+        of_swing: whether its steps are in proportion to the amplitude of the run, whose multiple ``size`` then is.
+        effect: name of the effect that it belongs to; empty: the nominal model.
+    """
+
+    name: str
+    unit: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    size: float = 1.0
+    owner: Owner = "common"
+    of_swing: bool = False
+    effect: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A value of every parameter.
+
+    Args:
+        common: parameters common to the runs, in the order of `ParameterSet.names`, shape (common,).
+        release: of every run its own parameters, in the order of `ParameterSet.own_names`, shape (runs, own).
+    """
+
+    common: Array
+    release: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterSet:
+    """The parameters of a fit, in the order of its vectors."""
+
+    parameters: tuple[Parameter, ...]
+
+    @cached_property
+    def common(self) -> tuple[Parameter, ...]:
+        """Those common to the runs."""
+        return tuple(one for one in self.parameters if one.owner == "common")
+
+    @cached_property
+    def own(self) -> tuple[Parameter, ...]:
+        """Those of which every run has its own."""
+        return tuple(one for one in self.parameters if one.owner == "per_run")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the common parameters."""
+        return tuple(one.name for one in self.common)
+
+    @cached_property
+    def own_names(self) -> tuple[str, ...]:
+        """Names of a run's own parameters."""
+        return tuple(one.name for one in self.own)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and greatest values of the common parameters, shape (common,) each."""
+        found = np.array([(one.lower, one.upper) for one in self.common], np.float64).reshape(-1, 2)
+        return found[:, 0], found[:, 1]
+
+    @cached_property
+    def own_places(self) -> Mapping[str, slice]:
+        """Where each effect's phase or instants are among a run's own parameters, by the effects' names."""
+        effects = [one.effect for one in self.own]
+        first = {effect: effects.index(effect) for effect in dict.fromkeys(effects) if effect}
+        return {effect: slice(at, at + effects.count(effect)) for effect, at in first.items()}
+
+    @cached_property
+    def of_effects(self) -> int:
+        """How many of a run's own parameters are those of effects; they come last."""
+        return sum(bool(one.effect) for one in self.own)
+
+    def value(self, point: Point, name: str, run: int) -> float | None:
+        """A parameter in one run, in its unit; None where there is none of that name.
+
+        Args:
+            run: place of the run.
+        """
+        if name in self.names:
+            return float(point.common[self.names.index(name)])
+        return float(point.release[run, self.own_names.index(name)]) if name in self.own_names else None
+
+    def point(self, common: Mapping[str, float], own: Sequence[Mapping[str, float]]) -> Point:
+        """The point of some values; those not given are 0.
+
+        Args:
+            common: by name.
+            own: by run, by name.
+        """
+        return Point(
+            np.array([common.get(name, 0.0) for name in self.names]),
+            np.array([[run.get(name, 0.0) for name in self.own_names] for run in own]),
+        )
+
+    def steps(self, common: Array) -> Array:
+        """Steps for one-sided finite differences of the common parameters, away from bounds, shape (common,).
+
+        Args:
+            common: their values, shape (common,).
+        """
+        sizes = [max(abs(value), one.size) for one, value in zip(self.common, common, strict=True)]
+        steps = _RELATIVE_STEP * np.array(sizes)
+        _, upper = self.bounds
+        steps[common + steps > upper] *= -1.0
+        return steps
+
+    def own_steps(self, amplitude: Array) -> list[Array]:
+        """Steps for finite differences of a run's own parameters, by parameter, shape (runs,) each.
+
+        Args:
+            amplitude: of every run, rad, shape (runs,).
+        """
+        whole = np.ones_like(amplitude)
+        return [_RELATIVE_STEP * one.size * (amplitude if one.of_swing else whole) for one in self.own]
+
+
+def released(zero: Parameter | None = None) -> Iterable[Parameter]:
+    """What every run has of its own: its release, and its sensor's zero where each run has one.
+
+    The angle (rad) and the rate (rad/s) are those of the sensor's end at the start of what is fitted.
+    """
+    yield Parameter("release_angle", "rad", owner="per_run", of_swing=True)
+    yield Parameter("release_rate", "rad/s", size=10.0, owner="per_run", of_swing=True)
+    if zero is not None:
+        yield zero

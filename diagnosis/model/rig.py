@@ -1,0 +1,197 @@
+"""The rig: a body on springs of stated stiffness; and records of one spring that is not stated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.parameters import Parameter
+from diagnosis.model.starts import Shown, decay_squares
+from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.units import dimension, in_si, product
+
+if TYPE_CHECKING:
+    from diagnosis.likelihood.run_data import Data, RunData
+
+_LOSS = 0.01  # of a start, in angular frequencies: a small damping
+
+#: Parameters of effects that add to the spring's stiffness at small amplitudes, as gravity does.
+_STIFFNESSES = tuple(
+    f"{kind.name}.{kind.parameters()[0].name}"
+    for kind in ALL_EFFECTS
+    if kind.channel == "stiffness" and kind.parameters()[0].unit == "N m/rad"
+)
+
+
+#: Units of what acts on the yaw axis, and of the same per unit inertia.
+_PER_INERTIA = {
+    "N m": "rad/s2",
+    "N m/rad": "1/s2",
+    "N m s/rad": "1/s",
+    "N m s2/rad2": "1/rad",
+    "rad/(N m)": "s2",
+}
+
+
+@dataclass(frozen=True)
+class Rig(NominalModel):
+    """A body on springs of stated stiffness: Izz β̈ + C β̇ + Kr β = Ka β + Ca β̇."""
+
+    @classmethod
+    def describes(cls, campaign: Campaign) -> bool:
+        """Where every run states its spring."""
+        return all(run.spring_stiffness is not None for run in campaign.runs)
+
+    def starts(self, data: Data) -> Iterator[Start]:
+        """From the runs' spectra; then from their own decays, as `identify` finds them."""
+        yield self._start(data, Shown.of(data))
+        squares = decay_squares(data)
+        if squares is not None:
+            yield self._start(data, Shown.of(data, squares))
+
+    def _start(self, data: Data, shown: Shown) -> Start:
+        zero = float(np.median(shown.zeros))
+        zeros = shown.zeros if self.own_zeros else [zero] * len(shown.zeros)
+        own = [
+            {"release_angle": float(np.mean(run.reading[:3]) - own_zero), "zero": own_zero}
+            for run, own_zero in zip(data.runs, zeros, strict=True)
+        ]
+        return Start({**self.dynamics(data, shown), "zero": zero}, own)
+
+    def dynamics(self, data: Data, shown: Shown) -> dict[str, float]:
+        """Starting values by name, of the zero apart.
+
+        Inertia and aerodynamic stiffness are found by linear regression of the runs' frequencies.
+        """
+        spring = self.springs_at(data, np.sqrt(2.0) * shown.swing)
+        pressure, moving = np.array([data.air_moment(run) for run in data.runs]), shown.moving
+        # Kr = Izz ω² + pressure Cnβ, with equal relative errors
+        design = np.column_stack([shown.squares, pressure]) / spring[:, None] * moving[:, None]
+        if not self.windy:
+            design = design[:, :1]
+        solution = np.linalg.lstsq(design, moving, rcond=None)[0]
+        inertia = float(solution[0])
+        if inertia <= 0.0:
+            inertia = float(np.median((spring / shown.squares)[moving > 0.0]))
+        damping = _LOSS * inertia * float(np.sqrt(shown.typical))
+        if shown.loss is not None:
+            damping = inertia * shown.loss
+        found = {"yaw_inertia": inertia, "mechanical_damping": damping, "drive_gain": inertia * shown.gain}
+        return found | ({"cn_beta": float(solution[1])} if self.windy else {})
+
+
+@dataclass(frozen=True)
+class PerInertia(Rig):
+    """A body on one spring that is not stated: all moments are per unit inertia."""
+
+    per_inertia: ClassVar[bool] = True
+    coefficient_units: ClassVar[Mapping[str, str]] = {"omega_n": "rad/s", "zeta": "1"}
+
+    @classmethod
+    def describes(cls, campaign: Campaign) -> bool:
+        """Where a run states no spring."""
+        return any(run.spring_stiffness is None for run in campaign.runs)
+
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse inputs of known gain beside inputs of unknown gain.
+
+        Raises:
+            TunnelError: for the campaign.
+        """
+        on_body = [run.drive for run in campaign.runs if run.drive is not None and run.drive.on_body]
+        mixed = {drive.column == "moment_nm" or drive.gain is not None for drive in on_body}
+        if len(mixed) > 1:
+            raise TunnelError(
+                "without spring_stiffness, inputs of known and of unknown gain cannot be diagnosed together",
+                where=campaign.name,
+                remedy="state spring_stiffness, or diagnose the two kinds of runs separately",
+            )
+
+    def moment_factor(self, campaign: Campaign, time: float) -> float:
+        """So that the inertia is 1 before and after."""
+        del campaign
+        return time**-2
+
+    def inertial(self, data: Data) -> tuple[Parameter, ...]:
+        """The common stiffness in place of the inertia."""
+        del data
+        return (
+            Parameter("stiffness", "1/s2", lower=0.0, size=10.0),
+            Parameter("mechanical_damping", "1/s", lower=0.0, size=0.02),
+        )
+
+    def spring(self, values: Mapping[str, float], run: RunData) -> float:
+        """The common stiffness, 1/s²."""
+        del run
+        return values["stiffness"]
+
+    def dynamics(self, data: Data, shown: Shown) -> dict[str, float]:
+        """Starting values by name, of the zero apart."""
+        del data
+        loss = _LOSS * float(np.sqrt(shown.typical)) if shown.loss is None else shown.loss
+        return {"stiffness": shown.typical, "mechanical_damping": loss, "drive_gain": shown.gain}
+
+    def fitted_spring(self, value: Mapping[str, float]) -> float | None:
+        """The common stiffness, 1/s²."""
+        return value["stiffness"]
+
+    def tells(self, info: ParameterInfo, swing: float) -> bool:
+        """Not what only a spring of stated stiffness tells."""
+        del swing
+        return not info.beside_spring
+
+    def identified_unit(self, unit: str) -> str:
+        """The unit over that of the inertia."""
+        of = dimension(unit)
+        by_mass = in_si(product(of, dimension("kg m2"), -of[0])) if of[0] else unit
+        return _PER_INERTIA.get(unit, by_mass)
+
+    def coefficient(self, names: Sequence[str], common: Array, name: str) -> float | None:
+        """The natural frequency (rad/s) or the damping ratio of small swings; None of others."""
+        value = dict(zip(names, common.tolist(), strict=True))
+        if name not in self.coefficient_units:
+            return value.get(name)
+        omega = float(np.sqrt(max(sum(value[part] for part in self._stiffnesses(names)), 0.0)))
+        return omega if name == "omega_n" else value["mechanical_damping"] / max(2.0 * omega, 1e-150)
+
+    def gradient(self, names: Sequence[str], common: Array, name: str) -> Array:
+        """Derivative of a coefficient with respect to the common parameters, shape (common,)."""
+        if name not in self.coefficient_units:
+            return super().gradient(names, common, name)
+        found = dict.fromkeys(names, 0.0)
+        omega = max(self.coefficient(names, common, "omega_n") or 0.0, 1e-150)
+        damping = float(common[list(names).index("mechanical_damping")])
+        slope = 0.5 / omega if name == "omega_n" else -0.25 * damping / omega / omega / omega
+        found |= dict.fromkeys(self._stiffnesses(names), slope)
+        if name == "zeta":
+            found["mechanical_damping"] = 0.5 / omega
+        return np.array(list(found.values()))
+
+    def bounded_by(self, names: Sequence[str], name: str) -> str | None:
+        """The damping; of the frequency the spring where gravity does not restore the body in its place."""
+        if name == "zeta":
+            return "mechanical_damping"
+        return "stiffness" if name == "omega_n" and len(self._stiffnesses(names)) == 1 else None
+
+    @staticmethod
+    def _stiffnesses(names: Sequence[str]) -> tuple[str, ...]:
+        """The parameters whose sum is the stiffness of small swings; a pendulum's only spring is gravity."""
+        return ("stiffness", *(name for name in _STIFFNESSES if name in names))
+
+    def unseen(self, data: Data) -> Sequence[str]:
+        """The spring is not stated."""
+        del data
+        return ("an error of a single spring: the runs state no stiffness",)
+
+    def planned_springs(self, data: Data) -> tuple[float, ...]:
+        """None: no stiffness is known."""
+        del data
+        return ()

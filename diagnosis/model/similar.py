@@ -1,0 +1,69 @@
+"""The similar campaign: of a rig of the reference frequency and stiffness that moves as the measured one does."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity, free_frequency
+from diagnosis.model.choose import nominal_model
+from diagnosis.model.nominal import NominalModel
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.record import Record
+
+
+def similar_campaign(campaign: Campaign, model: NominalModel | None = None) -> tuple[Campaign, Similarity]:
+    """The campaign of the similar rig.
+
+    Args:
+        model: its nominal model; None: that of its kind.
+
+    Returns:
+        The similar campaign, and how it was made. Its wind-off runs have a median frequency of
+        `REFERENCE_FREQUENCY`, and its springs a median stiffness of `REFERENCE_STIFFNESS`; where no stiffness is
+        stated the inertia is 1 before and after. Where nothing holds the body, its inertia is the one that swings
+        at that frequency on a spring of that stiffness.
+    """
+    rig, sensor = campaign.rig, campaign.sensor
+    still = [run for run in campaign.runs if not run.wind_on] or list(campaign.runs)
+    time = float(np.median([free_frequency(run, sensor.derivative) for run in still])) / REFERENCE_FREQUENCY
+    moment = (model or nominal_model(campaign)).moment_factor(campaign, time)
+    rest = float(np.median([np.mean(run.record.yaw_rad) for run in campaign.runs]))
+    unit = ("rad", "rad/s", "rad/s2")[sensor.derivative]
+    change = Similarity(time, moment, rest if unit == "rad" else 0.0, unit)
+
+    def known(value: float | None, unit: str) -> float | None:
+        return None if value is None else change.similar(value, unit)
+
+    similar_rig = RigProperties(
+        known(rig.yaw_inertia, "kg m2"),
+        None if rig.frontal_area is None else rig.frontal_area * change.area,
+        None if rig.reference_length is None else rig.reference_length * time,
+        None if rig.width is None else rig.width * time,
+    )
+    similar_sensor = dataclasses.replace(
+        sensor,
+        sample_rate=known(sensor.sample_rate, "Hz"),
+        resolution=known(sensor.resolution, unit),
+        noise_std=known(sensor.noise_std, unit),
+    )
+    runs = []
+    for run in campaign.runs:
+        readings = (run.record.yaw_rad - change.rest) * change.similar(1.0, change.reading)
+        record, spring = Record(run.record.time_s * change.time, readings), run.spring_stiffness
+        drive = None if run.drive is None else _drive(run.drive, change)
+        spring = None if spring is None else spring * change.moment
+        runs.append(dataclasses.replace(run, record=record, spring_stiffness=spring, drive=drive))
+    similar = dataclasses.replace(campaign, rig=similar_rig, sensor=similar_sensor, runs=tuple(runs))
+    return similar, change
+
+
+def _drive(drive: Drive, change: Similarity) -> Drive:
+    """An input, whose own times are those of its record."""
+    if not drive.on_body:
+        return drive
+    if drive.column == "drive":
+        return dataclasses.replace(drive, gain=None if drive.gain is None else drive.gain * change.moment)
+    return dataclasses.replace(drive, values=drive.values * change.similar(1.0, "N m"))

@@ -1,0 +1,118 @@
+"""What records show of a motion before any fit: frequencies, losses and gains of the runs, each by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.driven import driven_start
+from identification.signal.frequency import peak_of_swing, starting_decay
+from tunnel_sim.vocabulary.record import Array, Record
+
+if TYPE_CHECKING:
+    from diagnosis.likelihood.run_data import Data, RunData
+
+_STILL = 0.02  # of the largest swing, below which a run counts as at rest
+_PADDING = 16  # zero padding of the spectrum that gives the first frequency
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What the runs show, each by itself.
+
+    Args:
+        squares: angular frequency squared, shape (runs,), 1/s².
+        swing: standard deviation of the reading, shape (runs,), rad.
+        moving: 1 for a run that moves, 0 for one at rest, which has no frequency, shape (runs,).
+        loss: rate of the energy's loss by the driven runs, 1/s; None where they show none.
+        gain: of an input that is not known, rad/s² per unit; 0 where no run shows it.
+        zeros: mean readings, by run, rad.
+    """
+
+    squares: Array
+    swing: Array
+    moving: Array
+    loss: float | None
+    gain: float
+    zeros: list[float]
+
+    @property
+    def typical(self) -> float:
+        """The median angular frequency squared of the runs that move, 1/s²."""
+        return float(np.median(self.squares[self.moving > 0.0]))
+
+    @classmethod
+    def of(cls, data: Data, squares: list[float] | None = None) -> Shown:
+        """What the runs of a campaign show.
+
+        Args:
+            squares: of the runs, where they are known, 1/s²; else they are those of their spectra, or of a driven
+                run that of the resonance between input and motion.
+        """
+        driven = responses(data)
+        if squares is None:
+            squares = [
+                _by_spectrum(run) if response is None else response[1]
+                for run, response in zip(data.runs, driven, strict=True)
+            ]
+        swing = np.array([float(np.std(run.reading)) for run in data.runs])
+        losses = [2.0 * one[0] for one in driven if one is not None and one[0] > 0.0]
+        gains = [
+            response[2] / run.drive.scale
+            for run, response in zip(data.runs, driven, strict=True)
+            if response is not None and run.gain_free and run.drive is not None
+        ]
+        return cls(
+            np.array(squares),
+            swing,
+            (swing > _STILL * swing.max()).astype(np.float64),
+            float(np.median(losses)) if losses else None,
+            float(np.median(gains)) if gains else 0.0,
+            [float(np.mean(run.reading)) for run in data.runs],
+        )
+
+
+def decay_squares(data: Data) -> list[float] | None:
+    """Angular frequency squared of the runs by their own decays, 1/s²; None where a run has none, or is driven.
+
+    A frequency that depends on the amplitude spreads the peak of a spectrum, and χ² has a minimum for every cycle
+    more or less that fits the record.
+    """
+    if data.driven:
+        return None
+    found = []
+    for run in data.runs:
+        record = Record(run.times, run.reading)
+        start = starting_decay(record)
+        own = None if start is None else fit_run(Reading.from_record(record), start)
+        if own is None or not own.runs or own.runs[0].decay.stiffness <= 0.0:
+            return None
+        found.append(own.runs[0].decay.stiffness)
+    return found
+
+
+def responses(data: Data) -> list[tuple[float, float, float] | None]:
+    """Decay rate (1/s), stiffness (1/s²) and gain (rad/s² per unit) of every run; None where it shows no resonance.
+
+    Of a body without a spring the gain must be positive, in N m of the input.
+    """
+    return [None if run.drive is None else _response(run) for run in data.runs]
+
+
+def _response(run: RunData) -> tuple[float, float, float] | None:
+    sprung = run.spring_stiffness != 0.0
+    found = driven_start(run.times, run.reading, run.input_means, sprung=sprung, derivative=run.derivative)
+    if found is None or run.drive is None or (found[1] if sprung else found[2] * run.drive.scale) <= 0.0:
+        return None
+    return found
+
+
+def _by_spectrum(run: RunData) -> float:
+    """The angular frequency squared of the peak of a run's spectrum, 1/s²."""
+    values = run.reading - run.reading.mean()
+    size = _PADDING * values.size
+    peak = float(peak_of_swing(values, size) / (size * run.interval))
+    return (2.0 * np.pi * peak) ** 2
