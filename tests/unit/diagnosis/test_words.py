@@ -31,8 +31,8 @@ def placed(given: Document, **changes: Any) -> str:
 def test_where_the_gap_is_says_runs_places_bands_and_reasons(given: Document) -> None:
     assert where_words(given) == (
         "88 % of the gap is in 2 of 3 runs (alpha, gamma); 4.2 times as much power with the wind on as with it "
-        "off. Four fifths of it lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 to "
-        "2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on the "
+        "off. Four fifths of it lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 "
+        "to 2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on the "
         "damping: the damping shifts along the decay more than the frequency does. It is there with the wind on "
         "and off: the 2 wind-off runs, fitted alone, show it too. That agrees with quadratic damping."
     )
@@ -212,7 +212,9 @@ def test_what_could_be_closed(given: Document) -> None:
     def text(**changes: Any) -> str:
         return closable_words(given | {"closable": CLOSABLE | changes})
 
-    first = "85.0 ± 2.0 % of what the causes leave could be closed by a moment of the angle alone, measured on runs held"
+    first = (
+        "85.0 ± 2.0 % of what the causes leave could be closed by a moment of the angle alone, measured on"
+    )
     assert text().startswith(first)
     assert text().endswith("No other kind would close more than 31.0 %.")
     assert text(alike=["rate"]).endswith("cannot distinguish it from a moment of the rate alone.")
