@@ -17,10 +17,11 @@ from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.answer.verdict import cautions, immaterial, nearly, remainder, spring_choices
+from diagnosis.facts.checks import NoiseSummary
 from diagnosis.facts.closure import PATCHED
 from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
-from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
+from diagnosis.result import Coefficients, Diagnosis, Where
 from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, main_effect
 from diagnosis.where.described import described, nowhere

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from diagnosis.answer.held_out import Base, HeldOut
+from diagnosis.facts.checks import Confirmation
 from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Problem, blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.model.parameters import Point
-from diagnosis.result import Confirmation, GapSummary, RunGap
+from diagnosis.result import GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
 from tunnel_sim.physics.run_settings import released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from diagnosis.facts.checks import Confirmation
 from diagnosis.facts.found import Fact, Nearly, SpringError, SpringsOff
 from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
-from diagnosis.result import Confirmation, Hidden, ParameterEstimate, RunGap
+from diagnosis.result import Hidden, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
 from diagnosis.search.outside import ONE_SPRING, AnotherSpring
 from diagnosis.search.weigh import UNKNOWN

@@ -10,7 +10,6 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from diagnosis.printing import part
 
 from diagnosis import Settings, diagnose
 from diagnosis.likelihood.residuals import ChannelMisfit
@@ -18,6 +17,7 @@ from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import FittedSet, weigh
 from diagnosis.settings import settings_of
 from diagnosis.settings.origin import Origin
+from diagnosis.words.numbers import part
 from docs.studies import settings_page
 from tests.unit.gap_campaigns import campaign
 from tunnel_sim.vocabulary.errors import TunnelError

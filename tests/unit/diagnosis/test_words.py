@@ -8,7 +8,6 @@ import pytest
 
 from diagnosis.settings import settings_of
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
-from diagnosis.words.numbers import part
 from diagnosis.words.remainder import closable_words, rest_words
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
@@ -32,9 +31,9 @@ def test_where_the_gap_is_says_runs_places_bands_and_reasons(given: Document) ->
     assert where_words(given) == (
         "88 % of the gap is in 2 of 3 runs (alpha, gamma); 4.2 times as much power with the wind on as with it "
         "off. Four fifths of it lie between 0.1 and 3.4 s of the record, at amplitudes from 9.9° to 19°, at 1.88 "
-        "to 2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on the "
-        "damping: the damping shifts along the decay more than the frequency does. It is there with the wind on "
-        "and off: the 2 wind-off runs, fitted alone, show it too. That agrees with quadratic damping."
+        "to 2.62 Hz. By frequency: 73 % at the oscillation itself, 13 % at three times its frequency. It acts on "
+        "the damping: the damping shifts along the decay more than the frequency does. It is there with the wind "
+        "on and off: the 2 wind-off runs, fitted alone, show it too. That agrees with quadratic damping."
     )
 
 
@@ -249,14 +248,6 @@ def test_all_text_fields_are_written_from_the_facts(given: Document) -> None:
     assert found.remarks[0].what.startswith("sampled too slowly")
     assert (found.closable, found.patch) == ("", ())
     assert CAUSE.replace("_", " ") in found.verdict
-
-
-@pytest.mark.parametrize(
-    ("share", "words"),
-    [(0.8, "four fifths"), (0.5, "half"), (0.1, "a tenth"), (0.125, "an eighth"), (0.83, "83 %")],
-)
-def test_a_share_in_words(share: float, words: str) -> None:
-    assert part(share) == words
 
 
 def test_numbers_in_sentences_are_those_of_the_settings(given: Document) -> None:

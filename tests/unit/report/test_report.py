@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from diagnosis.answer.assemble import localise
+from diagnosis.facts.checks import Confirmation, NoiseSummary
 from diagnosis.facts.closure import ON_RUNS, Step, Waterfall
 from diagnosis.facts.remainder import Ceiling, Closable, Curve
 from diagnosis.likelihood.least_squares import fit
@@ -15,10 +16,8 @@ from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import (
     Candidate,
     Coefficients,
-    Confirmation,
     Diagnosis,
     GapSummary,
-    NoiseSummary,
     ParameterEstimate,
     RunGap,
 )
