@@ -42,7 +42,9 @@ def rival_lines(document: Document) -> list[str]:
     lines = []
     if rivals:
         lines.append(f"These runs cannot distinguish it from: {', '.join(rivals)}")
-    if run is not None:
+    if run is not None and run_to_make(document) is None:
+        lines.append(too_close(run))
+    elif run is not None:
         which = "A run that could" if decided else "A run that would distinguish the likely answers"
         lines.append(f"{which}: {run_words(run)}")
     elif rivals:

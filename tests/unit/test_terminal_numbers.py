@@ -179,6 +179,9 @@ def test_the_run_to_make(given: Document) -> None:
     assert_shows(calm, [run[key] for key in keys if key != "wind_speed"])
     assert len(rival_lines(given)) == 2
     assert len(rival_lines(given | {"next_run": None})) == 2
+    close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
+    assert close[1].startswith("No run that can be set distinguishes these answers")
+    assert "by 2.9 standard deviations" in close[1]
     assert rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
 
 

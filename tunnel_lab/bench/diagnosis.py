@@ -304,18 +304,15 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
-    from diagnosis.words.next_steps import next_steps, rival_lines, run_to_make, too_close, unplannable
+    from diagnosis.words.next_steps import next_steps, rival_lines, run_to_make, unplannable
 
     document = read_diagnosis(session)
     assert document is not None  # else the stage is closed
     heading("What to do next")
     with ui.element("ol"):
         show_items(next_steps(document))
-    lines, run = rival_lines(document), run_to_make(document)
-    if run is None and document["next_run"] is not None:
-        lines[-1] = too_close(document["next_run"])
-    show_parts(lines)
-    if run is not None:
+    show_parts(rival_lines(document))
+    if (run := run_to_make(document)) is not None:
         show_run(run)
     if why := unplannable(document):
         ui.label(why).classes("soft")
