@@ -8,7 +8,7 @@ import pytest
 
 from diagnosis.settings import settings_of
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
-from diagnosis.words.remainder import closable_words, rest_words
+from diagnosis.words.remainder import closable_words, rest_line, rest_words
 from diagnosis.words.where import REASONS, reason, where_words
 from diagnosis.words.written import sentences
 from tests.unit.diagnosis_document import CAUSE, IDS, RIVAL, document
@@ -195,6 +195,8 @@ def test_what_remains(given: Document) -> None:
         "Not all is explained: what remains (0.13 noise powers) could move Cnr by 0."
     )
     assert rest_words(given | {"rest": None}) == ""
+    assert rest_line(given | {"rest": None}) == ""
+    assert rest_line(given | {"rest": rest | {"words": "Explained."}}) == "Explained."
 
 
 CEILINGS = [
