@@ -11,9 +11,9 @@ import numpy as np
 
 from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
+from diagnosis.answer.judgements import springs_off
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
-from diagnosis.answer.verdict import springs_off
 from diagnosis.diagnosable import choose, gain_words, refuse_undiagnosable
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel

@@ -12,11 +12,11 @@ import numpy as np
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
+from diagnosis.answer.judgements import cautions, immaterial, nearly, remainder, spring_choices
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
-from diagnosis.answer.verdict import cautions, immaterial, nearly, remainder, spring_choices
 from diagnosis.facts.checks import NoiseSummary
 from diagnosis.facts.closure import PATCHED
 from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from diagnosis.answer.coefficients import coefficients, possible_answers
-from diagnosis.answer.verdict import spring_choices
+from diagnosis.answer.judgements import spring_choices
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.search.choices import choices
 from diagnosis.search.investigate import investigate

@@ -7,8 +7,8 @@ import pytest
 
 from diagnosis.answer import reported as module
 from diagnosis.answer.held_out import predict_held_out
+from diagnosis.answer.judgements import cautions
 from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
-from diagnosis.answer.verdict import cautions
 from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
 from diagnosis.likelihood.partial import refit_releases

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from diagnosis.answer.judgements import immaterial, nearly
 from diagnosis.answer.reported import held_out_totals
-from diagnosis.answer.verdict import immaterial, nearly
 from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Step, Waterfall
 from diagnosis.facts.decision import decision
 from diagnosis.facts.found import Nearly

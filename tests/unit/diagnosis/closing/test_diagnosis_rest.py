@@ -10,11 +10,11 @@ import pytest
 
 from diagnosis.answer.candidates import meant_coefficient, meant_parameter
 from diagnosis.answer.coefficients import Answers, Possible, coefficients
+from diagnosis.answer.judgements import remainder
 from diagnosis.answer.linear_theory import (
     coefficient_move,
     wind_on_runs,
 )
-from diagnosis.answer.verdict import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
