@@ -305,7 +305,7 @@ class Diagnosis:
             coefficients=replace(self.coefficients, note=said.note),
             noise=replace(self.noise, reason=said.noise),
             cautions=said.cautions,
-            remarks=(*self.remarks, *said.remarks),
+            remarks=(*self.remarks, *(remark for remark in said.remarks if remark not in self.remarks)),
             model=self.model and replace(self.model, notes=said.patch),
         )
 

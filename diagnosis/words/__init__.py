@@ -8,6 +8,7 @@ Where a sentence is:
 - `remainder`: what remains of the gap, and what could be closed of it.
 - `cautions`: caveats, remarks on the noise, notes on coefficients and on a patched model, each under the kind of
   its fact (`diagnosis.facts.found.Fact`).
+- `causes`: what a cause does to a swing.
 - `next_steps`: what to do next, and the run to make.
 - `lines` and `tables`: what is printed around and below them.
 - `numbers` and `names`: how numbers, effects and channels are written in all of these.

@@ -6,6 +6,9 @@ from typing import Any
 
 import pytest
 
+from diagnosis.facts.checks import Confirmation, NoiseSummary
+from diagnosis.facts.found import Fact, Found, Noted, Nowhere
+from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, Where
 from diagnosis.settings import settings_of
 from diagnosis.words.cautions import CAUTIONS, NOISE, PATCH, coefficient_note, remark, said, size_note
 from diagnosis.words.remainder import closable_words, rest_line, rest_words
@@ -258,3 +261,27 @@ def test_numbers_in_sentences_are_those_of_the_settings(given: Document) -> None
     text = where_words(changed)
     assert "Three quarters of it lie between" in text
     assert "in 2 of 3 runs;" in text
+
+
+def test_an_answer_in_words_has_all_of_them_and_writes_them_once() -> None:
+    noise = NoiseSummary(4e-4, None, "estimated")
+    value = {"cn_beta": ParameterEstimate(0.5, 0.001, "1/rad")}
+    found = Found(
+        nowhere=Nowhere(3, 0.5, within_step=False),
+        noise=Fact("not stated"),
+        cautions=(Fact("cut"),),
+        noted=(Noted(("a",), Fact("not judged")),),
+    )
+    answer = Diagnosis(
+        "c", (), GapSummary(False, 0.01, 0.01, 0.0, "", (), 1e-3, 0.5), Where(None, None),
+        (Candidate("none", 1.0, 0.01, 0.0),), (), None,
+        Coefficients(value, value), Confirmation(True, 0.0, "a", 0.0, 1e-5), noise, found=found,
+    )  # fmt: skip
+    once = answer.in_words()
+    assert once.verdict.startswith("No gap: ")
+    assert once.where.words.startswith("Nowhere: in 3 runs")
+    assert once.noise.reason == "the campaign states no noise"
+    assert once.coefficients.note.startswith("With no cause these agree")
+    assert [text.partition(" ")[0] for text in once.cautions] == ["The"]
+    assert [remark.runs for remark in once.remarks] == [("a",)]
+    assert once.in_words() == once
