@@ -154,7 +154,7 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
             bound = fit.bound(name)
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
-            undetermined = study.settings.answer.undetermined
+            undetermined = study.settings.answer.undetermined_from
             found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
