@@ -42,7 +42,7 @@ def diagnose(
     *,
     kinds: Sequence[type[Effect]] | None = None,
     progress: Progress | None = None,
-    model: JointModel | None = None,
+    model: JointModel | NominalModel | None = None,
     settings: Settings = Settings(),
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
@@ -51,7 +51,8 @@ def diagnose(
         campaign: the runs; or their folder, or one file of a data logger.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
-        model: a model of one's own, from `read_model`, which is then the nominal model.
+        model: a model of one's own, from `read_model`, whose joint is then the nominal model; or a nominal model
+            of one's own kind.
         settings: every number that decides.
 
     Returns:
@@ -62,9 +63,9 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
-    own: NominalModel | None = None
-    if model is not None:
-        campaign, own = with_law(campaign, model.law)
+    joint, own = (None, model) if isinstance(model, NominalModel) else (model, None)
+    if joint is not None:
+        campaign, own = with_law(campaign, joint.law)
     refuse_undiagnosable(campaign, own)
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
@@ -72,7 +73,7 @@ def diagnose(
         chosen = choose(campaign, kinds, settings.selection, own)
         study = _studied(chosen, progress, settings)
         say("how far it closes")  # where it is, and the answer without what no effect explains
-        patched, unpatched = (None, ()) if model is None else _patched(study, model)
+        patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
         answer = _assembled(study, chosen, patched, unpatched)
         if chosen.limit_cycles:
             answer = limit_cycle_answer(answer, chosen.remarks)
