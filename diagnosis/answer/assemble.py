@@ -12,14 +12,14 @@ import numpy as np
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
-from diagnosis.answer.judgements import cautions, immaterial, nearly, remainder, spring_choices
+from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.facts.checks import NoiseSummary
 from diagnosis.facts.closure import PATCHED
-from diagnosis.facts.found import Fact, Found, Nowhere, PlaceFound
+from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.result import Coefficients, Diagnosis, Where
 from diagnosis.search.investigate import Study, located
@@ -119,6 +119,10 @@ def assemble(
     ]
     fitted = [hypothesis.fit for effects in rivals if (hypothesis := study.hypothesis(effects)) is not None]
     noise = study.noise
+    of_answer = cautions(
+        study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
+    )
+    caveats = (*left_out, *of_answer, *outside_the_fits(study))
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
@@ -146,25 +150,5 @@ def assemble(
         waterfall=steps,
         rest=left,
         model=patched,
-        found=Found(
-            place=said if isinstance(said, PlaceFound) else None,
-            nowhere=said if isinstance(said, Nowhere) else None,
-            both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
-            nearly=nearly(study),
-            immaterial=immaterial(before, after, settings.words) if study.named else {},
-            choices=spring_choices(study),
-            noise=noise.reason,
-            cautions=(
-                *left_out,
-                *cautions(
-                    study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
-                ),
-                *((Fact("cut"),) if study.cut else ()),
-                *(
-                    Fact("unresolved", {"effects": names})
-                    for names in dict.fromkeys(study.unresolved.values())
-                ),
-                *((Fact("rested", {"runs": study.rested}),) if study.rested else ()),
-            ),
-        ),
+        found=beside_the_numbers(study, said, before, after, caveats),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.facts.checks import Confirmation
-from diagnosis.facts.found import Fact, Nearly, SpringError, SpringsOff
+from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError, SpringsOff
 from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
@@ -68,6 +68,37 @@ def cautions(
     elif named and fitted:
         found.append(Fact("some not held out", {"runs": fitted}))
     return tuple(found)
+
+
+def outside_the_fits(study: Study) -> tuple[Fact, ...]:
+    """The parts of the records that no fit uses, and the effects that no half of them shows."""
+    return (
+        *((Fact("cut"),) if study.cut else ()),
+        *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.unresolved.values())),
+        *((Fact("rested", {"runs": study.rested}),) if study.rested else ()),
+    )
+
+
+def beside_the_numbers(
+    study: Study, place: PlaceFound | Nowhere, before: Estimates, after: Estimates, caveats: tuple[Fact, ...]
+) -> Found:
+    """What is said of an answer and is no number of it.
+
+    Args:
+        before: the coefficients without the causes.
+        after: the coefficients with them.
+    """
+    runs = study.nominal.problem.data.runs
+    return Found(
+        place=place if isinstance(place, PlaceFound) else None,
+        nowhere=place if isinstance(place, Nowhere) else None,
+        both_winds=len({run.wind_on for run in runs}) > 1,
+        nearly=nearly(study),
+        immaterial=immaterial(before, after, study.settings.words) if study.named else {},
+        choices=spring_choices(study),
+        noise=study.noise.reason,
+        cautions=caveats,
+    )
 
 
 def nearly(study: Study) -> Nearly | None:

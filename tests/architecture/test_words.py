@@ -83,17 +83,19 @@ def test_a_sentence_is_told_from_other_text(source: str, count: int) -> None:
     assert len(sentences(source)) == count
 
 
-def test_every_kind_of_fact_has_a_sentence() -> None:
+def test_every_kind_of_fact_has_a_sentence_and_every_sentence_a_fact() -> None:
     from diagnosis.words import cautions, where
 
     known = {
         *cautions.CAUTIONS, *cautions.NOISE, *cautions.REMARKS, *cautions.PATCH, *where.REASONS,
     }  # fmt: skip
-    used = set()
+    used, texts = set(), set()
     for path in modules():
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            texts.add(text_of(node))
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Fact":
                 kind = node.args[0]
                 used |= {kind.value} if isinstance(kind, ast.Constant) else set()
     assert len(used) > 40
     assert used <= known
+    assert known <= texts  # and no sentence waits for a fact that nobody finds
