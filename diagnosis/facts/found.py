@@ -85,7 +85,7 @@ class Nowhere:
 
     Args:
         runs: number of the runs compared.
-        p_value: of the run that differs most, corrected for their number.
+        p_value: of the run that differs most, corrected for their number, a probability.
         within_step: whether the residual is not white, but within the steps of the readings.
     """
 
@@ -100,6 +100,7 @@ class Nearly:
 
     Args:
         closes: share of the gap in the fitted runs, a fraction.
+        probability: that they are the answer, a fraction.
         noisy: whether the noise misbehaves and may be all of the gap.
         rival: effects that explain as much; empty where none do.
         rival_probability: of those, a fraction.

@@ -100,6 +100,8 @@ class Line:
     """A steady line in the readings, beyond chance.
 
     Args:
+        frequency_hz: Hz.
+        frequency_std_hz: its standard deviation, Hz.
         amplitude: root mean square over the runs, in ``unit``.
         amplitude_std: its standard deviation, in ``unit``.
         unit: of the readings.

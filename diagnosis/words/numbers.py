@@ -106,7 +106,12 @@ def of_swing(misfit: Misfit, excess: float) -> str:
 
 
 def times_noise(value: float, decimals: int = 2) -> str:
-    """A gap in noise variances (a ratio): ``2.75 times the noise power``."""
+    """A gap in words, such as ``2.75 times the noise power``.
+
+    Args:
+        value: the gap as an excess, in noise variances, a ratio.
+        decimals: of a gap below ten (a count).
+    """
     return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise power"
 
 
