@@ -189,7 +189,9 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
 
 def absorbed(base: Fit, change: Sequence[Array]) -> Point:
     """Where the parameters of a fit go to absorb a change of the scaled prediction, by one Gauss–Newton step."""
-    return damped_step(base.problem, base.point, [-c for c in change], base.jacobian, 0.0)
+    return damped_step(
+        base.problem, base.point, [-c for c in change], base.jacobian, 0.0, base.products, linear=True
+    )
 
 
 def change_to(base: Fit, problem: Problem, point: Point) -> list[Array]:
