@@ -32,7 +32,12 @@ class ResidualsOf:
         return _of_line(mains_line(self.fit))
 
     def wind_line(self, least: float, greatest: float, size: str) -> Sought | None:
-        """As `diagnosis.likelihood.residuals.wind_line`."""
+        """As `diagnosis.likelihood.residuals.wind_line`.
+
+        Args:
+            least: frequency times size over wind speed, dimensionless.
+            greatest: likewise.
+        """
         return _of_line(wind_line(self.fit, least, greatest, size))
 
     def ringing(self) -> Sought | None:
