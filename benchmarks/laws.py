@@ -46,8 +46,12 @@ def answer(folder: Path) -> dict[str, Any]:
     """What is said of one campaign with no effect to answer with."""
     begun = time.process_time()
     study = investigate(read_campaign(folder), ())
-    found = closable(study, significant=study.test.detected) if study.test.detected else None
-    return {"detected": study.test.detected, "closable": as_json(found), "cpu_s": time.process_time() - begun}
+    found = closable(study, significant=study.gap.test.detected) if study.gap.test.detected else None
+    return {
+        "detected": study.gap.test.detected,
+        "closable": as_json(found),
+        "cpu_s": time.process_time() - begun,
+    }
 
 
 def _closes(found: Mapping[str, Any]) -> float:

@@ -11,7 +11,6 @@ import numpy as np
 
 from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
-from diagnosis.answer.judgements import springs_off
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
 from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable
@@ -23,8 +22,11 @@ from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.mains import hum_noted
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
-from diagnosis.search.investigate import Progress, Study
-from diagnosis.search.lead import investigate_with_lead
+from diagnosis.search.clock import Progress
+from diagnosis.search.investigate import investigate
+from diagnosis.search.rivals import RIVALS
+from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect, effect_class, known_effects
@@ -44,6 +46,7 @@ def diagnose(
     progress: Progress | None = None,
     model: JointModel | NominalModel | None = None,
     settings: Settings = Settings(),
+    rivals: Sequence[Rival] = RIVALS,
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
 
@@ -54,6 +57,8 @@ def diagnose(
         model: a model of one's own, from `read_model`, whose joint is then the nominal model; or a nominal model
             of one's own kind.
         settings: every number that decides.
+        rivals: what is outside the vocabulary and weighed beside it; what is probable of it is probable of
+            ``unknown``.
 
     Returns:
         The answer, for the runs that one model can be fitted to; its cautions name the others.
@@ -71,7 +76,7 @@ def diagnose(
     say = progress or (lambda _: None)
     with answering_with(kinds):
         chosen = choose(campaign, kinds, settings.selection, own)
-        study = _studied(chosen, progress, settings)
+        study = _studied(chosen, progress, settings, rivals)
         say("how far it closes")  # where it is, and the answer without what no effect explains
         patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
         answer = _assembled(study, chosen, patched, unpatched)
@@ -82,14 +87,14 @@ def diagnose(
         return answer.in_words()
 
 
-def _studied(chosen: Chosen, progress: Progress | None, settings: Settings) -> Study:
+def _studied(chosen: Chosen, progress: Progress | None, settings: Settings, rivals: Sequence[Rival]) -> Study:
     """Noise, nominal fit, where, search.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted.
     """
     try:
-        return investigate_with_lead(chosen.campaign, chosen.kinds, progress, chosen.model, settings)
+        return investigate(chosen.campaign, chosen.kinds, progress, chosen.model, settings, rivals=rivals)
     except TunnelError as error:
         if not chosen.limit_cycles:
             raise
@@ -110,14 +115,14 @@ def _assembled(
     study: Study, chosen: Chosen, patched: PatchedModel | None, unpatched: tuple[Fact, ...]
 ) -> Diagnosis:
     """The answer in the units of the campaign, without what no effect explains and without words."""
-    by_moment = (Fact("by moment"),) if study.by_moment else ()
+    in_view = (Fact(study.caution),) if study.caution else ()
     gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
     lead = map(as_stated, study.model.lead_words(study.similarity))
-    left_out = (*chosen.left_out, *by_moment, *gain, *unpatched, *lead)
+    left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead)
     answer = assemble(study, *localise(study), left_out, patched, chosen.kinds)
     noted = (
-        *noise_noted(study.noise, study.trend, study.test),
-        *hum_noted(study.campaign, study.hum, study.similarity),
+        *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test),
+        *hum_noted(study.campaign, study.prepared.hum, study.similarity),
     )
     sized = replace(
         answer,
@@ -150,10 +155,16 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
     found = replace(
         answer.found,
         second_modes=second_modes(chosen.campaign, study.settings.words) if unknown else (),
-        springs_off=springs_off(study) if unknown or not decided else None,
+        rivals=_rivals(study) if unknown or not decided else (),
         cautions=(*answer.found.cautions, *caution),
     )
     return replace(answer, found=found)
+
+
+def _rivals(study: Study) -> tuple[Fact, ...]:
+    """What is said of the rivals from outside the vocabulary that would explain the gap."""
+    said = (one.fact(study.nominal, study.similarity) for one in study.rivals)
+    return tuple(fact for fact in said if fact is not None)
 
 
 def read_model(

@@ -19,7 +19,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
-from diagnosis.search.weigh import Weighed
+from diagnosis.search.study import Answer
 from diagnosis.settings import Settings
 from diagnosis.words.names import plain
 from tunnel_sim.effects import effect_class, known_effects
@@ -90,10 +90,9 @@ class ByHand:
         for one in (self._study.nominal, fitted):
             if one not in self._held_out:
                 self._held_out[one] = predict_held_out(one)
-        hypotheses = (Hypothesis(tuple(sorted(names)), fitted),) if names else ()
+        known = Hypothesis(tuple(sorted(names)), fitted)
         # Of the one candidate only the parameters are taken: its share and its probability do not matter.
-        weighed = (Weighed(tuple(sorted(names)), 0.0, 1.0),) if names else ()
-        study = replace(self._study, hypotheses=hypotheses, weighed=weighed)
+        study = replace(self._study, answers=(Answer(known.names, 0.0, 1.0, known, known),) if names else ())
         ends = both_ends(study, self._base, self._held_out)
         parameters = candidates(study, self._base)[0].parameters if names else {}
         before, after = (step.excess for step in ends.steps)

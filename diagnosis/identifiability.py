@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.starting_points import unabsorbed
-from diagnosis.search.investigate import fit_nominal
+from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.rig_file import load_rig

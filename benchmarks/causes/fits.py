@@ -12,7 +12,8 @@ from typing import Any
 from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
 from diagnosis.likelihood.run_data import Data
-from diagnosis.search.investigate import fit_nominal, investigate, nominal_study
+from diagnosis.search.investigate import investigate, nominal_study
+from diagnosis.search.prepared import fit_nominal
 from diagnosis.settings import Settings
 from tunnel_sim.effects import known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
@@ -68,7 +69,7 @@ def nominal(folder: Path) -> tuple[Fitted, tuple[str, ...], bool]:
         TunnelError: when the records are refused.
     """
     study = nominal_study(_campaign(folder), known_effects())
-    return _fitted((), study.nominal), tuple(study.read_off), bool(study.test.detected)
+    return _fitted((), study.nominal), tuple(study.read_off), bool(study.gap.test.detected)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +101,8 @@ def grown(folder: Path) -> Grown:
         TunnelError: when the records are refused.
     """
     study = investigate(_campaign(folder), known_effects())
-    weighed = study.weighed
-    sets = study.by_moment or study.hypotheses
-    settled = not sets or not weighed or weighed[0].probability == 1.0
+    sets = [answer.stated for answer in study.answers if answer.stated is not None]
+    settled = not sets or study.answers[0].probability == 1.0
     data = _most_common([h.fit.problem.data for h in sets]) or study.nominal.problem.data
     nominal = study.nominal if data is study.nominal.problem.data else fit_nominal(data)
     best: dict[tuple[str, ...], Fitted] = {}
@@ -112,7 +112,8 @@ def grown(folder: Path) -> Grown:
             best[h.names] = one
     random = tuple(
         (tuple(sorted(a.effects)), () if a.beside is None else a.beside.names, a.process.drop)
-        for a in study.random
+        for answer in study.answers
+        if (a := answer.random) is not None
     )
     return Grown(
         _fitted((), nominal),

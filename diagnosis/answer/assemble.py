@@ -22,7 +22,7 @@ from diagnosis.facts.closure import PATCHED
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.result import Coefficients, Diagnosis, Where
-from diagnosis.search.investigate import Study, located
+from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN, main_effect
 from diagnosis.where.described import described, nowhere
 from diagnosis.where.maps import Maps
@@ -36,15 +36,15 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
 
     The place is that of the residuals alone. The causes only have to agree with it.
     """
-    place, chosen = located(study), study.settings.where
+    place, chosen = study.gap.place or study.prepared.place(), study.settings.where
     found = place.survey
     answer = None if study.chosen is study.nominal else study.chosen
     maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
     if not study.causes:
-        return Where(None, None), maps, nowhere(found, within_step=study.test.within_step)
+        return Where(None, None), maps, nowhere(found, within_step=study.gap.test.within_step)
     compared = list(study.read_off) if study.named else []  # what has to agree with the place
     if study.named and study.fitted:
-        shares = {answer.effects: answer.share for answer in study.weighed}
+        shares = {answer.effects: answer.share for answer in study.answers}
         compared.insert(0, main_effect(study.fitted, shares))
     where = Where(
         channel=place.channel.value,
@@ -110,15 +110,15 @@ def assemble(
     }
     left = remainder(study, stated, moved, steps.steps[-1].excess, answers.hidden)
     rivals = [
-        answer.effects
-        for answer in study.weighed[1:]
+        answer
+        for answer in study.answers[1:]
         if study.named
         and answer.probability >= settings.answer.rivals_from
         and answer.effects != UNKNOWN
         and not set(study.fitted) <= set(answer.effects)
     ]
-    fitted = [hypothesis.fit for effects in rivals if (hypothesis := study.hypothesis(effects)) is not None]
-    noise = study.noise
+    fitted = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
+    noise = study.prepared.noise
     of_answer = cautions(
         study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
     )
@@ -130,7 +130,9 @@ def assemble(
         where=where,
         maps=maps.to_json_dict(),
         candidates=weighed,
-        ambiguous_with=tuple(sorted({name for effects in rivals for name in effects} - set(study.causes))),
+        ambiguous_with=tuple(
+            sorted({name for answer in rivals for name in answer.effects} - set(study.causes))
+        ),
         next_run=separating_run(chosen, fitted[0]) if fitted and chosen is not study.nominal else None,
         coefficients=found,
         confirmation=shown.confirmation,

@@ -14,8 +14,9 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.model.parameters import Point
 from diagnosis.result import Candidate, CauseSize, ParameterEstimate
-from diagnosis.search.investigate import COARSE_STEP, HUM, Study
+from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.process_noise import LONGEST_BANDWIDTH
+from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
 from identification.signal.decay_fit import Reading, fit_run
@@ -99,21 +100,21 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         )
     found = []
     before = max(study.nominal.excess, 1e-9)
-    for answer in study.weighed:
+    for answer in study.answers:
         if answer.effects == UNKNOWN:
             found.append(Candidate("unknown", answer.probability, before / block, 0.0))
             continue
         name = " + ".join(sorted({*study.read_off, *answer.effects}))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
-        found.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer.effects)))
-    if not study.weighed:
+        found.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
+    if not study.answers:
         whole = excess + base.hum + base.extra
         closed = float(np.clip(1.0 - max(excess, 0.0) / max(whole, 1e-9), 0.0, 1.0))
         name = " + ".join(study.read_off)
         even = study.settings.weighing.even_share
-        found.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study, ())))
+        found.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study)))
         found.append(Candidate("unknown", even, whole, 0.0))
-    none = 0.0 if study.read_off else min(study.test.p_value, rate)
+    none = 0.0 if study.read_off else min(study.gap.test.p_value, rate)
     found.append(Candidate("none", none, before / block, 0.0))
     total = sum(candidate.probability for candidate in found)
     first, *others = (replace(c, probability=c.probability / total) for c in found)
@@ -134,18 +135,20 @@ def inclusion(answers: Sequence[Candidate], read_off: Sequence[str], chosen: Gap
     return found | dict.fromkeys(read_off, 1.0 - chosen.detection_rate)
 
 
-def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEstimate]:
-    """Parameters of the causes read off the records, and of these effects; without the name of a single effect."""
+def _parameters(study: Study, answer: Answer | None = None) -> dict[str, ParameterEstimate]:
+    """Parameters of the causes read off the records, and of an answer; without the name of a single effect."""
     found: dict[str, ParameterEstimate] = {}
-    if study.hum is not None:
+    prepared, hum = study.prepared, study.prepared.hum
+    if hum is not None:
         amplitude, frequency = (f"{HUM.name}.{info.name}" for info in HUM.parameters())
-        found[amplitude] = ParameterEstimate(study.hum.amplitude, study.hum.std, "rad")
-        found[frequency] = ParameterEstimate(study.hum.frequency, study.hum.frequency_std, "Hz")
-    if study.coarse:
+        found[amplitude] = ParameterEstimate(hum.amplitude, hum.std, "rad")
+        found[frequency] = ParameterEstimate(hum.frequency, hum.frequency_std, "Hz")
+    if prepared.coarse:
         step = f"{COARSE_STEP.name}.{COARSE_STEP.parameters()[0].name}"
-        found[step] = ParameterEstimate(study.step, None, "rad")
-    random = study.random_answer(effects)
-    hypothesis = study.stated(effects) if random is None else random.beside
+        found[step] = ParameterEstimate(prepared.step, None, "rad")
+    random = None if answer is None else answer.random
+    stated = None if answer is None else answer.stated
+    hypothesis = stated if random is None else random.beside
     if hypothesis is not None:
         fit, problem = hypothesis.fit, hypothesis.fit.problem
         infos = {f"{kind.name}.{info.name}": info for kind in problem.effects for info in kind.parameters()}

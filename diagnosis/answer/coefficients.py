@@ -23,7 +23,7 @@ from diagnosis.answer.linear_theory import (
 )
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.result import Hidden, ParameterEstimate
-from diagnosis.search.investigate import Study
+from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -123,41 +123,35 @@ def possible_answers(study: Study, kinds: Sequence[type[Effect]]) -> Answers:
         kinds: the effects that may act unnamed. They are considered beside the chosen answer and every probable
             answer, and only where there is a gap.
     """
-    with_moment = study.stated(study.fitted) if study.by_moment else None
-    chosen = study.chosen if with_moment is None else with_moment.fit
-    even = study.settings.weighing.even_share / max(len(study.weighed), 1)
+    chosen = study.stated
+    even = study.settings.weighing.even_share / max(len(study.answers), 1)
     least = study.settings.answer.small_causes_from
-    textbook = {id(h.fit): h.textbook for h in study.hypotheses}
     others, own, unknown = [], 1.0, 0.0
-    for place, answer in enumerate(study.weighed):
-        probability, fit = max(answer.probability - even, 0.0), None
-        random, hypothesis = study.random_answer(answer.effects), study.hypothesis(answer.effects)
-        if random is not None:  # alone it has no fit of its own
-            fit = study.nominal if random.beside is None else random.beside.fit
-        elif hypothesis is not None:
-            fit = hypothesis.fit
+    for place, answer in enumerate(study.answers):
+        probability, fit = max(answer.probability - even, 0.0), answer.fit(study.nominal)
         if place == 0:
             own = probability
         elif answer.effects == UNKNOWN:
             unknown = probability
         elif fit is not None and probability > 0.0:
             small = beside(fit, starts_beside(fit, kinds)) if probability >= least else None
-            share, alternatives = _by_choice(study, answer.effects, fit, probability, kinds)
-            others += [Possible(probability * share, fit, textbook.get(id(fit)), small), *alternatives]
-    share, alternatives = _by_choice(study, study.fitted, chosen, own, kinds)
+            share, alternatives = _by_choice(answer, fit, probability, kinds)
+            others += [Possible(probability * share, fit, answer.textbook_of(fit), small), *alternatives]
+    answer = study.answer or Answer((), 1.0, 1.0)
+    share, alternatives = _by_choice(answer, chosen, own, kinds)
     starts = starts_beside(chosen, kinds)
     small = beside(chosen, starts) if study.causes else None
     hidden = hidden_effects(chosen, starts, None if small is None else small.left)
-    first = Possible(own * share, chosen, textbook.get(id(chosen)), small)
+    first = Possible(own * share, chosen, answer.textbook_of(chosen), small)
     return Answers((first, *alternatives, *others), unknown, study.nominal, hidden)
 
 
 def _by_choice(
-    study: Study, names: tuple[str, ...], fit: Fit, probability: float, kinds: Sequence[type[Effect]]
+    answer: Answer, fit: Fit, probability: float, kinds: Sequence[type[Effect]]
 ) -> tuple[float, list[Possible]]:
     """The share of the fit among the choices of an answer that the runs cannot exclude, and the other choices."""
     share, others = 1.0, []
-    for choice in study.choices.get(names, ()):
+    for choice in answer.choices:
         if choice.hypothesis.fit is fit:
             share = choice.probability
         else:

@@ -16,8 +16,9 @@ from diagnosis.likelihood.run_data import FOLDS, folds
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search.hypothesis import restricted
-from diagnosis.search.investigate import COARSE_STEP, HUM, Study
+from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.study import Study
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
 
@@ -128,14 +129,14 @@ def excess_base(study: Study) -> Base:
         The stated noise, where it is stated and contradicted by the records or by the readings' step; else the
         noise estimated from the records.
     """
-    estimated = float(np.mean(list(study.noise.variance.values())))
-    stated = study.noise.stated_variance
-    hum = 0.0 if study.hum is None else study.hum.excess
-    if stated is not None and (study.coarse or study.test.noisy):
+    estimated = float(np.mean(list(study.prepared.noise.variance.values())))
+    stated = study.prepared.noise.stated_variance
+    hum = 0.0 if study.prepared.hum is None else study.prepared.hum.excess
+    if stated is not None and (study.prepared.coarse or study.gap.test.noisy):
         return Base(stated, max(estimated / stated - 1.0, 0.0), hum * estimated / stated)
-    if study.coarse:
+    if study.prepared.coarse:
         fine = (study.campaign.sensor.resolution or 0.0) ** 2 / 12.0
-        alone = max(estimated - study.step**2 / 12.0, 0.05 * estimated) + fine
+        alone = max(estimated - study.prepared.step**2 / 12.0, 0.05 * estimated) + fine
         return Base(alone, estimated / alone - 1.0, hum * estimated / alone)
     return Base(estimated, 0.0, hum)
 
@@ -164,7 +165,8 @@ class Subsets:
         key = frozenset(names)
         if key not in self._fits:
             fewer = min((known for known in self._fits if known < key), key=lambda k: self._fits[k].total)
-            known, own = self._fits[fewer], self._study.hypothesis(sorted(key))
+            known, answer = self._fits[fewer], self._study.of(key)
+            own = None if answer is None else answer.hypothesis
             if own is None:
                 start = restricted(self._study.chosen, key)
                 found = try_fit(
@@ -209,7 +211,7 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
         names |= {best}
         left.remove(best)
         steps.append(Step(best, models.excess(names)))
-    random = study.random_answer(study.fitted)
+    random = study.random
     if random is None:
         without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
     else:

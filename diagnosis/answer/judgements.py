@@ -9,15 +9,14 @@ import numpy as np
 from scipy.special import chdtrc
 
 from diagnosis.facts.checks import Confirmation
-from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError, SpringsOff
+from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError
 from diagnosis.facts.remainder import Move, Remainder
-from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.noise.gap import gap_test, rounding_errors
 from diagnosis.noise.sensor_noise import Noise
 from diagnosis.result import Hidden, ParameterEstimate, RunGap
-from diagnosis.search.investigate import Study
-from diagnosis.search.outside import ONE_SPRING, AnotherSpring
+from diagnosis.search.rivals.two_springs import ONE_SPRING, spring_error
+from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings, WordsSettings
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -73,9 +72,9 @@ def cautions(
 def outside_the_fits(study: Study) -> tuple[Fact, ...]:
     """The parts of the records that no fit uses, and the effects that no half of them shows."""
     return (
-        *((Fact("cut"),) if study.cut else ()),
-        *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.unresolved.values())),
-        *((Fact("rested", {"runs": study.rested}),) if study.rested else ()),
+        *((Fact("cut"),) if study.prepared.cut else ()),
+        *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.refused.values())),
+        *((Fact("rested", {"runs": study.prepared.rested}),) if study.prepared.rested else ()),
     )
 
 
@@ -96,25 +95,25 @@ def beside_the_numbers(
         nearly=nearly(study),
         immaterial=immaterial(before, after, study.settings.words) if study.named else {},
         choices=spring_choices(study),
-        noise=study.noise.reason,
+        noise=study.prepared.noise.reason,
         cautions=caveats,
     )
 
 
 def nearly(study: Study) -> Nearly | None:
     """The effects that explain most of a gap without being named; None where none do."""
-    sets, chosen = [answer for answer in study.weighed if answer.effects != UNKNOWN], study.settings.words
+    sets, chosen = [answer for answer in study.answers if answer.effects != UNKNOWN], study.settings.words
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
     if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
         return None
     found = Nearly(first.effects, 1.0 - first.share, first.probability)
-    if study.test.noisy and first.probability == 0.0:
+    if study.gap.test.noisy and first.probability == 0.0:
         return replace(found, noisy=True)
     alike = [a for a in sets if a is not first and a.share <= first.share + chosen.nearly_alike]
     rival = max(alike, key=lambda answer: answer.probability, default=None)
     if rival is not None and rival.probability >= chosen.nearly_rival * first.probability:
         return replace(found, rival=rival.effects, rival_probability=rival.probability)
-    fitted = study.hypothesis(first.effects)
+    fitted = first.hypothesis
     if fitted is None:
         return found
     chance = chosen.nearly_misfit_stds * np.sqrt(2.0 * misfit(study.nominal).count)
@@ -134,31 +133,14 @@ def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> di
     return {name: moves[name] / abs(given.value) for name, given in known.items()}
 
 
-def springs_off(study: Study) -> SpringsOff | None:
-    """The likeliest pair of springs that are off; None where none closes most of the gap."""
-    best = min(study.outside, key=lambda pair: pair.fit.total, default=None)
-    least = study.settings.words.two_springs_explain
-    if best is None or best.fit.excess > (1.0 - least) * study.nominal.excess:
-        return None
-    both = (ONE_SPRING.name, AnotherSpring.name)
-    springs = tuple(_spring_error(study, best.fit, name) for name in both)
-    return SpringsOff(springs, tuple(name for name in best.names if name not in both))
-
-
 def spring_choices(study: Study) -> tuple[SpringError, ...]:
     """The springs of which one may be off, where the runs cannot tell which."""
     return tuple(
-        replace(_spring_error(study, one.hypothesis.fit, ONE_SPRING.name), probability=one.probability)
-        for one in study.choices.get(study.fitted, ())
+        replace(
+            spring_error(one.hypothesis.fit, ONE_SPRING.name, study.similarity), probability=one.probability
+        )
+        for one in (study.answer.choices if study.answer else ())
     )
-
-
-def _spring_error(study: Study, fit: Fit, name: str) -> SpringError:
-    """The spring that an effect is off, and its error."""
-    stated = dict(fit.problem.fixed)[f"{name}.{ONE_SPRING.chosen_spring()}"]
-    inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
-    error, std = (of(f"{name}.error") for of in (fit.value, fit.std))
-    return SpringError(study.similarity.own(stated, "N m/rad"), error, inflate * std)
 
 
 def remainder(
@@ -174,17 +156,21 @@ def remainder(
         excess: left on readings held out of the fit, in noise variances of a sample.
         hidden: the effects that could hide beside the answer.
     """
-    random, chosen = study.random_answer(study.fitted), study.settings.answer
+    random, chosen = study.random, study.settings.answer
     if random is not None:  # in its wind it leaves innovations
         runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
         still = [residual for run, residual in runs if not run.wind_on]
         both = np.concatenate([*random.process.innovations, *still])
         p_value = float(chdtrc(both.size, both @ both))
     elif study.chosen is study.nominal:
-        p_value = study.test.p_value
+        p_value = study.gap.test.p_value
     else:  # no cause changes the tests of the noise itself: those of the residuals count
-        errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
-        p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
+        errors = rounding_errors(
+            study.chosen, study.prepared.noise.white(study.prepared.step), study.prepared.step
+        )
+        p_value = gap_test(
+            study.chosen, study.prepared.noise, study.prepared.trend, coarse_step=True, errors=errors
+        ).p_value
     further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
     by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
     shown = further is not None and by_effect < chosen.remains_rate <= p_value

@@ -14,7 +14,8 @@ from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Problem, blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.model.parameters import Point
 from diagnosis.result import GapSummary, RunGap
-from diagnosis.search.investigate import COARSE_STEP, Study
+from diagnosis.search.prepared import COARSE_STEP
+from diagnosis.search.study import Study
 from tunnel_sim.physics.run_settings import released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -197,8 +198,8 @@ def report_fits(nominal: Fit, chosen: Fit, nominal_out: HeldOut, chosen_out: Hel
 def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
     """The gap of the campaign and of every run, in noise variances of a sample."""
     ratio = base.extra + 1.0  # of the estimated noise to the base
-    random = study.random_answer(study.fitted)
-    explained = 0.0 if study.coarse and COARSE_STEP.name in study.causes else base.extra
+    random = study.random
+    explained = 0.0 if study.prepared.coarse and COARSE_STEP.name in study.causes else base.extra
     predicted = {**shown.before, **shown.before_out} if study.causes else shown.before
     runs, sizes, powers = [], [], []
     for run in study.nominal.problem.data.runs:
@@ -222,8 +223,8 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         closed_on=ON_RUNS if shown.before_out else FITTED,
         runs=tuple(runs),
         false_alarm_rate=study.settings.gap.detection_rate,
-        p_value=0.0 if study.read_off else study.test.p_value,
-        tests=study.test.tests,
+        p_value=0.0 if study.read_off else study.gap.test.p_value,
+        tests=study.gap.test.tests,
         misfit=Misfit(
             own * float(np.sqrt(base.variance)),
             own * float(np.sqrt(weight @ powers)),

@@ -30,7 +30,7 @@ class Fact:
 
 
 def as_stated(words: str) -> Fact:
-    """A sentence that a nominal model brings, as a fact."""
+    """A sentence that a nominal model or a rival brings, as a fact."""
     return Fact("stated", {"words": words})
 
 
@@ -134,18 +134,6 @@ class SpringError:
 
 
 @dataclass(frozen=True)
-class SpringsOff:
-    """Springs that would explain the gap if they all were off.
-
-    Args:
-        beside: effects that act with them.
-    """
-
-    springs: tuple[SpringError, ...]
-    beside: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Mode:
     """A decaying oscillation.
 
@@ -188,7 +176,7 @@ class Found:
         nearly: what nearly explains an unexplained gap; None where nothing does.
         immaterial: by coefficient, the share by which the causes change it, where they change none materially.
         choices: springs of which one may be off, the likeliest first.
-        springs_off: springs that would explain a gap whose cause is not known; else None.
+        rivals: what is outside the vocabulary and would explain a gap whose cause is not known.
         second_modes: by run, where the gap is not explained.
         limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
         noise: why the noise is taken as it is.
@@ -202,7 +190,7 @@ class Found:
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()
-    springs_off: SpringsOff | None = None
+    rivals: tuple[Fact, ...] = ()
     second_modes: tuple[SecondMode, ...] = ()
     limit_cycles: tuple[Remark, ...] = ()
     noise: Fact | None = None

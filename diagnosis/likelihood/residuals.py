@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
@@ -78,41 +78,6 @@ class Line:
     contrast: float
     amplitude: float
     phases: Array
-
-
-def by_moment(fit: Fit) -> Data:
-    """The runs of a fit, whose noise holds a random moment beside the white noise.
-
-    Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) of it, with the backward
-    shift B and φ = exp(−C h/Izz). White noise beside it makes (1 − B)(1 − φ B) of the reading a moving average of
-    order two, whose inverse whitens it (Box and Jenkins, Time Series Analysis). The power of the moment is the
-    likeliest one for the fit's residuals.
-    """
-    from scipy.signal import lfilter  # only here: slow to load
-
-    inertia, damping, _ = linear_coefficients(fit, 0)
-    runs = []
-    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
-        shape = np.polymul([1.0, -1.0], [1.0, -np.exp(-damping * run.interval / inertia)])
-        left = np.convolve(residual, shape, "valid")
-        likeliest, least = run, np.inf
-        for power in _POWERS:
-            # the invertible factor of a spectrum: of the shape's, and a constant beside it
-            roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
-            inside = roots[np.argsort(np.abs(roots))][:2]
-            average = np.asarray(np.real(np.poly(inside)), np.float64)
-            variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
-            cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
-            if cost < least:
-                noise = run.noise_variance * variance
-                likeliest = dataclasses.replace(run, innovations=(shape, average), noise_variance=noise)
-                least = cost
-        runs.append(likeliest)
-    return fit.problem.data.with_runs(tuple(runs))
-
-
-# Of a random moment's response per interval, in variances of white noise.
-_POWERS = np.geomspace(1e-12, 1e12, 49)
 
 
 def smooth_spectra(fit: Fit) -> list[ResidualSpectrum]:

@@ -21,7 +21,7 @@ from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.run_data import FOLDS
 from diagnosis.model.joint import Joint, LooseJoint, reach
-from diagnosis.search.investigate import Study
+from diagnosis.search.study import Study
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.engine.joint_patch import (
     JointPatch,
@@ -323,7 +323,9 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     """
     chosen = study.chosen
     problem, change = chosen.problem, study.similarity
-    noise = change.own(study.noise.std, change.reading) if not study.campaign.sensor.derivative else 0.0
+    noise = (
+        change.own(study.prepared.noise.std, change.reading) if not study.campaign.sensor.derivative else 0.0
+    )
 
     still = next((i for i, run in enumerate(problem.data.runs) if not run.wind_on), 0)
 

@@ -18,7 +18,7 @@ from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.remainder.formula import choose, propose
-from diagnosis.search.investigate import Study
+from diagnosis.search.study import Study
 from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
 from tunnel_sim.vocabulary.record import Array
@@ -43,7 +43,7 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         LinAlgError: when the equations of a kind cannot be solved.
     """
     left, similarity = study.chosen if decided else study.nominal, study.similarity
-    if not study.causes or not significant or study.random_answer(study.fitted) is not None:
+    if not study.causes or not significant or study.random is not None:
         return None
     # a run of a few blocks has no row of an eighth of a cycle
     if left.excess <= 0.0 or any(path.residual.size == 0 for path in paths(left)):

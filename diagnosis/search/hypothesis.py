@@ -30,11 +30,13 @@ class Hypothesis:
         effects: names, in the order they were added.
         fit: the fit.
         textbook: the fit with the textbook form, where the forms were freed; None otherwise.
+        short: the same set fitted to shorter stretches of the runs, where effects are added there.
     """
 
     effects: tuple[str, ...]
     fit: Fit
     textbook: Fit | None = None
+    short: Hypothesis | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -250,7 +252,9 @@ def with_forms(
                     needed.append(kind.name)
         if needed and tuple(needed) != freed.problem.free_forms:
             freed = _free_forms(textbook, only=needed) or freed
-        ranked[place] = of_more_weight(hypothesis, Hypothesis(hypothesis.effects, freed, textbook), gap)
+        ranked[place] = of_more_weight(
+            hypothesis, dataclasses.replace(hypothesis, fit=freed, textbook=textbook), gap
+        )
     return sorted(ranked, key=lambda h: h.fit.total)
 
 

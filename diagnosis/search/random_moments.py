@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import fdtrc
@@ -33,6 +34,9 @@ from diagnosis.search.process_noise import (
 )
 from diagnosis.search.weigh import FittedSet, log_weight
 from tunnel_sim.effects import Effect
+
+if TYPE_CHECKING:
+    from diagnosis.search.views.view import View
 
 _ROUNDS = 3  # of estimating the random moment from the residuals, and the effects beside it
 
@@ -65,26 +69,27 @@ class RandomAnswer:
         return tuple(sorted(names | set(() if self.beside is None else self.beside.effects)))
 
 
-def weigh_random_moments(
-    nominal: Fit,
-    hypotheses: Sequence[Hypothesis],
-    kinds: Sequence[type[Effect]],
-) -> list[RandomAnswer]:
+def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[RandomAnswer]:
     """Try turbulence, and vortices with a wandering phase, under all sets of effects.
+
+    Args:
+        view: in which they are fitted.
+        hypotheses: those found without a random moment.
 
     Returns:
         The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
         than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes,
-        where the likeliest is of a kind that is not among ``kinds``, or where no random moment in the wind could
-        leave little enough of the gap.
+        where the likeliest is of a kind that may not be named, or where no random moment in the wind could leave
+        little enough of the gap.
     """
-    allowed, chosen = {kind.random: kind for kind in kinds if kind.random}, nominal.settings.moment
-    scale = Scale.of(hypotheses, misfit(nominal), nominal.settings.weighing)
+    nominal, able = view.base, view.able
+    allowed = {kind.random: kind for kind in view.prepared.kinds if kind.random}
+    chosen = nominal.settings.moment
+    scale = Scale.of(hypotheses, view.gap, nominal.settings.weighing)
     best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
     if not allowed or not _may_act(best, scale):
         return []
-    able = [kind for kind in kinds if kind.fitted]
-    top = _settled(best, nominal, able)
+    top = _settled(best, view)
     for number in range(chosen.further_effects + 1):
         if number > 0:  # a small effect that no gap shows may keep the innovations from being white
             further = _evident(top, able)
@@ -101,7 +106,7 @@ def weigh_random_moments(
             kinds = tuple(allowed[band] for band in bands)
             share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
             names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
-            left = FittedSet(names, share, share * misfit(nominal).excess, seen.further_numbers)
+            left = FittedSet(names, share, share * view.gap.excess, seen.further_numbers)
             return [RandomAnswer(kinds, process, seen if seen.effects else None, left)]
     return []
 
@@ -133,7 +138,7 @@ def _evident(top: Hypothesis, kinds: Sequence[type[Effect]]) -> list[Hypothesis]
     if len(top.effects) >= top.fit.settings.search.most_causes:
         return []
     able = {kind.name: kind for kind in kinds if not kind.line}
-    larger = sets_with_one_more([top], list(able.values()), None)
+    larger = sets_with_one_more([top], list(able.values()))
     gains = [(top.fit.total - h.fit.total) / overdispersion(h.fit, able[h.effects[-1]]) for h in larger]
     order = sorted(range(len(larger)), key=lambda i: -gains[i])
     return [larger[i] for i in order if gains[i] > top.fit.settings.moment.evident_from]
@@ -223,7 +228,7 @@ def overdispersion(fitted: Fit, kind: type[Effect]) -> float:
     return max(1.0, float(np.trace(np.linalg.pinv(naive) @ robust)) / max(len(own), 1))
 
 
-def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> Hypothesis:
+def _settled(best: Hypothesis, view: View) -> Hypothesis:
     """The best set of effects on rows in whose noise the response to the random moment is part.
 
     The set given, where no random moment acts or its filter does not settle. The random moment is estimated from
@@ -232,8 +237,8 @@ def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> H
     set is the one that the random moment was estimated beside. Where none is, the likeliest of those reached is
     taken.
     """
-    data, known, top = nominal.problem.data, best.fit, best
-    chosen = nominal.settings.moment
+    nominal, kinds, known, top = view.base, view.able, best.fit, best
+    data, chosen = nominal.problem.data, nominal.settings.moment
     windy = {kind.name for kind in kinds if kind.condition == "wind_on"}
     reached: dict[tuple[str, ...], Hypothesis] = {}
 
@@ -251,7 +256,7 @@ def _settled(best: Hypothesis, nominal: Fit, kinds: Sequence[type[Effect]]) -> H
             if noisy is None:
                 break
             base = fit(Problem(noisy), nominal.point)
-            sets = [Hypothesis((), base), *grow(base, kinds)]
+            sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, misfit(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap in the wind for effects to be compared there: more are added
             # while one of the wind is evident, the most evident of all, so that none mops up what another leaves

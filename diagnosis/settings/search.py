@@ -93,9 +93,9 @@ class SearchSettings:
     rival_forms: float = setting(
         0.05, "Probability from which the forms of a rival set are freed.", "judgement"
     )
-    two_springs_from: float = setting(
+    outside_from: float = setting(
         0.05,
-        "Probability of a set from which two springs off are tried in place of its effects.",
+        "Probability of a set from which rivals from outside the vocabulary are tried in place of it.",
         "judgement",
     )
     two_springs_of: int = setting(

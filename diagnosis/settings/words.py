@@ -107,8 +107,10 @@ class WordsSettings:
     nearly_misfit_stds: float = setting(
         2.0, "χ² of a channel that is chance where their misfit is the reason.", "convention", unit="std"
     )
-    two_springs_explain: float = setting(
-        0.8, "Share of a gap from which two springs off are mentioned.", "judgement"
+    rival_explains: float = setting(
+        0.8,
+        "Share of a gap that a rival from outside the vocabulary must close to be mentioned.",
+        "judgement",
     )
     immaterial: float = setting(
         0.01,

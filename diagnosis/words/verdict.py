@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from diagnosis.settings import settings_of
@@ -55,7 +55,7 @@ def verdict(document: Document, rest: str) -> str:
         *map(_second_mode, found["second_modes"]),
         _answer(document, rest),
         _choices(found["choices"]),
-        _springs_off(found["springs_off"]),
+        *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
     ]
     return " ".join(filter(None, parts))
 
@@ -171,10 +171,8 @@ def _choices(found: list[Mapping[str, Any]]) -> str:
     )
 
 
-def _springs_off(found: Mapping[str, Any] | None) -> str:
-    """Springs that would explain the gap together; empty where none do."""
-    if found is None:
-        return ""
+def _two_springs_off(found: Mapping[str, Any]) -> str:
+    """Springs that would explain the gap together."""
     beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
     return (
         f"Two springs that are not as stiff as stated would explain the gap{beside}, such as "
@@ -186,3 +184,10 @@ def _spring_error(found: Mapping[str, Any]) -> str:
     """A spring and its error, such as ``16.12 N m/rad by −1.96 ± 0.01 %``."""
     error, std = 100.0 * found["error"], 100.0 * found["std"]
     return f"{found['stiffness']:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, std)} %"
+
+
+RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
+    "two springs off": _two_springs_off,
+    "stated": lambda found: str(found["words"]),
+}
+"""What is said of a rival from outside the vocabulary, by kind."""

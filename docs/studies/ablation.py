@@ -30,7 +30,7 @@ from scipy.optimize import minimize
 
 from diagnosis import Settings, diagnose
 from diagnosis.likelihood.residuals import ChannelMisfit
-from diagnosis.search import investigate as investigation
+from diagnosis.search import sets as weighed_sets
 from diagnosis.search import weigh as decide
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
 from diagnosis.settings import WeighingSettings
@@ -179,11 +179,11 @@ def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterato
         seen.append((sets, nominal))
         return weigh(sets, nominal, chosen)
 
-    investigation.weigh = kept  # type: ignore[attr-defined]
+    weighed_sets.weigh = kept  # type: ignore[attr-defined]
     try:
         yield
     finally:
-        investigation.weigh = weigh  # type: ignore[attr-defined]
+        weighed_sets.weigh = weigh  # type: ignore[attr-defined]
 
 
 def read_case(

@@ -18,7 +18,7 @@ import numpy as np
 
 from diagnosis.answer.next_run import planned_run, separation
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.search.investigate import Study
+from diagnosis.search.study import Study
 from identification.campaign.belief import expected_belief, information_gain
 from tunnel_lab.envs.menu import Choice, Menu, refusal
 from tunnel_lab.envs.session import Knowledge
@@ -116,7 +116,7 @@ def best_rivals(study: Study) -> tuple[Fit, Fit] | None:
 
     It is None while no effect is fitted.
     """
-    fits = [found.fit for answer in study.weighed if (found := study.hypothesis(answer.effects)) is not None]
+    fits = [answer.hypothesis.fit for answer in study.answers if answer.hypothesis is not None]
     if not fits:
         return None
     return (fits[0], fits[1]) if len(fits) > 1 else (fits[0], study.nominal)

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.search.investigate import Study, investigate
+from diagnosis.search.investigate import investigate
+from diagnosis.search.study import Study
 from identification.campaign.belief import (
     Belief,
     LinearRun,
@@ -249,11 +250,11 @@ def probabilities(known: Knowledge) -> Array:
     shares = np.zeros(len(names))
     if known.study is None:
         return np.full(len(names), 1.0 / len(names))
-    if not known.study.weighed:
+    if not known.study.answers:
         rate = known.study.settings.gap.detection_rate
         shares[0], shares[-1] = 1.0 - rate, rate
         return shares
-    for answer in known.study.weighed:
+    for answer in known.study.answers:
         name = answer.effects[0] if len(answer.effects) == 1 else "several"
         shares[names.index(name)] += answer.probability
     return np.asarray(shares / shares.sum())
@@ -264,7 +265,7 @@ def diagnostic_information(known: Knowledge) -> float:
 
     It is 0 while no gap is detected: its absence does not show which effect acts.
     """
-    if known.study is None or not known.study.weighed:
+    if known.study is None or not known.study.answers:
         return 0.0
     shares = probabilities(known)
     positive = shares[shares > 0.0]

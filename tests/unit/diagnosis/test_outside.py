@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis.search.outside import AnotherSpring, two_springs
 
 from diagnosis import diagnose
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.search import investigate
-from diagnosis.search.outside import AnotherSpring, two_springs
 from diagnosis.search.weigh import UNKNOWN, FittedSet, weigh
 from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import campaign, nominal

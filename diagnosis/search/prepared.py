@@ -1,0 +1,187 @@
+"""A campaign prepared for the search: similar, without its hum, its noise measured and its nominal model fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.diagnosable import refuse_indefinite
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
+from diagnosis.likelihood.mains_lines import fastest, mains_interval
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.prepare import prepare, without_rest, without_start
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
+from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similar import similar_campaign
+from diagnosis.noise.gap import GapTest, gap_or_colour
+from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
+from diagnosis.noise.sensor_noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.search.clock import Clock
+from diagnosis.search.grow import second_mode_alone
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.settings import Settings
+from diagnosis.where.place import Place, locate
+from tunnel_sim.effects import Effect, the_effect
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+
+#: The effects that are read off the records before any is fitted.
+HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What is known of a campaign before any effect is fitted, in the units of the similar campaign.
+
+    Args:
+        campaign: the similar campaign (`diagnosis.likelihood.nondimensional`).
+        similarity: how it was made from the measured one.
+        kinds: the effects that may be named.
+        noise: of the records without the hum.
+        trend: of the noise with the motion.
+        step: of the lattice on which the readings lie, rad; 0 where they are continuous.
+        coarse: whether that step is coarser than the stated resolution.
+        hum: the hum that was removed, or None.
+        nominal: the fit of the nominal model to the runs to which answers are fitted.
+        cut: whether the start of every run and what follows its motion were left out, because the nominal model
+            misses the motion grossly.
+        rested: runs that end with a long rest, which the fits leave out.
+    """
+
+    campaign: Campaign
+    similarity: Similarity
+    kinds: tuple[type[Effect], ...]
+    noise: Noise
+    trend: NoiseTrend
+    step: float
+    coarse: bool
+    hum: Hum | None
+    nominal: Fit
+    cut: bool = False
+    rested: tuple[str, ...] = ()
+
+    @property
+    def read_off(self) -> tuple[str, ...]:
+        """Causes read off the records before fitting."""
+        found = {HUM.name: self.hum is not None, COARSE_STEP.name: self.coarse}
+        return tuple(name for name, present in found.items() if present)
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the diagnosis."""
+        return self.nominal.settings
+
+    @property
+    def able(self) -> tuple[type[Effect], ...]:
+        """The effects that a fit can find."""
+        return tuple(kind for kind in self.kinds if kind.fitted)
+
+    @cached_property
+    def ringing(self) -> Hypothesis | None:
+        """The second mode, where it alone makes up for a motion that the nominal model misses."""
+        return second_mode_alone(self.nominal, self.able) if misses_motion(self.nominal) else None
+
+    @property
+    def in_stretches(self) -> bool:
+        """Whether the phase of the motion is lost, so that effects are sought in stretches of the runs.
+
+        An input holds the phase.
+        """
+        lost = self.ringing is None and misses_motion(self.nominal) and not self.campaign.driven
+        return bool(self.able) and lost
+
+    def place(self) -> Place:
+        """Where the gap is, from the residuals of the nominal model alone."""
+        stated = self.noise.stated_variance if self.coarse else None
+        level = float(np.mean([run.noise_variance * run.block for run in self.nominal.problem.data.runs]))
+        ratio = level / stated if stated else 1.0
+        return locate(self.campaign, self.nominal, hum_removed=self.hum is not None, noise_ratio=ratio)
+
+
+def prepared_and_tested(
+    measured: Campaign,
+    model: NominalModel,
+    kinds: Sequence[type[Effect]],
+    clock: Clock,
+    settings: Settings,
+) -> tuple[Prepared, GapTest]:
+    """Measure the noise, remove the hum, fit the nominal model and test for a gap.
+
+    Args:
+        measured: the campaign in its own units.
+        model: its nominal model, in the same units.
+        kinds: the effects that may be named, and read off the records.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    campaign, similarity = similar_campaign(measured, model)
+    model = model.similar(similarity)
+    allowed = {kind.name for kind in kinds}
+    with clock.step("noise"):
+        noise = campaign_noise(campaign, settings.noise)
+        trend, step = noise_trend(campaign), reading_step(campaign)
+        stated = campaign.sensor.resolution
+        least = settings.read_off.coarse_step
+        coarse = COARSE_STEP.name in allowed and stated is not None and step > least * stated
+    with clock.step("nominal fit"):
+        nominal = fit_nominal(prepare(campaign, noise.variance, similarity, model=model, settings=settings))
+        hum = None
+        if HUM.name in allowed:
+            nominal, noise, hum = _without_hum(campaign, similarity, nominal, noise)
+        # a second mode is missed from the start on, and its decay is counted from there; a driven run has none
+        missed = misses_motion(nominal) and not campaign.driven
+        cut = missed and second_mode_alone(nominal, kinds) is None
+        if cut:
+            nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
+        nominal, noise, test = gap_or_colour(nominal, noise, trend, step=step, coarse_step=coarse)
+    known = (noise, trend, step, coarse, hum, nominal, cut)
+    return Prepared(campaign, similarity, tuple(kinds), *known), test
+
+
+def _without_hum(
+    campaign: Campaign, similarity: Similarity, nominal: Fit, noise: Noise
+) -> tuple[Fit, Noise, Hum | None]:
+    """The nominal model fitted to records without their hum, their noise, and the hum; as given without a hum."""
+    model, settings = nominal.problem.data.model, nominal.settings
+    # block means short enough to show every line of the mains that the samples show
+    interval = mains_interval(similarity)
+    problem = Problem(prepare(campaign, noise.variance, similarity, interval, model, settings))
+    residuals = scaled_residuals(problem, nominal.point)
+    line = find_hum(replace(nominal, problem=problem, residuals=residuals))
+    if line is None:
+        return nominal, noise, None
+    motion = fastest(nominal)
+    frequency = refine_frequency(campaign, line, motion)
+    for _ in range(2):  # as a hum may count as noise at first
+        variance = float(np.mean(list(noise.variance.values())))
+        cleaned, hum = remove_hum(campaign, frequency, variance, settings.read_off, motion)
+        noise = campaign_noise(cleaned, settings.noise)
+    data = prepare(cleaned, noise.variance, similarity, model=model, settings=settings)
+    return fit_nominal(data), noise, hum
+
+
+def fit_nominal(data: Data) -> Fit:
+    """Fit the nominal model; where it misses the motion, from the runs' own decays as well.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted.
+    """
+    try:
+        starts = nominal_starts(data)
+        found = fit(Problem(data), next(starts))
+        nearer = next(starts, None) if misses_motion(found) else None
+        if nearer is not None:
+            found = min(found, fit(Problem(data), nearer), key=lambda one: one.total)
+    except (FitError, np.linalg.LinAlgError) as error:
+        raise TunnelError(
+            "the nominal model cannot be fitted",
+            remedy="check spring stiffness, wind speed and that the runs are free decays of three cycles or more",
+        ) from error
+    refuse_indefinite(found)
+    return found

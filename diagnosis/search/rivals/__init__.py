@@ -1,0 +1,9 @@
+"""The causes from outside the vocabulary that are weighed beside it, one file each."""
+
+from __future__ import annotations
+
+from diagnosis.search.rivals.rival import Rival
+from diagnosis.search.rivals.two_springs import TwoSprings
+
+#: Weighed where a diagnosis is not given others.
+RIVALS: tuple[Rival, ...] = (TwoSprings(),)

@@ -1,0 +1,84 @@
+"""A cause from outside the vocabulary: two springs that are not as stiff as stated.
+
+Every effect that changes the frequency with the spring has one number for it, and the inertia is another: two such
+effects fit any frequencies of three springs, so that they prove nothing by them. Two springs that are off are as
+simple (paper, Table II: springs 4 and 7), and are no effect of the vocabulary. They are weighed like a set of it;
+what is probable of them is probable of an unknown cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.facts.found import Fact, SpringError
+from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis, restricted
+from diagnosis.search.rivals.rival import Rival
+from tunnel_sim.effects import ALL_EFFECTS, Effect
+
+(ONE_SPRING,) = (kind for kind in ALL_EFFECTS if kind.chosen_spring() is not None)
+
+
+@dataclass(frozen=True)
+class AnotherSpring(ONE_SPRING):  # type: ignore[valid-type, misc]
+    """A second spring that is not as stiff as stated."""
+
+    name = "another_spring"
+
+
+class TwoSprings(Rival):
+    """Two springs off, in place of the effects of answers that change the frequency with the spring."""
+
+    def hypotheses(
+        self, likely: Sequence[Hypothesis], known: Sequence[Hypothesis], nominal: Fit
+    ) -> list[Hypothesis]:
+        """The pairs of springs beside what stays of each answer; none with too few springs.
+
+        Fits start at the known sets that have the effects that stay.
+        """
+        data = nominal.problem.data
+        if len(data.springs) < data.settings.search.two_springs_of:
+            return []
+        by_name = {hypothesis.names: hypothesis for hypothesis in known} | {(): Hypothesis((), nominal)}
+        pairs: dict[tuple[str, ...], Hypothesis] = {}
+        for answer in likely:
+            kinds = answer.fit.problem.effects
+            others = tuple(sorted(kind.name for kind in kinds if not _differs_by_spring(kind)))
+            if len(others) == len(kinds) or others in pairs:
+                continue
+            one, rest = by_name.get(tuple(sorted((*others, ONE_SPRING.name)))), by_name.get(others)
+            if one is None and rest is None:
+                start = restricted(answer.fit, others)
+                fitted = try_fit(start.problem, start.point)
+                rest = None if fitted is None else Hypothesis(others, fitted)
+            level = [one] if one is not None else sets_with_one_more([rest] if rest else [], [ONE_SPRING])
+            for pair in sets_with_one_more(level, [AnotherSpring]):
+                fitted = None if pair.fit.converged else try_fit(pair.fit.problem, pair.fit.point)
+                pairs[others] = pair if fitted is None else replace(pair, fit=fitted)
+        return list(pairs.values())
+
+    def fact(self, best: Hypothesis, similarity: Similarity) -> Fact:
+        """The two springs with their errors, and the effects that act with them."""
+        both = (ONE_SPRING.name, AnotherSpring.name)
+        springs = [spring_error(best.fit, name, similarity) for name in both]
+        beside = [name for name in best.names if name not in both]
+        return Fact("two springs off", {"springs": springs, "beside": beside})
+
+
+def spring_error(fit: Fit, name: str, similarity: Similarity) -> SpringError:
+    """The spring that an effect is off, and its error."""
+    stated = dict(fit.problem.fixed)[f"{name}.{ONE_SPRING.chosen_spring()}"]
+    inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
+    error, std = (of(f"{name}.error") for of in (fit.value, fit.std))
+    return SpringError(similarity.own(stated, "N m/rad"), error, inflate * std)
+
+
+def _differs_by_spring(kind: type[Effect]) -> bool:
+    """Whether an effect changes the frequency of the runs of every spring by another share."""
+    stiffens = kind.channel == "stiffness" and kind.condition == "always" and not kind.on_spring
+    return stiffens or kind.chosen_spring() is not None

@@ -1,0 +1,221 @@
+"""What an investigation returns: what was prepared, the gap, and the answers, each with its own fits."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.model.nominal import NominalModel
+from diagnosis.noise.gap import GapTest
+from diagnosis.search.choices import Choice, choices
+from diagnosis.search.clock import Clock
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.prepared import Prepared
+from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.rivals.rival import FoundRival
+from diagnosis.search.sets import Names, Sets
+from diagnosis.search.weigh import UNKNOWN, Weighed
+from diagnosis.settings import Settings
+from diagnosis.where.place import Place
+from tunnel_sim.vocabulary.campaign import Campaign
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Whether there is a gap, and where.
+
+    Args:
+        test: whether there is one, after the hum is removed.
+        place: where it is, from the residuals alone; None where there is none.
+    """
+
+    test: GapTest
+    place: Place | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Answer(Weighed):
+    """An answer, its probability and its fits.
+
+    Args:
+        hypothesis: its effects without a random moment; fitted to whole runs if it is the answer of the study or a
+            part of it, else in the view in which it was weighed. None where it is no set of effects, or its fit to
+            whole runs fails.
+        stated: the same as its parameters are stated, with the random moment beside it where sets are weighed so.
+        random: the random moment among its effects; None where there is none, or they close more without it.
+        choices: the choices of it that the runs cannot exclude.
+    """
+
+    hypothesis: Hypothesis | None = None
+    stated: Hypothesis | None = None
+    random: RandomAnswer | None = None
+    choices: tuple[Choice, ...] = ()
+
+    def fit(self, nominal: Fit) -> Fit | None:
+        """The fit of its effects; None where it has none.
+
+        Args:
+            nominal: the fit of a random moment that acts alone.
+        """
+        if self.random is not None:
+            return nominal if self.random.beside is None else self.random.beside.fit
+        return None if self.hypothesis is None else self.hypothesis.fit
+
+    def textbook_of(self, fit: Fit) -> Fit | None:
+        """The fit of its textbook form, where a fit is that of its freed forms; else None."""
+        own = self.hypothesis
+        return own.textbook if own is not None and own.fit is fit else None
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Everything found in a campaign, in the units of the similar campaign.
+
+    Args:
+        prepared: what is known before any effect is fitted.
+        gap: whether there is a gap, and where.
+        answers: the answer first, then the most probable ones; empty where there is no gap.
+        refused: by names of refused answers, their effects that no half of the records shows.
+        rivals: what was weighed from outside the vocabulary.
+        caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
+        seconds: wall time by step, s.
+    """
+
+    prepared: Prepared
+    gap: Gap
+    answers: tuple[Answer, ...] = ()
+    refused: Mapping[Names, Names] = field(default_factory=dict)
+    rivals: tuple[FoundRival, ...] = ()
+    caution: str = ""
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def campaign(self) -> Campaign:
+        """The similar campaign."""
+        return self.prepared.campaign
+
+    @property
+    def similarity(self) -> Similarity:
+        """How it was made from the measured one."""
+        return self.prepared.similarity
+
+    @property
+    def nominal(self) -> Fit:
+        """The fit of the nominal model."""
+        return self.prepared.nominal
+
+    @property
+    def model(self) -> NominalModel:
+        """The nominal model."""
+        return self.nominal.problem.data.model
+
+    @property
+    def settings(self) -> Settings:
+        """The settings of the diagnosis."""
+        return self.nominal.settings
+
+    @property
+    def read_off(self) -> Names:
+        """Causes read off the records before fitting."""
+        return self.prepared.read_off
+
+    @property
+    def answer(self) -> Answer | None:
+        """The answer; None where no cause had to be weighed."""
+        return self.answers[0] if self.answers else None
+
+    @property
+    def fitted(self) -> Names:
+        """Causes found by fitting: none, one or several, or ``unknown`` alone."""
+        return self.answer.effects if self.answer else ()
+
+    @property
+    def causes(self) -> Names:
+        """All causes, sorted; ``unknown`` alone where nothing in the vocabulary explains the gap."""
+        if self.fitted == UNKNOWN:
+            return UNKNOWN
+        return tuple(sorted({*self.read_off, *self.fitted}))
+
+    @property
+    def named(self) -> bool:
+        """Whether there is a gap and a cause of it is named."""
+        return self.causes not in ((), UNKNOWN)
+
+    @property
+    def chosen(self) -> Fit:
+        """The fit of the answer; the nominal one where no fitted effect is part of it."""
+        found = None if self.answer is None else self.answer.fit(self.nominal)
+        return self.nominal if found is None else found
+
+    @property
+    def stated(self) -> Fit:
+        """The fit whose coefficients are stated: that of the answer, in the noise in which it is stated."""
+        answer = self.answer
+        if answer is None or answer.stated is None or answer.stated is answer.hypothesis:
+            return self.chosen
+        return answer.stated.fit
+
+    @property
+    def random(self) -> RandomAnswer | None:
+        """The random moment that is part of the answer, or None."""
+        return None if self.answer is None else self.answer.random
+
+    def of(self, effects: Collection[str]) -> Answer | None:
+        """The answer of these effects; None where they were not weighed."""
+        key = tuple(sorted(effects))
+        return next((answer for answer in self.answers if answer.effects == key), None)
+
+
+def answered(sets: Sets, test: GapTest, clock: Clock) -> tuple[Answer, ...]:
+    """The answers with their fits, those of the first and of its parts fitted to whole runs.
+
+    Args:
+        sets: what the last view found.
+        test: of the gap, which the noise may explain.
+    """
+    view, prepared = sets.view, sets.view.prepared
+    with clock.step("polishing"):
+        whole = sets.in_whole_runs()
+    found = []
+    for weighed in _excused(sets, test):
+        names = weighed.effects
+        in_view = sets.fitted(names)
+        hypothesis = whole.get(names, in_view)
+        stated = in_view if view.states_parameters else hypothesis
+        random = sets.moment(names, hypothesis)
+        found.append(Answer(names, weighed.share, weighed.probability, hypothesis, stated, random))
+    with clock.step("choices"):
+        gap = misfit(prepared.nominal)
+        return tuple(replace(answer, choices=_choices(answer, prepared.nominal, gap)) for answer in found)
+
+
+def _excused(sets: Sets, test: GapTest) -> Sequence[Weighed]:
+    """The answers; where noise explains the gap, what is read off the records, or else that nothing explains it."""
+    weighed, prepared = sets.weighed, sets.view.prepared
+    if not sets.view.may_be_noise or not noise_explains(prepared.nominal, test, weighed):
+        return weighed
+    answer = Weighed((), 1.0, 1.0) if prepared.read_off else Weighed(UNKNOWN, 1.0, 1.0)
+    others = [replace(w, probability=0.0) for w in weighed if w.effects not in ((), UNKNOWN)]
+    return [answer, *others]
+
+
+def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> bool:
+    """Whether the gap is so small that the noise, which misbehaves, is all of it, or that its shares are chance.
+
+    Effects of a few numbers close little of any noise, however it misbehaves.
+    """
+    block, weighing = nominal.problem.data.mean_block, nominal.settings.weighing
+    small = test.noisy and nominal.excess < weighing.noise_explains * block
+    closed = any(w.effects != UNKNOWN and w.share < 1.0 - weighing.noise_excused for w in weighed)
+    return nominal.chance > weighing.shares_chance or (small and not closed)
+
+
+def _choices(answer: Answer, nominal: Fit, gap: ChannelMisfit) -> tuple[Choice, ...]:
+    """The choices of a probable answer that whole runs cannot exclude."""
+    stated, least = answer.stated, nominal.settings.search.choices_from
+    if stated is None or answer.probability < least or stated.fit.problem.data is not nominal.problem.data:
+        return ()
+    return choices(stated, gap)

@@ -1,0 +1,11 @@
+"""The views of the runs in which sets of causes are found, one file each."""
+
+from __future__ import annotations
+
+from diagnosis.search.views.by_moment import ByMoment
+from diagnosis.search.views.stretches import InStretches
+from diagnosis.search.views.view import View
+from diagnosis.search.views.whole_runs import WholeRuns
+
+#: In the order in which they are asked whether they apply; each is told what was found in the one before.
+VIEWS: tuple[type[View], ...] = (InStretches, WholeRuns, ByMoment)

@@ -1,0 +1,107 @@
+"""Sets of causes of a body that nothing holds, weighed by the moment that they leave and not by its angle."""
+
+from __future__ import annotations
+
+import dataclasses
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.run_data import Data
+from diagnosis.search.clock import Clock
+from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.prepared import Prepared
+from diagnosis.search.sets import Sets
+from diagnosis.search.views.view import View
+from diagnosis.search.weigh import UNKNOWN
+
+# Of a random moment's response per interval, in variances of white noise.
+_POWERS = np.geomspace(1e-12, 1e12, 49)
+
+
+@dataclass(frozen=True, eq=False)
+class ByMoment(View):
+    """Whole runs in whose noise a random moment is part.
+
+    Every small error of the moment moves such a body for good, so that its angle departs further and further. So
+    the random moment that a set leaves counts as noise: that of the likeliest set whose moment is small beside the
+    one that the nominal model misses.
+
+    Args:
+        known: the sets found by the angle.
+    """
+
+    known: Sets
+
+    states_parameters: ClassVar[bool] = True
+    caution: ClassVar[str] = "by moment"
+
+    @classmethod
+    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+        """Where a set is fitted to the angle of a body that nothing restores, and its share is beyond chance.
+
+        None also where no set explains the angle, and none leaves a small moment.
+        """
+        del clock
+        best = None if known is None or prepared.nominal.problem.data.model.restored else known.best
+        if known is None or best is None or best.fit.chance >= prepared.settings.search.moment_chance:
+            return None
+        prepared, chosen = known.view.prepared, prepared.settings.search
+        # the nominal model in the noise that the likeliest set leaves, and that other probable ones leave
+        bases: list[Fit] = []
+        for answer in known.weighed:
+            left = known.fitted(answer.effects)
+            if left is None or (bases and answer.probability < chosen.moment_noise_from):
+                continue
+            with suppress(FitError, np.linalg.LinAlgError):
+                bases.append(fit(Problem(by_moment(left.fit)), prepared.nominal.point))
+        small = [base for base in bases if chosen.moment_left * (1.0 + base.excess) >= 1.0]
+        if not bases or (not small and known.weighed[0].effects == UNKNOWN):
+            return None
+        return cls(prepared, (small or bases)[0], known)
+
+    def sets(self, clock: Clock) -> Sets:
+        """The sets that are found, beside what was found by the angle and is not grown again."""
+        return replace(super().sets(clock), random=self.known.random, refused=self.known.refused)
+
+    def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The set fitted to the angle."""
+        problem = replace(hypothesis.fit.problem, data=self.prepared.nominal.problem.data)
+        fitted = try_fit(problem, hypothesis.fit.point)
+        return None if fitted is None else replace(hypothesis, fit=fitted)
+
+
+def by_moment(fit: Fit) -> Data:
+    """The runs of a fit, whose noise holds a random moment beside the white noise.
+
+    Per interval, a body without a spring turns a random moment into 1/((1 − B)(1 − φ B)) of it, with the backward
+    shift B and φ = exp(−C h/Izz). White noise beside it makes (1 − B)(1 − φ B) of the reading a moving average of
+    order two, whose inverse whitens it (Box and Jenkins, Time Series Analysis). The power of the moment is the
+    likeliest one for the fit's residuals.
+    """
+    from scipy.signal import lfilter  # only here: slow to load
+
+    inertia, damping, _ = linear_coefficients(fit, 0)
+    runs = []
+    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
+        shape = np.polymul([1.0, -1.0], [1.0, -np.exp(-damping * run.interval / inertia)])
+        left = np.convolve(residual, shape, "valid")
+        likeliest, least = run, np.inf
+        for power in _POWERS:
+            # the invertible factor of a spectrum: of the shape's, and a constant beside it
+            roots = np.roots(np.polyadd(np.convolve(shape, shape[::-1]), [power, 0.0, 0.0]))
+            inside = roots[np.argsort(np.abs(roots))][:2]
+            average = np.asarray(np.real(np.poly(inside)), np.float64)
+            variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
+            cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
+            if cost < least:
+                noise = run.noise_variance * variance
+                likeliest = dataclasses.replace(run, innovations=(shape, average), noise_variance=noise)
+                least = cost
+        runs.append(likeliest)
+    return fit.problem.data.with_runs(tuple(runs))

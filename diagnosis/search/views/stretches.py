@@ -1,0 +1,223 @@
+"""Sets of causes fitted in stretches of the runs, where the nominal model misses the motion itself.
+
+Where the model is far from the motion, its phase is lost within a few cycles, and a fit of the whole run has many
+minima. In a stretch of two cycles the phase cannot be lost: what is wrong with the model shows as a frequency and a
+damping that differ from stretch to stretch (multiple shooting; Bock, Springer Ser. Chem. Phys. 18 (1981) 102).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Container, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import Self
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, FitError, fit
+from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
+from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.starting_points import misses_motion
+from diagnosis.model.parameters import Point
+from diagnosis.search.clock import Clock, Progress
+from diagnosis.search.grow import sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis, with_forms
+from diagnosis.search.prepared import Prepared, fit_nominal
+from diagnosis.search.sets import Sets
+from diagnosis.search.views.view import View
+from tunnel_sim.effects import Effect
+
+_SHORT, _LONG = 2, 18  # cycles
+_LONGER = 3  # times, from one fit to the next: the phase at the end of a stretch is known to that much
+_TOLERANCE = 1e-3  # of the fits on the way
+_ITERATIONS = 15
+
+
+def long_stretch(short: Stretches) -> int:
+    """Length, in blocks, of the stretches on which sets of causes are compared, from stretches of two cycles.
+
+    Over eighteen cycles a model of the motion shows in the phase as well; over a hundred the phase shows the clock,
+    the temperature and the hand that let go.
+    """
+    return short.length * _LONG // _SHORT
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """The runs of a campaign in stretches.
+
+    Args:
+        data: the stretches, as runs.
+        places: of each stretch its run's number and the block it begins with.
+        length: in blocks; the last of a run may be half as short or half as long again.
+    """
+
+    data: Data
+    places: tuple[tuple[int, int], ...]
+    length: int
+
+    def only(self, places: Container[tuple[int, int]]) -> Stretches:
+        """Those of the places given."""
+        if all(place in places for place in self.places):
+            return self
+        kept = [k for k, place in enumerate(self.places) if place in places]
+        runs = tuple(self.data.runs[k] for k in kept)
+        return Stretches(self.data.with_runs(runs), tuple(self.places[k] for k in kept), self.length)
+
+
+def in_stretches(data: Data, length: int | None = None) -> Stretches:
+    """Cut runs into stretches, which may be fitted with effects that are autonomous.
+
+    Args:
+        length: of a stretch, in blocks; two cycles where not given. Multiples of it have ends in common.
+    """
+    if length is None:
+        length = round(_SHORT / (REFERENCE_FREQUENCY * data.runs[0].interval))
+    parts, places = [], []
+    for number, run in enumerate(data.runs):
+        count = max(1, round(run.reading.size / length))
+        begins = [k * length for k in range(count)]
+        for begin, end in zip(begins, [*begins[1:], run.reading.size], strict=True):
+            name = f"{run.id} from block {begin}"
+            parts.append(dataclasses.replace(run.part(begin, end), id=name, stretch_of=run.id))
+            places.append((number, begin))
+    return Stretches(data.with_runs(tuple(parts)), tuple(places), length)
+
+
+def spread_out(short: Stretches, data: Data) -> Stretches:
+    """Stretches of two cycles to grow sets of causes on, spread over the runs where all would be too many.
+
+    Returns:
+        Those that lie in every k-th stretch of eighteen cycles, the first of each run among them. k is the least
+        with which the runs divided by it have no more blocks than sets are grown on.
+    """
+    each = ceil(sum(run.reading.size for run in data.runs) / data.settings.search.grown_on)
+    long = in_stretches(data, long_stretch(short))
+    kept: set[tuple[int, int]] = set()
+    for run in range(len(data.runs)):
+        begins = [begin for number, begin in long.places if number == run]
+        ends = [*begins[1:], data.runs[run].reading.size]
+        for begin, end in list(zip(begins, ends, strict=True))[::each]:
+            kept.update(place for place in short.places if place[0] == run and begin <= place[1] < end)
+    return short.only(kept)
+
+
+def fit_longer(
+    found: Fit, stretches: Stretches, data: Data, length: int | None = None
+) -> tuple[Fit, Stretches]:
+    """Fit ever longer stretches, each from the fit of shorter ones.
+
+    Args:
+        found: a fit of the stretches, the first of each run among them.
+        length: to reach, in blocks; None: whole runs.
+
+    Returns:
+        The fit of the longest stretches, and these. Whole runs are one stretch each and keep their own names.
+
+    Raises:
+        FitError: when the model cannot be integrated.
+    """
+    longest = max(run.reading.size for run in data.runs)
+    goal = longest if length is None else min(length, longest)
+    while stretches.length < goal:
+        known = dict(zip(stretches.places, found.point.release, strict=True))
+        longer = in_stretches(data, min(stretches.length * _LONGER, goal)).only(known)
+        if longer.length >= longest:
+            longer = Stretches(data, tuple((i, 0) for i in range(len(data.runs))), longest)
+        release = np.array([known[place] for place in longer.places])
+        problem = dataclasses.replace(found.problem, data=longer.data)
+        start = Point(found.point.common, release)
+        if longer.length >= goal:
+            found = fit(problem, start)
+        else:
+            found = fit(problem, start, tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
+        stretches = longer
+    return found, stretches
+
+
+@dataclass(frozen=True, eq=False)
+class InStretches(View):
+    """Long stretches of the runs, on which sets are compared, and short ones, on which they grow.
+
+    Effects are added in short stretches, in which the phase cannot be lost, and in long ones to the sets that keep
+    it there: a slow loss hardly shows in two cycles.
+
+    Args:
+        first: fit of the nominal model to the short stretches.
+        short: these.
+        long: the long ones.
+    """
+
+    first: Fit
+    short: Stretches
+    long: Stretches
+
+    @classmethod
+    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+        """The first view of a motion whose phase the nominal model loses."""
+        if known is not None or not prepared.in_stretches:
+            return None
+        with clock.step("effects"):
+            return cls.of(prepared)
+
+    @classmethod
+    def of(cls, prepared: Prepared) -> Self:
+        """The nominal model fitted to stretches of the runs."""
+        data = prepared.nominal.problem.data
+        short = spread_out(in_stretches(data), data)
+        first = fit_nominal(short.data)
+        try:
+            base, long = fit_longer(first, short, data, long_stretch(short))
+        except (FitError, np.linalg.LinAlgError):  # a model without the causes may run away in long stretches
+            base, long = first, short
+        return cls(prepared, base, first, short, long)
+
+    @property
+    def able(self) -> Sequence[type[Effect]]:
+        """The effects that do not depend on what was before a stretch."""
+        return [kind for kind in self.prepared.able if kind.autonomous]
+
+    @property
+    def smallest(self) -> Hypothesis:
+        """The nominal model."""
+        return Hypothesis((), self.base, short=Hypothesis((), self.first))
+
+    def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
+        """The sets with one effect more, from the better of two starts where there are two."""
+        data, chosen = self.prepared.nominal.problem.data, self.base.settings.search
+        tried = sets_with_one_more([h.short for h in level if h.short is not None], self.able, progress)
+        grown: dict[tuple[str, ...], Hypothesis] = {}
+        for h in sorted(tried, key=lambda h: h.fit.total)[: chosen.fitted_longer]:
+            with suppress(FitError, np.linalg.LinAlgError):
+                longer, _ = fit_longer(h.fit, self.short, data, long_stretch(self.short))
+                grown[h.names] = replace(h, fit=longer, short=h)
+        following = [h for h in level if h.effects and not misses_motion(h.fit)]
+        for child in sets_with_one_more(following, self.able, progress):
+            other = grown.get(child.names)
+            if other is None or child.fit.total < other.fit.total:
+                grown[child.names] = replace(child, short=None if other is None else other.short)
+        return list(grown.values())
+
+    def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
+        """Sets with their forms freed where the textbook leaves more than sensors and springs may."""
+        settings, base = self.base.settings, self.base
+        may = settings.weighing.model_error**2 * self.gap.motion / base.count
+        return with_forms(children, self.gap, min(settings.search.form_open * level[0].fit.excess, may))
+
+    def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """The best child of each parent, then the others: what fits better at first may be a dead end."""
+        first: list[Hypothesis] = []
+        for parent in level:
+            own = [h for h in going if h not in first and set(parent.effects) < set(h.effects)]
+            first += own[:1]
+        kept = first + [h for h in going if h not in first]
+        return kept[: self.base.settings.search.grown_from]
+
+    def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """The set fitted to ever longer stretches, up to whole runs."""
+        with suppress(FitError, np.linalg.LinAlgError):
+            whole, _ = fit_longer(hypothesis.fit, self.long, self.prepared.nominal.problem.data)
+            return replace(hypothesis, fit=whole)
+        return None

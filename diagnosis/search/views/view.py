@@ -1,0 +1,127 @@
+"""A view of the runs: how they are fitted while sets of causes are found. One of one's own is one file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, Self
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.search.clock import Clock, Progress
+from diagnosis.search.grow import grow, same_change, sets_with_one_more
+from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
+from diagnosis.search.prepared import Prepared
+from diagnosis.search.read_off import left_by_read_off
+from diagnosis.search.sets import Sets
+from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.record import Array
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """The runs as sets of causes are fitted to them; what is common to all views.
+
+    Args:
+        prepared: the campaign, whose nominal model is fitted to the whole runs to which answers are.
+        base: fit of the nominal model in this view, whose gap the sets share.
+    """
+
+    prepared: Prepared
+    base: Fit
+
+    #: Whether the parameters of an answer are those fitted in the view, and not those fitted to whole runs.
+    states_parameters: ClassVar[bool] = False
+    #: Whether the gap may be as small as noise that misbehaves, which then explains it.
+    may_be_noise: ClassVar[bool] = False
+    #: What is said of answers that were found in the view, by its key among the cautions; empty: nothing.
+    caution: ClassVar[str] = ""
+
+    @classmethod
+    def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
+        """The view of a campaign; None where it does not apply.
+
+        Args:
+            known: what was found in the view before; None: it is the first that applies.
+        """
+        raise NotImplementedError
+
+    def on(self, base: Fit) -> Self:
+        """The same view of runs with other noise, of which nothing is known but the fit of the nominal model."""
+        return replace(self, base=base)
+
+    @cached_property
+    def gap(self) -> ChannelMisfit:
+        """What the nominal model leaves in the view, by channel."""
+        return misfit(self.base)
+
+    @cached_property
+    def left_by_read_off(self) -> Array:
+        """χ² by channel that no set of effects has to explain, shape (6,), dimensionless."""
+        return left_by_read_off(self.prepared, self.base)
+
+    # ---- how sets are grown ----
+
+    @property
+    def able(self) -> Sequence[type[Effect]]:
+        """The effects that a fit in the view can find."""
+        return self.prepared.able
+
+    @property
+    def smallest(self) -> Hypothesis:
+        """The set that all others contain."""
+        return Hypothesis((), self.base)
+
+    def larger(self, level: Sequence[Hypothesis], progress: Progress | None) -> list[Hypothesis]:
+        """The sets with one effect more than those of a level."""
+        return sets_with_one_more(level, self.able, progress)
+
+    def with_forms(self, children: Sequence[Hypothesis], level: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
+        """Sets with their forms freed where that pays.
+
+        Args:
+            level: the sets with one effect less from which they are grown, the best first.
+        """
+        chosen, parent = self.base.settings.search, level[0]
+        scale = Scale.of(children, self.gap, self.base.settings.weighing)
+        if not all(scale.form_may_gain(child) for child in children):
+            return children
+        count = chosen.freed_hypotheses if not parent.effects else 1
+        return with_forms(children, self.gap, chosen.form_open * parent.fit.excess, count)
+
+    def to_grow(self, level: Sequence[Hypothesis], going: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Of the sets that may be grown further those that are; of several that change the readings alike one.
+
+        Args:
+            level: the sets from which they are grown.
+            going: the sets, the best first.
+        """
+        del level
+        kept: list[Hypothesis] = []
+        for hypothesis in going:  # those that change the readings alike would grow alike
+            if not any(same_change(hypothesis.fit, other.fit, self.base) for other in kept):
+                kept.append(hypothesis)
+        return kept[: self.base.settings.search.grown_from]
+
+    def sets(self, clock: Clock) -> Sets:
+        """The sets that are found in the view."""
+        with clock.step("effects"):
+            return Sets(self, tuple(grow(self, clock.progress)))
+
+    # ---- how they are fitted to whole runs ----
+
+    def whole(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """A set fitted to whole runs, from its fit in the view; None where that fails."""
+        raise NotImplementedError
+
+    def settled(self, hypothesis: Hypothesis) -> Hypothesis | None:
+        """A set that may be the answer, fitted to whole runs from its fit to convergence; None where that fails.
+
+        Each half of the runs is then asked whether it shows the effects.
+        """
+        return self.whole(polish(hypothesis))
+
+    def finished(self, settled: Hypothesis) -> Hypothesis:
+        """The answer as it is stated, from its fit to whole runs."""
+        return settled
