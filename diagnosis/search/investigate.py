@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
@@ -14,7 +13,7 @@ from diagnosis.search.prepared import prepared_and_tested
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.sets import Sets
-from diagnosis.search.study import Gap, Study, answered
+from diagnosis.search.study import Gap, Study
 from diagnosis.search.views import VIEWS
 from diagnosis.search.views.view import View
 from diagnosis.settings import Settings
@@ -49,13 +48,27 @@ def investigate(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    inquiry = _Inquiry(campaign, kinds, progress, settings, rivals, views)
     model = model or nominal_model(campaign)
-    found = inquiry.study(model)
+
+    def study(model: NominalModel) -> Study:
+        clock = Clock(progress)
+        prepared, test = prepared_and_tested(campaign, model, kinds, clock, settings)
+        if not test.detected:
+            return Study(prepared, Gap(test), seconds=clock.seconds)
+        with clock.step("where"):
+            gap = Gap(test, prepared.place())
+        sets: Sets | None = None
+        for kind in views:
+            view = kind.after(prepared, sets, clock)
+            if view is not None:
+                sets = compared(view.sets(clock), rivals, clock)
+        if sets is None:
+            raise ValueError("no view of the runs applies")
+        return Study.of_sets(sets, gap, clock)
+
+    found = study(model)
     lead = likeliest_lead(found)
-    if lead == 0.0:
-        return found
-    again = inquiry.study(model.with_lead(lead))
+    again = found if lead == 0.0 else study(model.with_lead(lead))
     return again if explains_more(again, found) else found
 
 
@@ -73,35 +86,3 @@ def nominal_study(
     """
     prepared, test = prepared_and_tested(campaign, nominal_model(campaign), kinds, Clock(), settings)
     return Study(prepared, Gap(test))
-
-
-@dataclass(frozen=True, eq=False)
-class _Inquiry:
-    """A campaign, and what may be found in it; arguments as of `investigate`."""
-
-    campaign: Campaign
-    kinds: Sequence[type[Effect]]
-    progress: Progress | None
-    settings: Settings
-    rivals: Sequence[Rival]
-    views: Sequence[type[View]]
-
-    def study(self, model: NominalModel) -> Study:
-        """The study with a nominal model."""
-        clock = Clock(self.progress)
-        prepared, test = prepared_and_tested(self.campaign, model, self.kinds, clock, self.settings)
-        if not test.detected:
-            return Study(prepared, Gap(test), seconds=clock.seconds)
-        with clock.step("where"):
-            gap = Gap(test, prepared.place())
-        sets: Sets | None = None
-        for kind in self.views:
-            view = kind.after(prepared, sets, clock)
-            if view is not None:
-                sets = compared(view.sets(clock), self.rivals, clock)
-        if sets is None:
-            raise ValueError("no view of the runs applies")
-        answers = answered(sets, test, clock)
-        view = sets.view
-        found = Study(view.prepared, gap, answers, sets.refused, sets.rivals, view.caution)
-        return replace(found, seconds=clock.seconds)

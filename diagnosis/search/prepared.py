@@ -14,13 +14,22 @@ from diagnosis.likelihood.mains_lines import fastest, mains_interval
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.prepare import prepare, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similar import similar_campaign
-from diagnosis.noise.gap import GapTest, gap_or_colour
+from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
-from diagnosis.noise.sensor_noise import Noise, NoiseTrend, campaign_noise, noise_trend, reading_step
+from diagnosis.noise.sensor_noise import (
+    Noise,
+    NoiseTrend,
+    campaign_noise,
+    noise_trend,
+    reading_levels,
+    reading_step,
+    typical_step,
+)
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
@@ -29,6 +38,7 @@ from diagnosis.where.place import Place, locate
 from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
 
 #: The effects that are read off the records before any is fitted.
 HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
@@ -94,6 +104,36 @@ class Prepared:
         """
         lost = self.ringing is None and misses_motion(self.nominal) and not self.campaign.driven
         return bool(self.able) and lost
+
+    def left_by_read_off(self, base: Fit) -> Array:
+        """χ² by channel that no set of effects has to explain, shape (6,), dimensionless.
+
+        The error of a coarse step is not white, and follows a slow motion. A hum that is not a pure line leaves a
+        small share of itself.
+
+        Args:
+            base: fit of the nominal model to the runs on which sets are compared.
+        """
+        left, runs = self.hum_power(base, self.settings.weighing.hum_left), base.problem.data.runs
+        if not self.coarse:
+            return left
+        levels, stated = reading_levels(self.campaign), self.campaign.sensor.noise_std
+        white = self.noise.white(typical_step(levels))
+        # a coarse step hides the noise, so that what is stated of it is the better guess
+        white = dict.fromkeys(white, stated) if stated else white
+        errors = rounding_errors(base, white, self.step, levels)
+        if errors is None:
+            return left
+        tries = [
+            misfit(base, [run.scaled(e[k]) for run, e in zip(runs, errors, strict=True)]).excess
+            for k in range(len(errors[0]))
+        ]
+        return np.asarray(left + np.maximum(np.mean(tries, axis=0), 0.0), np.float64)
+
+    def hum_power(self, base: Fit, share: float = 1.0) -> Array:
+        """χ² by channel of a share of the hum that was removed, in the readings of a fit, shape (6,)."""
+        size = 0.0 if self.hum is None else share * self.hum.excess * base.count
+        return np.array([size * (name == "harmonics") for name in CHANNELS])
 
     def place(self) -> Place:
         """Where the gap is, from the residuals of the nominal model alone."""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.random_moments import RandomAnswer
-from diagnosis.search.read_off import IN_HARMONICS
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.weigh import FittedSet, Weighed, weigh
 
@@ -49,9 +48,7 @@ class Sets:
         sets += [answer.left for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess))
-        if prepared.hum is not None:
-            removed = prepared.hum.excess * base.count * IN_HARMONICS
-            nominal = replace(nominal, chi2=nominal.chi2 + removed)
+        nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
         own = self.view.left_by_read_off
         return weigh([replace(one, excess=one.excess - own) for one in sets], nominal, base.settings.weighing)
 

@@ -168,28 +168,36 @@ class Study:
         key = tuple(sorted(effects))
         return next((answer for answer in self.answers if answer.effects == key), None)
 
+    @classmethod
+    def of_sets(cls, sets: Sets, gap: Gap, clock: Clock) -> Study:
+        """The study whose answers are sets, the first of them and its parts fitted to whole runs.
 
-def answered(sets: Sets, test: GapTest, clock: Clock) -> tuple[Answer, ...]:
-    """The answers with their fits, those of the first and of its parts fitted to whole runs.
+        Args:
+            sets: what the last view found.
+        """
+        prepared = sets.view.prepared
+        with clock.step("polishing"):
+            whole = sets.in_whole_runs()
+        answers = [_answer(one, sets, whole) for one in _excused(sets, gap.test)]
+        with clock.step("choices"):
+            left = misfit(prepared.nominal)
+            answers = [replace(one, choices=_choices(one, prepared.nominal, left)) for one in answers]
+        caution, refused = sets.view.caution, sets.refused
+        return cls(prepared, gap, tuple(answers), refused, sets.rivals, caution, clock.seconds)
+
+
+def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:
+    """An answer with its fits.
 
     Args:
-        sets: what the last view found.
-        test: of the gap, which the noise may explain.
+        whole: sets fitted to whole runs, by names; None where that failed.
     """
-    view, prepared = sets.view, sets.view.prepared
-    with clock.step("polishing"):
-        whole = sets.in_whole_runs()
-    found = []
-    for weighed in _excused(sets, test):
-        names = weighed.effects
-        in_view = sets.fitted(names)
-        hypothesis = whole.get(names, in_view)
-        stated = in_view if view.states_parameters else hypothesis
-        random = sets.moment(names, hypothesis)
-        found.append(Answer(names, weighed.share, weighed.probability, hypothesis, stated, random))
-    with clock.step("choices"):
-        gap = misfit(prepared.nominal)
-        return tuple(replace(answer, choices=_choices(answer, prepared.nominal, gap)) for answer in found)
+    names = weighed.effects
+    in_view = sets.fitted(names)
+    hypothesis = whole.get(names, in_view)
+    stated = in_view if sets.view.states_parameters else hypothesis
+    moment = sets.moment(names, hypothesis)
+    return Answer(names, weighed.share, weighed.probability, hypothesis, stated, moment)
 
 
 def _excused(sets: Sets, test: GapTest) -> Sequence[Weighed]:

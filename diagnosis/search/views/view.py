@@ -13,7 +13,6 @@ from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.grow import grow, same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
 from diagnosis.search.prepared import Prepared
-from diagnosis.search.read_off import left_by_read_off
 from diagnosis.search.sets import Sets
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
@@ -59,7 +58,7 @@ class View:
     @cached_property
     def left_by_read_off(self) -> Array:
         """χ² by channel that no set of effects has to explain, shape (6,), dimensionless."""
-        return left_by_read_off(self.prepared, self.base)
+        return self.prepared.left_by_read_off(self.base)
 
     # ---- how sets are grown ----
 
