@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from diagnosis.facts.found import Mode, SecondMode
+from diagnosis.facts.found import Mode, TwoModes
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import WordsSettings
@@ -35,7 +35,7 @@ class _Modes:
     left: float  # sum of squared residuals, rad²
 
 
-def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[SecondMode, ...]:
+def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, ...]:
     """Find a second mode in each run that shows one.
 
     Returns:
@@ -70,7 +70,7 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[SecondMode,
             main, second = (
                 Mode(float(two.amplitude[i]), float(two.frequency[i]), float(two.rate[i])) for i in order
             )
-            found.append(SecondMode(run.id, main, second, 1.0 - two.left / one.left))
+            found.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
             break
     return tuple(found)
 

@@ -149,8 +149,8 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class SecondMode:
-    """A second mode in a run.
+class TwoModes:
+    """Two modes in a run, where a rig has one.
 
     Args:
         run: id of the run.
@@ -191,7 +191,7 @@ class Found:
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()
     rivals: tuple[Fact, ...] = ()
-    second_modes: tuple[SecondMode, ...] = ()
+    second_modes: tuple[TwoModes, ...] = ()
     limit_cycles: tuple[Remark, ...] = ()
     noise: Fact | None = None
     cautions: tuple[Fact, ...] = ()

@@ -19,7 +19,7 @@ from diagnosis.model.joint import Joint, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import Rig
 from diagnosis.model.similar import similar_campaign
-from diagnosis.search.investigate import fit_nominal
+from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive

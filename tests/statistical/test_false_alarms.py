@@ -10,7 +10,7 @@ from diagnosis.likelihood.prepare import prepare
 from diagnosis.noise import gap
 from diagnosis.noise.gap import level_p_value, trend_p_values
 from diagnosis.noise.sensor_noise import campaign_noise, noise_trend
-from diagnosis.search.investigate import fit_nominal
+from diagnosis.search.prepared import fit_nominal
 from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, with_records

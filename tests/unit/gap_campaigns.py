@@ -19,7 +19,8 @@ from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.investigate import COARSE_STEP, HUM, Study, fit_nominal
+from diagnosis.search.prepared import COARSE_STEP, HUM, fit_nominal
+from diagnosis.search.study import Study
 from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
 from tunnel_sim.effects import Effect

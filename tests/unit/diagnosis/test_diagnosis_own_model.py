@@ -14,7 +14,8 @@ from diagnosis.facts.patch import NativeClosure
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.model.joint import reach, with_law
 from diagnosis.model.similar import similar_campaign
-from diagnosis.search.investigate import fit_nominal, investigate
+from diagnosis.search.investigate import investigate
+from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.engine.joint_model import JointModel
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError

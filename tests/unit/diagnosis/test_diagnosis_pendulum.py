@@ -17,7 +17,8 @@ from diagnosis.likelihood.starting_points import misses_motion, starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search.grow import _of_each, grow_in_stretches
 from diagnosis.search.hypothesis import Hypothesis, is_plausible
-from diagnosis.search.investigate import fit_nominal, investigate
+from diagnosis.search.investigate import investigate
+from diagnosis.search.prepared import fit_nominal
 from identification import identify
 from tests.unit.gap_campaigns import campaign, nominal
 from tunnel_reference import moments

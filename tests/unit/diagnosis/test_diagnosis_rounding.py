@@ -14,7 +14,8 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
-from diagnosis.search.investigate import fit_nominal, investigate
+from diagnosis.search.investigate import investigate
+from diagnosis.search.prepared import fit_nominal
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference import free_decays
@@ -142,6 +143,6 @@ def test_a_coarse_lattice_of_uneven_steps_is_the_only_cause(kinds):
     """What the lattice leaves by itself in each channel does not count against it."""
     found = investigate(coarse(), kinds)
     assert found.causes == ("sensor_quantisation",)
-    assert found.weighed[0].probability > 0.5
+    assert found.answers[0].probability > 0.5
     nominal = misfit(found.nominal)
     assert nominal.excess.max() > 10.0 * np.sqrt(2.0 * nominal.count.max())  # it is a gap

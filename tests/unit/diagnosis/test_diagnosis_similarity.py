@@ -178,7 +178,7 @@ def assert_same_answer(data, first, time, moment):
     assert found.causes == first.causes == ("coulomb_friction", "cubic_stiffness")
     assert found.similarity.time == pytest.approx(first.similarity.time / time, rel=1e-6)
     known = {answer.effects: answer.probability for answer in first.weighed}
-    for answer in found.weighed:
+    for answer in found.answers:
         assert answer.probability == pytest.approx(known[answer.effects], abs=0.02)
     change, units = (
         Similarity(time, moment),
@@ -218,7 +218,7 @@ def test_a_factor_on_the_angles_leaves_the_causes(twice_caused, factor):
     found = investigate(dataclasses.replace(data, sensor=sensor, runs=runs), FEW)
     assert found.causes == first.causes
     known = {answer.effects: answer.probability for answer in first.weighed}
-    for answer in found.weighed:
+    for answer in found.answers:
         assert answer.probability == pytest.approx(known[answer.effects], abs=0.02)
     name = "cubic_stiffness.coefficient"
     # beside forms, which polishing frees where that lowers χ², a coefficient is known less well

@@ -11,7 +11,7 @@ from diagnosis.likelihood.prepare import fit_longer, in_stretches, long_stretch,
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.search.grow import grow_in_stretches
-from diagnosis.search.investigate import fit_nominal
+from diagnosis.search.prepared import fit_nominal
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 

@@ -22,7 +22,7 @@ from tunnel_sim.effects import effect_class, effect_from
 
 if TYPE_CHECKING:
     from diagnosis.likelihood.least_squares import Fit
-    from diagnosis.search.investigate import Study
+    from diagnosis.search.study import Study
 
 
 def left(share: float) -> FittedSet:

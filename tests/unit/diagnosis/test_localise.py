@@ -72,10 +72,10 @@ def test_a_small_cause_beside_the_main_one_is_not_said_to_agree():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     study = studied(data, nominal(data), ("cubic_stiffness", "structural_damping"))
     alone = (Weighed(("cubic_stiffness",), 0.1, 0.1), Weighed(("structural_damping",), 0.9, 0.0))
-    _, _, said = localise(dataclasses.replace(study, weighed=(*study.weighed, *alone)))
+    _, _, said = localise(dataclasses.replace(study, weighed=(*study.answers, *alone)))
     assert (said.compared, said.agrees) == (("cubic_stiffness",), False)
     turned = (Weighed(("cubic_stiffness",), 0.9, 0.0), Weighed(("structural_damping",), 0.1, 0.1))
-    _, _, said = localise(dataclasses.replace(study, weighed=(*study.weighed, *turned)))
+    _, _, said = localise(dataclasses.replace(study, weighed=(*study.answers, *turned)))
     assert (said.compared, said.agrees) == (("structural_damping",), True)
 
 

@@ -73,7 +73,7 @@ def test_a_second_mode_is_an_answer_however_large_and_whatever_the_sensor_measur
     study = investigate(two_modes(derivative, share), kinds)
     assert misses_motion(study.nominal) == (share > 0.1)
     assert study.fitted == ("second_mode",)
-    assert study.weighed[0].probability > 0.9
+    assert study.answers[0].probability > 0.9
     found = study.chosen
     assert found.value("second_mode.amplitude") == pytest.approx(0.2 * share, rel=2e-3)
     frequency = study.similarity.own(found.value("second_mode.frequency"), "rad/s")
@@ -94,4 +94,4 @@ def test_a_wandering_zero_is_not_a_missed_motion(form):
     assert not study.cut
     if form == "drift":
         assert study.fitted == ("sensor_drift",)
-        assert study.weighed[0].probability > 0.9
+        assert study.answers[0].probability > 0.9
