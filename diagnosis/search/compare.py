@@ -33,7 +33,7 @@ def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
         )
         sets = replace(sets, rivals=tuple(one for one in tried if one.hypotheses))
     with clock.step("polishing"):
-        return _resolved(sets)
+        return resolved(sets)
 
 
 def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
@@ -54,7 +54,7 @@ def _with_near_sets(sets: Sets, clock: Clock) -> Sets:
         return replace(sets, hypotheses=(*others, *with_forms(rivals, view.gap, 0.0, len(rivals))))
 
 
-def _resolved(sets: Sets) -> Sets:
+def resolved(sets: Sets) -> Sets:
     """Without the answers that cannot be fitted to whole runs, or of which no half of them shows some effect."""
     while (answer := sets.answer) is not None:
         whole = sets.view.settled(answer)

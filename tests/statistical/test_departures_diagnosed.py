@@ -37,7 +37,7 @@ def test_a_campaign_without_a_gap_has_none(names):
     draw = CampaignDraw("none", c, (), 4)
     campaign = as_campaign(read_and_fit(draw, simulate_motions([draw])[0]), "c")
     found = nominal_study(campaign, ALL_EFFECTS)
-    assert not found.test.detected
+    assert not found.gap.test.detected
     assert found.causes == ()
     fitted, std = (getattr(found.nominal, name)("cn_beta") for name in ("value", "std"))
     assert abs(fitted - c.cn_beta) < 5.0 * std
@@ -73,4 +73,4 @@ def test_a_hum_of_every_form_is_found_and_removed(names, form):
     wander = 0.03 if shape.name == "wandering" else 3e-3  # Hz
     assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(extra["frequency"], abs=wander)
     assert found.hum.amplitude == pytest.approx(1e-3, rel=0.3 if shape.name == "wandering" else 0.03)
-    assert not found.test.detected
+    assert not found.gap.test.detected

@@ -153,7 +153,7 @@ def found() -> dict[str, Any]:
         "nearly": None,
         "immaterial": {},
         "choices": [],
-        "springs_off": None,
+        "rivals": [],
         "second_modes": [],
         "limit_cycles": [],
         "noise": {"kind": "not stated"},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +20,11 @@ from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.prepared import COARSE_STEP, HUM, fit_nominal
-from diagnosis.search.study import Study
-from diagnosis.search.weigh import Weighed
+from diagnosis.search.prepared import COARSE_STEP, HUM, Prepared, fit_nominal
+from diagnosis.search.study import Answer, Gap, Study
+from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.settings import Settings
-from tunnel_sim.effects import Effect
+from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -138,20 +139,31 @@ def with_settings(fitted: Fit, values: dict[str, float]) -> Fit:
 def studied(data: Campaign, nominal: Fit, causes: tuple[str, ...] = (), best: Fit | None = None) -> Study:
     """A study that ends in these causes, those that can be fitted answered by `best` where it is given."""
     fitted = tuple(sorted(name for name in causes if name not in (HUM.name, COARSE_STEP.name)))
-    return Study(
+    prepared = Prepared(
         data,
         Similarity(),
-        data,
+        (),
         campaign_noise(data, Settings().noise),
         NoiseTrend(0.0, 0.0, 0.0),
         step=0.0,
         coarse=COARSE_STEP.name in causes,
         hum=Hum(50.0, 1e-4, 1e-6, None, 0.1) if HUM.name in causes else None,
         nominal=nominal,
-        test=GapTest(bool(causes), 0.0, {}, noisy=False),
-        hypotheses=() if best is None else (Hypothesis(fitted, best),),
-        weighed=(Weighed(fitted, 0.0, 1.0),) if fitted else (),
     )
+    one = answer(fitted, 0.0, 1.0, best)
+    return Study(prepared, Gap(GapTest(bool(causes), 0.0, {}, noisy=False)), (one,) if fitted else ())
+
+
+def answer(effects: Sequence[str], share: float, probability: float, fitted: Fit | None = None) -> Answer:
+    """An answer, whose fit to whole runs is the one stated."""
+    known = None if fitted is None else Hypothesis(tuple(effects), fitted)
+    return Answer(tuple(effects), share, probability, known, known)
+
+
+def whole_runs(base: Fit, kinds: Sequence[type[Effect]] = ALL_EFFECTS) -> WholeRuns:
+    """Whole runs, of which the fit of the nominal model is known."""
+    none: Any = None
+    return WholeRuns(Prepared(none, Similarity(), tuple(kinds), none, none, 0.0, False, None, base), base)
 
 
 def judged(data: Campaign) -> GapTest:

@@ -27,7 +27,7 @@ def study():
 
 def test_both_springs_are_choices_of_equal_probability(study):
     assert study.fitted == (NAME,)
-    found = study.choices[(NAME,)]
+    found = study.answer.choices
     errors = {}
     for one in found:
         stiffness = dict(one.hypothesis.fit.problem.fixed)[f"{NAME}.spring_stiffness"]
@@ -39,7 +39,7 @@ def test_both_springs_are_choices_of_equal_probability(study):
 
 def test_the_interval_holds_the_truth_of_either_choice(study):
     found = coefficients(possible_answers(study, KINDS), study.campaign)["cn_beta"]
-    ends = [one.hypothesis.fit.value("cn_beta") for one in study.choices[(NAME,)]]
+    ends = [one.hypothesis.fit.value("cn_beta") for one in study.answer.choices]
     assert abs(ends[0] - ends[1]) > 0.01 * CN_BETA
     assert found.value == pytest.approx(0.5 * sum(ends), abs=0.2 * abs(ends[0] - ends[1]))
     assert abs(found.value - CN_BETA) < 2.0 * found.std
@@ -50,12 +50,12 @@ def test_both_springs_are_stated_with_their_errors_and_probabilities(study):
     assert [one.stiffness for one in found] == pytest.approx([16.12, 44.84])
     assert [one.error for one in found] == pytest.approx([-0.02 / 1.02, 0.02], rel=1e-2)
     assert sum(one.probability for one in found) == pytest.approx(1.0)
-    assert spring_choices(replace(study, choices={})) == ()
+    assert spring_choices(replace(study, answers=(replace(study.answer, choices=()),))) == ()
 
 
 def test_a_third_spring_leaves_no_choice():
     off = effect_from(NAME, {"spring_stiffness": 44.84, "error": 0.02})
     study = investigate(campaign(off, conditions=(*CONDITIONS, (30.0, 0.0), (30.0, 25.0))), KINDS)
     assert study.fitted == (NAME,)
-    assert choices(study.hypothesis((NAME,)), misfit(study.nominal)) == ()
-    assert not study.choices
+    assert choices(study.answer.hypothesis, misfit(study.nominal)) == ()
+    assert not study.answer.choices

@@ -22,14 +22,13 @@ from diagnosis.remainder.explain import chosen_kind, closable, steady_line
 from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect_table, terms
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
-from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
 from diagnosis.words.names import KINDS
 from diagnosis.words.remainder import closable_line, closable_words
 from diagnosis.words.tables import closable_table
 from tests.marks import slow
 from tests.reference.rigs import rig
-from tests.unit.gap_campaigns import campaign, nominal
+from tests.unit.gap_campaigns import answer, campaign, nominal
 from tunnel_lab.commands.diagnose import write_proposal
 from tunnel_reference.draw import CampaignDraw, EffectDraw
 from tunnel_reference.make import as_campaign
@@ -64,7 +63,8 @@ def test_a_run_of_too_few_blocks_for_a_row_says_nothing_of_what_could_be_closed(
     fitted = fit(replace(study.nominal.problem, data=short), study.nominal.point)
     assert fitted.excess > 0.0
     assert min(path.residual.size for path in paths(fitted)) == 0
-    assert closable(replace(study, nominal=fitted), significant=True, decided=False) is None
+    shorter = replace(study, prepared=replace(study.prepared, nominal=fitted))
+    assert closable(shorter, significant=True, decided=False) is None
 
 
 @pytest.fixture(scope="module")
@@ -391,7 +391,7 @@ def test_the_formula_for_an_undecided_answer_starts_from_the_nominal_model(deten
     nominal, name = study.nominal, "cubic_stiffness"
     (point, *_) = starting_points(nominal, effect_class(name))
     hypothesis = Hypothesis((name,), fit(point.problem, point.point, base=nominal, max_iterations=2))
-    likely = replace(study, hypotheses=(hypothesis,), weighed=(Weighed((name,), 0.5, 0.4),))
+    likely = replace(study, answers=(answer((name,), 0.5, 0.4, hypothesis.fit),))
     assert likely.chosen is hypothesis.fit
     undecided = closable(likely, significant=True, decided=False)
     assert as_json(undecided) == as_json(found)

@@ -16,10 +16,9 @@ from diagnosis.answer.candidates import candidates
 from diagnosis.answer.held_out import excess_base
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
-from diagnosis.search.weigh import Weighed
 from tests.marks import slow
 from tests.unit import gap_campaigns
-from tests.unit.gap_campaigns import INTERVAL, with_blow
+from tests.unit.gap_campaigns import INTERVAL, answer, with_blow
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -267,16 +266,15 @@ def test_the_excess_is_of_samples_whatever_the_blocks():
 
 @pytest.mark.slow
 def test_rivals_are_named_with_the_run_that_would_distinguish_them(found):
-    first = found.hypothesis(("quadratic_damping",))
-    second = found.hypothesis(("coulomb_friction",))
-    assert first is not None
-    assert second is not None
+    first, second = (found.of([name]) for name in ("quadratic_damping", "coulomb_friction"))
+    assert first.hypothesis is not None
+    assert second.hypothesis is not None
     torn = replace(
         found,
-        weighed=(
-            Weighed(("quadratic_damping",), 0.0, 0.6),
-            Weighed(("coulomb_friction",), 0.01, 0.3),
-            Weighed(("unknown",), 0.33, 0.1),
+        answers=(
+            replace(first, share=0.0, probability=0.6),
+            replace(second, share=0.01, probability=0.3),
+            answer(("unknown",), 0.33, 0.1),
         ),
     )
     document = answered(torn)
@@ -321,7 +319,7 @@ def test_the_source_of_the_noise_is_said():
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
     answer = assemble(found, *localise(found)).in_words()
     assert f"(probability {answer.candidates[0].probability:.2f})" in answer.verdict
-    doubtful = replace(found, test=replace(found.test, p_value=9e-4))
+    doubtful = replace(found, gap=replace(found.gap, test=replace(found.gap.test, p_value=9e-4)))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]
     assert none.probability == pytest.approx(9e-4 / 1.0009)
     read_off = replace(doubtful, coarse=True)
@@ -346,10 +344,10 @@ def test_noise_that_misbehaves_is_unknown_once():
 
 def test_the_chosen_fit_is_that_of_the_answer(found):
     assert found.chosen.problem.effects == (effect_class("quadratic_damping"),)
-    hypothesis = found.hypothesis(("quadratic_damping",))
+    hypothesis = found.of(["quadratic_damping"]).hypothesis
     assert isinstance(hypothesis, Hypothesis)
     assert found.chosen is hypothesis.fit
-    lost = replace(found, weighed=(Weighed(("unknown",), 1.0, 1.0),))
+    lost = replace(found, answers=(answer(("unknown",), 1.0, 1.0),))
     assert lost.chosen is found.nominal
     assert lost.causes == ("unknown",)
 

@@ -12,13 +12,14 @@ from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search import grow as growth
-from diagnosis.search.grow import exchange, grow, prune, without
+from diagnosis.search.compare import exchange, prune, without
+from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.weigh import weigh
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.unit import gap_campaigns
-from tests.unit.gap_campaigns import INTERVAL, nominal
+from tests.unit.gap_campaigns import INTERVAL, nominal, whole_runs
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 from tunnel_sim.effects.base import NEAR_MOTION
 
@@ -49,7 +50,7 @@ def of_three():
         effect_from(name, {effect_class(name).parameters()[0].name: value}) for name, value in THREE.items()
     ]
     base, steps = nominal(campaign(*effects)), []
-    return base, steps, grow(base, FEW, steps.append)
+    return base, steps, grow(whole_runs(base, FEW), steps.append)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +65,7 @@ def of_three():
 def test_the_effect_put_in_fits_best_and_the_growth_ends_with_it(name, values):
     base = nominal(campaign(effect_from(name, values)))
     steps = []
-    ranked = grow(base, [kind for kind in ALL_EFFECTS if kind.fitted], steps.append)
+    ranked = grow(whole_runs(base, [kind for kind in ALL_EFFECTS if kind.fitted]), steps.append)
     assert ranked[0].effects == (name,)
     assert within_noise(ranked[0].fit)
     assert all(len(hypothesis.effects) == 1 for hypothesis in ranked)
@@ -81,7 +82,7 @@ def test_the_effect_put_in_fits_best_and_the_growth_ends_with_it(name, values):
 def test_a_set_of_two_is_found_and_fitted_once():
     drift = 2e-3 * np.linspace(0.0, 1.0, round(DURATION / INTERVAL))
     base = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003}), added=drift))
-    ranked = grow(base, FEW)
+    ranked = grow(whole_runs(base, FEW))
     two = next(h for h in ranked if len(h.effects) == 2)
     assert two.names == ("quadratic_damping", "sensor_drift")
     assert two.fit.total < min(h.fit.total for h in ranked if len(h.effects) == 1)
@@ -111,7 +112,7 @@ def test_growth_ends_where_a_further_effect_closes_nothing():
     base = nominal(campaign(effect_from("sensor_clipping", {"limit": 0.33})))
     steps = []
     kinds = [effect_class(name) for name in ("nonlinear_yaw_moment", "quadratic_damping", "cubic_stiffness")]
-    ranked = grow(base, kinds, steps.append)
+    ranked = grow(whole_runs(base, kinds), steps.append)
     assert all(h.fit.excess > 0.99 * base.excess for h in ranked)
     assert max(line.count(" + ") for line in steps) == 1
 
@@ -163,7 +164,7 @@ def test_of_effects_that_do_the_same_one_is_grown_and_the_others_are_weighed_bes
     friction = effect_from("coulomb_friction", {"friction_moment": 0.002})
     base, steps = nominal(campaign(wrong, friction, duration=8.0)), []
     kinds = [effect_class(name) for name in (*ALIKE, "coulomb_friction", "sensor_drift")]
-    ranked = grow(base, kinds, steps.append)
+    ranked = grow(whole_runs(base, kinds), steps.append)
     grown_from = {line.split(" + ")[0] for line in steps if " + " in line}
     assert len(grown_from & set(ALIKE)) == 1
     best = next(h for h in ranked if len(h.effects) == 2)
@@ -187,7 +188,7 @@ def test_a_fit_that_ends_worse_than_without_the_effect_starts_again_nearby(monke
     far = replace(start, point=Point(common, start.point.release))
     assert fit(far.problem, far.point, base=base).total > base.total
     monkeypatch.setattr(growth, "starting_points", lambda *_: [far])
-    assert within_noise(grow(base, [kind])[0].fit)
+    assert within_noise(grow(whole_runs(base, [kind]))[0].fit)
 
 
 @pytest.mark.parametrize("offset", [-13.0, 6.0])
@@ -195,7 +196,7 @@ def test_an_offset_of_most_of_the_wind_is_found(offset):
     """The slowest wind is 15 m/s."""
     kind = effect_class("wind_speed_offset")
     base = nominal(campaign(effect_from(kind.name, {"offset": offset})))
-    found = grow(base, [kind])[0].fit
+    found = grow(whole_runs(base, [kind]))[0].fit
     assert within_noise(found)
     assert abs(found.value("wind_speed_offset.offset") - offset) < 4.0 * found.std("wind_speed_offset.offset")
 
@@ -230,7 +231,7 @@ def test_a_second_mode_near_the_motion_of_one_spring_is_found_beside_that_of_the
     assert not all(beside)
     assert np.mean(beside) >= 0.5
     line = effect_from("second_mode", {"amplitude": 0.004, "frequency": near, "damping_ratio": 0.01})
-    (found,) = grow(nominal(campaign(line)), [effect_class("second_mode")])
+    (found,) = grow(whole_runs(nominal(campaign(line)), [effect_class("second_mode")]))
     assert within_noise(found.fit)
     assert abs(found.fit.value("second_mode.frequency") - near) < 4.0 * found.fit.std("second_mode.frequency")
 
@@ -240,7 +241,7 @@ def test_of_several_forms_only_those_that_matter_are_freed() -> None:
     friction = effect_from("coulomb_friction", {"friction_moment": 0.003})
     spring = effect_from("asymmetric_stiffness", {"coefficient": -0.2, "exponent": 1.2})
     base = nominal(campaign(friction, spring))
-    whole = grow(base, [type(friction), type(spring)])[0]
+    whole = grow(whole_runs(base, [type(friction), type(spring)]))[0]
     kept = Hypothesis(
         whole.effects, fit(replace(whole.fit.problem, free_forms=()), textbook_point(whole.fit))
     )

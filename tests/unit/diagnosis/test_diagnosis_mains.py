@@ -70,7 +70,7 @@ def test_a_hum_is_found_wherever_grids_wander(frequency):
     assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(frequency, abs=3e-3)
     assert found.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.hum.std)
     assert found.hum.harmonic == 1
-    assert not found.test.detected
+    assert not found.gap.test.detected
 
 
 @pytest.mark.parametrize("frequency", [44.0, 55.0, 65.0, 72.0])
@@ -108,7 +108,7 @@ def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, pl
     assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(mains, abs=3e-3)
     assert found.hum.harmonic == multiple
     assert found.hum.amplitude == pytest.approx(2e-3, abs=4.0 * found.hum.std)
-    assert not found.test.detected
+    assert not found.gap.test.detected
     noted = hum_noted(found.campaign, found.hum, found.similarity)
     said = [remark(as_json(one)).what for one in noted]
     assert any(f"appears at {place:.5g} Hz" in one for one in said) == (place != multiple * mains)
@@ -127,7 +127,7 @@ def test_what_the_sample_rate_cannot_tell_apart_is_said(rate, multiple):
     said = [remark(as_json(one)).what for one in noted]
     assert own == pytest.approx(50.0, abs=3e-3)
     assert any(one.startswith(f"mains of {110.0 - own:.5g} Hz would show the same line") for one in said)
-    assert not found.test.detected
+    assert not found.gap.test.detected
 
 
 def test_a_mode_that_decays_is_not_a_hum():
@@ -212,7 +212,7 @@ def test_the_hum_of_a_slow_rig_is_found():
     assert own(found.hum.frequency, "Hz") == pytest.approx(50.0, abs=3e-3)
     assert found.hum.amplitude == pytest.approx(1e-3, rel=0.02)
     assert found.hum.excess == pytest.approx(0.5 * 1e-3**2 / NOISE**2, rel=0.1)
-    assert not found.test.detected
+    assert not found.gap.test.detected
     assert nominal_study(clean, ALL_EFFECTS).hum is None
 
 

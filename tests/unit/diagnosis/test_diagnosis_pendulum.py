@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,12 +16,14 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import misses_motion, starting_points
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import _of_each, grow_in_stretches
+from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, is_plausible
 from diagnosis.search.investigate import investigate
 from diagnosis.search.prepared import fit_nominal
+from diagnosis.search.views.stretches import InStretches
+from diagnosis.settings import Settings
 from identification import identify
-from tests.unit.gap_campaigns import campaign, nominal
+from tests.unit.gap_campaigns import campaign, nominal, whole_runs
 from tunnel_reference import moments
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.integrator import Phase, Term, integrate
@@ -125,7 +128,7 @@ def test_presliding_friction_is_fitted_in_stretches():
     """With the textbook form alone, its misfit hides whatever else acts."""
     data = without_rest(without_start(prepared(pendulum(1.0, 20.0, friction="dahl", quadratic=0.0))))
     kinds = [effect_class(name) for name in ("coulomb_friction", "gravity_stiffness")]
-    found = grow_in_stretches(data, fit_nominal, kinds).hypotheses
+    found = grow(InStretches.of(whole_runs(fit_nominal(data), kinds).prepared))
     both = next(h for h in found if len(h.effects) == 2)
     assert both.forms > 0
     assert abs(both.fit.excess) < 6.0 * np.sqrt(2.0 / both.fit.count)
@@ -134,9 +137,12 @@ def test_presliding_friction_is_fitted_in_stretches():
 def test_each_set_is_followed_by_its_best_child():
     ranked = [Hypothesis(names, None) for names in (("a", "c"), ("a", "d"), ("b", "c"), ("a", "b"))]
     parents = [Hypothesis(("a",), None), Hypothesis(("b",), None)]
-    assert [h.effects for h in _of_each(parents, ranked)] == [("a", "c"), ("b", "c"), ("a", "d"), ("a", "b")]
-    assert _of_each([*parents, Hypothesis(("x",), None)], ranked)[:2] == [ranked[0], ranked[2]]
-    assert _of_each(parents, []) == []
+    fitted = SimpleNamespace(settings=Settings().changed({"search.grown_from": 4}))
+    view = InStretches(None, fitted, None, None, None)
+    followed = view.to_grow(parents, ranked)
+    assert [h.effects for h in followed] == [("a", "c"), ("b", "c"), ("a", "d"), ("a", "b")]
+    assert view.to_grow([*parents, Hypothesis(("x",), None)], ranked)[:2] == [ranked[0], ranked[2]]
+    assert view.to_grow(parents, []) == []
 
 
 @pytest.mark.slow
@@ -197,7 +203,7 @@ def test_gravity_keeps_its_sign():
     """Half a turn away gravity of the other sign swings a body alike; the fits of this record end there first."""
     data = pendulum(2.2, 19.0, quadratic=0.0)
     found = investigate(data, [effect_class(name) for name in ("gravity_stiffness", "coulomb_friction")])
-    best = found.hypotheses[0].fit
+    best = found.answers[0].hypothesis.fit
     assert found.causes == ("coulomb_friction", "gravity_stiffness")
     assert abs(best.excess) < 0.2
     similar = found.similarity.moment * GRAVITY
@@ -231,10 +237,10 @@ def test_the_answer_says_which_runs_rest_for_long():
 
 
 def test_rests_stay_where_the_rest_of_the_runs_cannot_be_fitted(monkeypatch):
-    monkeypatch.setattr("diagnosis.search.investigate.try_fit", lambda *_: None)
+    monkeypatch.setattr("diagnosis.search.views.whole_runs.try_fit", lambda *_: None)
     fitted = nominal(stopped())
-    monkeypatch.setattr("diagnosis.search.investigate.fit_nominal", lambda _data: fitted)
+    monkeypatch.setattr("diagnosis.search.prepared.fit_nominal", lambda _data: fitted)
     found = investigate(stopped(), [effect_class("coulomb_friction")])
-    assert found.rested == ()
+    assert found.prepared.rested == ()
     assert [run.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6
     assert found.causes == ("coulomb_friction",)

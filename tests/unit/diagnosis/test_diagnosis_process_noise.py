@@ -35,6 +35,7 @@ from tests.unit.gap_campaigns import (
     INTERVAL,
     campaign,
     nominal,
+    whole_runs,
     with_blow,
 )
 from tunnel_sim.effects import effect_class, effect_from
@@ -145,7 +146,7 @@ def test_turbulence_in_one_run_is_not_that_of_the_stream(found):
     runs = tuple(blown.runs[i] if i == last else run for i, run in enumerate(still.runs))
     base = nominal(replace(still, runs=runs))
     assert not is_steady_noise(fit_turbulence(base), Settings().moment)
-    assert weigh_random_moments(base, [], BOTH) == []
+    assert weigh_random_moments(whole_runs(base, BOTH), []) == []
 
 
 def test_without_a_random_moment_there_is_nothing_to_gain():
@@ -167,9 +168,9 @@ def deflected(data, coefficient):
 def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     base = nominal(deflected(campaign(), 0.005))
     assert obeys_a_law(base)
-    assert weigh_random_moments(base, [], BOTH) == []
+    assert weigh_random_moments(whole_runs(base, BOTH), []) == []
     monkeypatch.setattr(random_moments, "obeys_a_law", lambda _: False)
-    assert [answer.effects for answer in weigh_random_moments(base, [], BOTH)] == [("buffeting",)]
+    assert [answer.effects for answer in weigh_random_moments(whole_runs(base, BOTH), [])] == [("buffeting",)]
 
 
 @pytest.mark.parametrize("bandwidth", [0.05, slow(0.5), 10.0])
@@ -179,7 +180,7 @@ def test_a_random_moment_obeys_no_law(bandwidth):
 
 
 def test_buffeting_is_offered_where_it_blows(windy):
-    (answer,) = weigh_random_moments(windy, [], BOTH)
+    (answer,) = weigh_random_moments(whole_runs(windy, BOTH), [])
     assert answer.effects == ("buffeting",)
     assert answer.share < 0.1
 
@@ -190,7 +191,7 @@ def test_turbulence_is_not_called_vortices_where_buffeting_is_excluded():
     narrow = fit_wandering_shedding(base)
     assert narrow is not None
     assert narrow.drop > Settings().moment.acts_from
-    assert weigh_random_moments(base, [], BOTH[1:]) == []
+    assert weigh_random_moments(whole_runs(base, BOTH[1:]), []) == []
 
 
 def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth_of_the_gap():
@@ -199,7 +200,7 @@ def test_weak_turbulence_is_seen_beside_a_spring_that_closes_all_but_a_hundredth
     (start, *_) = starting_points(base, type(strong))
     spring = Hypothesis(("cubic_stiffness",), fit(start.problem, start.point, base=base))
     assert 0.005 < spring.fit.excess / base.excess < 0.015
-    (answer,) = weigh_random_moments(base, [spring], (*BUFFETING, type(strong)))
+    (answer,) = weigh_random_moments(whole_runs(base, (*BUFFETING, type(strong))), [spring])
     assert answer.effects == ("buffeting", "cubic_stiffness")
 
 
@@ -212,7 +213,7 @@ def test_skips_beside_strong_turbulence_are_placed_where_they_are():
     planted = np.linspace(0.2, 0.8, len(CONDITIONS))  # shares of the runs
     assert np.max(np.abs(white.point.release[:, -1] - planted)) > 0.05
     kinds = (*BUFFETING, effect_class("dropped_samples"))
-    (answer,) = weigh_random_moments(base, [Hypothesis(("dropped_samples",), white)], kinds)
+    (answer,) = weigh_random_moments(whole_runs(base, kinds), [Hypothesis(("dropped_samples",), white)])
     assert answer.effects == ("buffeting", "dropped_samples")
     found = answer.beside.fit
     assert found.point.release[:, -1] == pytest.approx(planted, abs=0.005)
@@ -227,8 +228,8 @@ def test_beside_turbulence_that_misleads_all_sets_they_are_grown_anew():
     base = nominal(buffeted(campaign(friction, spring), 0.02, 4.0))
     names = ("buffeting", "coulomb_friction", "cubic_stiffness", "quadratic_damping")
     kinds = [effect_class(name) for name in names]
-    misled = grow(base, kinds[1:])
-    (answer,) = weigh_random_moments(base, misled, kinds)
+    misled = grow(whole_runs(base, kinds[1:]))
+    (answer,) = weigh_random_moments(whole_runs(base, kinds), misled)
     assert answer.effects == ("buffeting", "coulomb_friction", "cubic_stiffness")
     found = answer.beside.fit
     assert found.value("coulomb_friction.friction_moment") == pytest.approx(0.003, rel=0.05)
@@ -240,14 +241,14 @@ def test_an_effect_of_the_wind_that_is_weak_beside_turbulence_is_found():
     """It closes too little of the gap to be compared by shares, but far more than chance."""
     base = nominal(buffeted(campaign(effect_from("nonlinear_yaw_moment", {"coefficient": 0.6})), 0.004, 4.0))
     kinds = (*BUFFETING, effect_class("nonlinear_yaw_moment"), effect_class("nonlinear_yaw_damping"))
-    (answer,) = weigh_random_moments(base, [], kinds)
+    (answer,) = weigh_random_moments(whole_runs(base, kinds), [])
     assert answer.effects == ("buffeting", "nonlinear_yaw_moment")
     assert answer.beside.fit.value("nonlinear_yaw_moment.coefficient") == pytest.approx(0.6, rel=0.5)
 
 
 def test_a_random_moment_closes_little_of_a_gap_that_is_in_still_air_too():
     base = nominal(campaign(effect_from("cubic_stiffness", {"coefficient": -0.2})))
-    found = weigh_random_moments(base, [], (*BUFFETING, effect_class("coulomb_friction")))
+    found = weigh_random_moments(whole_runs(base, (*BUFFETING, effect_class("coulomb_friction"))), [])
     assert all(answer.share > 0.2 for answer in found)
 
 
@@ -275,7 +276,7 @@ def test_one_gust_is_no_buffeting():
             b if b.wind_on else a for a, b in zip(campaign().runs, struck.runs, strict=True)
         ),
     )  # fmt: skip
-    assert weigh_random_moments(nominal(struck), [], BOTH) == []
+    assert weigh_random_moments(whole_runs(nominal(struck), BOTH), []) == []
 
 
 def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_steady(monkeypatch, windy):
@@ -284,12 +285,12 @@ def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_stea
     runs = windy.problem.data.runs
     misled = [r if run.wind_on else 300.0 * r for run, r in zip(runs, windy.residuals, strict=True)]
     fitted = replace(windy, residuals=misled, chi2=np.array([float(r @ r) for r in misled]))
-    weigh_random_moments(fitted, [], BOTH)
+    weigh_random_moments(whole_runs(fitted, BOTH), [])
     assert len(settled) == 1
     drifting = [
         r * np.linspace(0.2, 1.8, r.size) if run.wind_on else r for run, r in zip(runs, misled, strict=True)
     ]
-    weigh_random_moments(replace(fitted, residuals=drifting), [], BOTH)
+    weigh_random_moments(whole_runs(replace(fitted, residuals=drifting), BOTH), [])
     assert len(settled) == 1
 
 
@@ -314,21 +315,21 @@ def test_of_sets_that_the_rounds_go_to_and_fro_between_the_likeliest_is_taken(mo
         return [Hypothesis(tuple(kind.name for kind in chosen), found)]
 
     monkeypatch.setattr(random_moments, "grow", grown)
-    (answer,) = weigh_random_moments(base, [], BUFFETING)
+    (answer,) = weigh_random_moments(whole_runs(base, BUFFETING), [])
     assert answer.effects == ("buffeting", "cubic_stiffness", "sensor_drift")
 
 
 def test_a_gap_in_still_air_is_no_buffeting():
     fit = nominal(campaign(effect_from("quadratic_damping", {"coefficient": 0.003})))
     assert wind_off_excess(fit) > 0.1
-    assert weigh_random_moments(fit, [], BOTH) == []
+    assert weigh_random_moments(whole_runs(fit, BOTH), []) == []
 
 
 def test_where_an_effect_closes_the_gap_no_random_moment_is_tried(windy):
     noise = np.random.default_rng(5)
     residuals = [noise.standard_normal(r.size) for r in windy.residuals]
     closed = replace(windy, residuals=residuals, chi2=np.array([float(r @ r) for r in residuals]))
-    assert weigh_random_moments(windy, [Hypothesis(("free_play",), closed)], BOTH) == []
+    assert weigh_random_moments(whole_runs(windy, BOTH), [Hypothesis(("free_play",), closed)]) == []
 
 
 def test_runs_without_wind_have_no_random_moment():
@@ -370,10 +371,10 @@ def test_vortices_whose_phase_wanders_are_shedding_and_not_turbulence():
     assert found is not None
     assert found.spectrum[0].strouhal_number == pytest.approx(strouhal, rel=0.01)
     assert np.sqrt(2.0) * found.spectrum[0].intensity == pytest.approx(0.05, rel=0.4)
-    (answer,) = weigh_random_moments(fit, [], BOTH)
+    (answer,) = weigh_random_moments(whole_runs(fit, BOTH), [])
     assert answer.effects == ("vortex_shedding",)
     assert answer.share < 0.1
-    assert weigh_random_moments(fit, [], BUFFETING) == []
+    assert weigh_random_moments(whole_runs(fit, BUFFETING), []) == []
 
 
 def test_turbulence_and_vortices_at_once_are_one_spectrum_with_two_parts():
@@ -381,14 +382,14 @@ def test_turbulence_and_vortices_at_once_are_one_spectrum_with_two_parts():
     base = nominal(with_moment(buffeted(campaign(), 0.006, 2.0), wandering_vortices(0.15, 0.05, seed=8)))
     for alone in (fit_turbulence(base), fit_turbulence(base, centred=True), fit_wandering_shedding(base)):
         assert not is_steady_noise(alone, Settings().moment)
-    (answer,) = weigh_random_moments(base, [], BOTH)
+    (answer,) = weigh_random_moments(whole_runs(base, BOTH), [])
     assert answer.effects == ("buffeting", "vortex_shedding")
     parts = {part.band: part for part in answer.process.spectrum}
     assert parts["broad_band"].intensity == pytest.approx(0.006, rel=0.5)
     assert parts["narrow_band"].strouhal_number == pytest.approx(0.15, rel=0.01)
     assert np.sqrt(2.0) * parts["narrow_band"].intensity == pytest.approx(0.05, rel=0.4)
-    assert weigh_random_moments(base, [], BUFFETING) == []
-    assert weigh_random_moments(base, [], BOTH[1:]) == []
+    assert weigh_random_moments(whole_runs(base, BUFFETING), []) == []
+    assert weigh_random_moments(whole_runs(base, BOTH[1:]), []) == []
 
 
 def test_the_covariance_of_two_parts_is_that_of_independent_moments():
@@ -431,7 +432,7 @@ def test_turbulence_of_another_spectrum_is_not_called_vortices_beside_turbulence
     base = nominal(with_moment(campaign(), octave))
     found = pn.likeliest(pn.random_moments(base), Settings().moment)
     assert [part.band for part in found.spectrum] == ["broad_band", "broad_band"]
-    (answer,) = weigh_random_moments(base, [], BOTH)
+    (answer,) = weigh_random_moments(whole_runs(base, BOTH), [])
     assert answer.effects == ("buffeting",)
 
 

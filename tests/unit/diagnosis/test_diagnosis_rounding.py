@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagnosis import vocabulary
-from diagnosis.likelihood.prepare import in_stretches, prepare
+from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.noise.gap import rounding_errors, with_rounding
 from diagnosis.noise.sensor_noise import (
@@ -16,6 +16,7 @@ from diagnosis.noise.sensor_noise import (
 )
 from diagnosis.search.investigate import investigate
 from diagnosis.search.prepared import fit_nominal
+from diagnosis.search.views.stretches import in_stretches
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.reference import free_decays

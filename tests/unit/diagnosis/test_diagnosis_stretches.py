@@ -7,12 +7,12 @@ import pytest
 
 from diagnosis.likelihood.least_squares import FitError, fit
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
-from diagnosis.likelihood.prepare import fit_longer, in_stretches, long_stretch, spread_out
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from diagnosis.search.grow import grow_in_stretches
+from diagnosis.search.grow import grow
 from diagnosis.search.prepared import fit_nominal
-from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal
+from diagnosis.search.views.stretches import InStretches, fit_longer, in_stretches, long_stretch, spread_out
+from tests.unit.gap_campaigns import CN_BETA, INERTIA, INTERVAL, campaign, nominal, whole_runs
 from tunnel_sim.effects import ALL_EFFECTS, effect_class
 
 
@@ -68,7 +68,7 @@ def test_a_stretch_moves_as_it_does_alone(kind, data):
 
 def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
     monkeypatch.setattr(
-        "diagnosis.likelihood.prepare._LONG", 6
+        "diagnosis.search.views.stretches._LONG", 6
     )  # these runs are shorter than two of eighteen
     short = in_stretches(data)
     assert spread_out(short, data).places == short.places
@@ -83,7 +83,7 @@ def test_of_many_stretches_every_second_long_one_is_used(data, monkeypatch):
 
 
 def test_whole_runs_are_fitted_from_some_of_their_stretches(data, monkeypatch):
-    monkeypatch.setattr("diagnosis.likelihood.prepare._LONG", 6)
+    monkeypatch.setattr("diagnosis.search.views.stretches._LONG", 6)
     data = replace(data, settings=data.settings.changed({"search.grown_on": 1000}))
     short = spread_out(in_stretches(data), data)
     found, longest = fit_longer(fit_nominal(short.data), short, data)
@@ -101,7 +101,7 @@ def test_releases_are_taken_over_from_shorter_stretches(data, monkeypatch):
         starts.append((problem.data, start))
         return fit(problem, start, **how)
 
-    monkeypatch.setattr("diagnosis.likelihood.prepare.fit", watched)
+    monkeypatch.setattr("diagnosis.search.views.stretches.fit", watched)
     found, longest = fit_longer(first, short, data)
     sizes = [max(run.reading.size for run in runs.runs) for runs, _ in starts]
     assert sizes == sorted(sizes)
@@ -128,18 +128,22 @@ def test_fits_of_growing_length_reach_a_truth_far_out_of_phase(data):
 def test_only_effects_without_a_memory_of_the_release_are_tried_on_stretches(data):
     kinds = [effect_class(name) for name in ("sensor_drift", "second_mode", "quadratic_damping")]
     steps = []
-    found = grow_in_stretches(data, fit_nominal, kinds, steps.append)
+    view = stretched(data, kinds)
+    found = grow(view, steps.append)
     assert set(steps) == {"quadratic_damping"}
-    assert all(h.fit.problem.data is not data for h in found.hypotheses)
-    whole = found.whole(found.hypotheses[0], data)
-    assert whole.fit.problem.data is data
+    assert all(h.fit.problem.data is not data for h in found)
+    assert view.whole(found[0]).fit.problem.data is data
+
+
+def stretched(data, kinds):
+    return InStretches.of(whole_runs(fit_nominal(data), kinds).prepared)
 
 
 def test_a_nominal_model_that_runs_away_on_long_stretches_stays_on_short_ones(data, monkeypatch):
     def away(*_, **__):
         raise FitError
 
-    monkeypatch.setattr("diagnosis.search.grow.fit_longer", away)
-    found = grow_in_stretches(data, fit_nominal, [effect_class("quadratic_damping")])
-    assert found.hypotheses == ()
-    assert max(run.reading.size for run in found.nominal.problem.data.runs) == in_stretches(data).length
+    monkeypatch.setattr("diagnosis.search.views.stretches.fit_longer", away)
+    view = stretched(data, [effect_class("quadratic_damping")])
+    assert grow(view) == []
+    assert max(run.reading.size for run in view.base.problem.data.runs) == in_stretches(data).length

@@ -10,11 +10,16 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.held_out import excess_base
+from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
-from diagnosis.search import investigate as investigation
+from diagnosis.search.clock import Clock
+from diagnosis.search.compare import resolved
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.investigate import _noise_explains, _polished, _weighed
 from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.sets import Sets
+from diagnosis.search.study import Study, noise_explains
+from diagnosis.search.views import by_moment as moments
+from diagnosis.search.views.whole_runs import WholeRuns
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
 from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import campaign, nominal, studied
@@ -22,7 +27,6 @@ from tunnel_sim.effects import effect_class, effect_from
 
 if TYPE_CHECKING:
     from diagnosis.likelihood.least_squares import Fit
-    from diagnosis.search.study import Study
 
 
 def left(share: float) -> FittedSet:
@@ -35,20 +39,29 @@ def _with_excess(fitted: Fit, excess: float) -> Fit:
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    """The nominal fit's excess is 1, and a fit with vortex shedding leaves half of it."""
+    """The nominal fit's excess is 1."""
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
-    base = nominal(data)
-    found = studied(data, _with_excess(base, 1.0))
-    steady = _with_excess(base, 0.5)
-    return replace(found, hypotheses=(Hypothesis(("vortex_shedding",), steady),))
+    return studied(data, _with_excess(nominal(data), 1.0))
+
+
+def weighed(study: Study, moment: RandomAnswer | None = None) -> Sets:
+    """A fit with vortex shedding leaves half of the gap."""
+    steady = Hypothesis(("vortex_shedding",), _with_excess(study.nominal, 0.5))
+    view = WholeRuns(study.prepared, study.nominal)
+    return Sets(view, (steady,), () if moment is None else (moment,), settled=steady)
+
+
+def shedding(share: float) -> RandomAnswer:
+    return RandomAnswer((effect_class("vortex_shedding"),), None, None, left(share))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("share", "is_random"), [(0.4, True), (0.6, False)])
 def test_a_random_moment_answers_where_it_leaves_less_than_the_steady_one(
     study: Study, share: float, is_random: bool
 ) -> None:
-    moment = RandomAnswer((effect_class("vortex_shedding"),), None, None, left(share))  # type: ignore[arg-type]
-    asked = replace(study, random=(moment,)).random_answer(("vortex_shedding",))
+    moment = shedding(share)
+    sets = weighed(study, moment)
+    asked = sets.moment(("vortex_shedding",), sets.hypotheses[0])
     assert (asked is moment) == is_random
 
 
@@ -56,11 +69,19 @@ def test_a_random_moment_answers_where_it_leaves_less_than_the_steady_one(
 def test_the_answer_is_polished_unless_a_random_moment_gives_it(
     study: Study, monkeypatch: pytest.MonkeyPatch, random: bool
 ) -> None:
-    polished = replace(study.hypotheses[0], textbook=study.nominal)
-    monkeypatch.setattr("diagnosis.search.investigate.polish", lambda _: polished)
-    moment = RandomAnswer((effect_class("vortex_shedding"),), None, None, left(0.4))  # type: ignore[arg-type]
-    found = _polished(study.hypotheses, Weighed(("vortex_shedding",), 0.5, 0.9), (moment,) if random else ())
-    assert found == (study.hypotheses if random else (polished,))
+    sets = weighed(study, shedding(0.4) if random else None)
+    vars(sets)["weighed"] = [Weighed(("vortex_shedding",), 0.5, 0.9)]
+    polished = replace(sets.hypotheses[0], textbook=study.nominal)
+    monkeypatch.setattr("diagnosis.search.views.whole_runs.polish", lambda _: polished)
+    found = sets.in_whole_runs()[("vortex_shedding",)]
+    assert found is (sets.hypotheses[0] if random else polished)
+
+
+def test_an_answer_that_is_read_off_the_records_is_settled_without_a_fit(study: Study) -> None:
+    """It is no set of effects, so that nothing is fitted to whole runs, in no view."""
+    sets = weighed(study)
+    vars(sets)["weighed"] = [Weighed((), 1.0, 0.9), Weighed(("vortex_shedding",), 0.5, 0.1)]
+    assert resolved(sets) is sets
 
 
 LEVEL = 1e-6  # rad², the records' own variance
@@ -84,31 +105,34 @@ def test_an_excess_is_measured_against_the_noise_of_a_perfect_model(
     base: float,
 ) -> None:  # fmt: skip
     """In every case base, extra and hum add up to what the records contain, unless the statement is above them."""
-    noise = replace(study.noise, variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL}, stated_variance=stated)
+    prepared = study.prepared
+    noise = replace(prepared.noise, variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL}, stated_variance=stated)
     sensor = replace(study.campaign.sensor, resolution=resolution)
-    asked = replace(
-        study,
+    changed = replace(
+        prepared,
         noise=noise,
         campaign=replace(study.campaign, sensor=sensor),
         coarse=coarse,
         step=step,
-        test=replace(study.test, noisy=noisy),
         hum=Hum(50.0, 1e-4, 1e-6, None, 0.2),
     )
+    gap = replace(study.gap, test=replace(study.gap.test, noisy=noisy))
+    asked = replace(study, prepared=changed, gap=gap)
     found = excess_base(asked)
     assert found.variance == pytest.approx(base)
     assert found.variance * (1.0 + found.extra) == pytest.approx(max(LEVEL, base))
     assert found.hum * found.variance == pytest.approx(0.2 * LEVEL)
-    assert excess_base(replace(asked, hum=None)).hum == 0.0
+    assert excess_base(replace(asked, prepared=replace(changed, hum=None))).hum == 0.0
 
 
-def _left(excess: float, block: int, chance: float = 0.01, **given: object) -> Study:
-    """A study whose nominal fit leaves an excess in noise variances of a sample, of readings in blocks."""
-    data = SimpleNamespace(runs=(SimpleNamespace(block=block),), mean_block=block)
-    fitted = SimpleNamespace(excess=excess * block, chance=chance, problem=SimpleNamespace(data=data))
-    noise = SimpleNamespace(variance={"r1": 0.5 * LEVEL, "r2": 1.5 * LEVEL})
-    found = {"nominal": fitted, "noise": noise, "coarse": False, "step": 0.0, "hum": None}
-    return SimpleNamespace(settings=Settings(), **(found | given))  # type: ignore[return-value]
+def _left(excess: float, block: int, chance: float = 0.01) -> Fit:
+    """A nominal fit that leaves an excess in noise variances of a sample, of readings in blocks."""
+    problem = SimpleNamespace(data=SimpleNamespace(mean_block=block))
+    return SimpleNamespace(excess=excess * block, chance=chance, problem=problem, settings=Settings())  # type: ignore[return-value]
+
+
+def judged(noisy: bool) -> GapTest:
+    return GapTest(True, 0.0, {}, noisy=noisy)
 
 
 OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.3, 0.5)]
@@ -117,8 +141,8 @@ OPEN = [Weighed(UNKNOWN, 0.0, 0.5), Weighed(("dropped_samples",), 0.3, 0.5)]
 @pytest.mark.parametrize(("chance", "explains"), [(0.9, False), (1.1, True)])
 def test_a_gap_below_the_scatter_of_the_noise_has_no_shares(chance: float, explains: bool) -> None:
     """Bands may show a gap where the mean square does not; every set would close all of it."""
-    left = _left(0.002, 4, chance, test=SimpleNamespace(noisy=False))
-    assert _noise_explains(left, [Weighed(("sensor_drift",), 0.0, 0.9)]) is explains
+    left = _left(0.002, 4, chance)
+    assert noise_explains(left, judged(noisy=False), [Weighed(("sensor_drift",), 0.0, 0.9)]) is explains
 
 
 @pytest.mark.parametrize("block", [1, 4])
@@ -128,9 +152,9 @@ def test_a_gap_below_the_scatter_of_the_noise_has_no_shares(chance: float, expla
 def test_noise_that_misbehaves_explains_a_gap_up_to_its_own_power(
     block: int, excess: float, noisy: bool, explains: bool
 ) -> None:
-    left = _left(excess, block, test=SimpleNamespace(noisy=noisy))
-    assert _noise_explains(left, OPEN) is explains
-    assert not _noise_explains(left, [*OPEN, Weighed(("dropped_samples",), 0.02, 0.9)])
+    left, test = _left(excess, block), judged(noisy)
+    assert noise_explains(left, test, OPEN) is explains
+    assert not noise_explains(left, test, [*OPEN, Weighed(("dropped_samples",), 0.02, 0.9)])
 
 
 @pytest.mark.parametrize(("share", "alone"), [(0.5, True), (20.0, False)])
@@ -143,7 +167,7 @@ def test_a_hum_is_the_only_cause_where_little_more_is_left_than_it_leaves_by_its
     excess = share * Settings().weighing.hum_left * hum.excess
     residuals = [np.sqrt(1.0 + excess) * rng.normal(size=r.size) for r in study.nominal.residuals]
     base = replace(study.nominal, residuals=residuals)
-    found = _weighed(replace(study, hum=hum, hypotheses=()), base)
+    found = Sets(WholeRuns(replace(study.prepared, hum=hum), base), ()).weighed
     assert found[0].effects == (() if alone else UNKNOWN)
 
 
@@ -165,21 +189,18 @@ def test_the_random_moment_of_a_free_body_is_that_of_the_likeliest_set_that_leav
     def fitted(problem, _):
         return SimpleNamespace(name=problem, excess=1.0 / powers[problem] - 1.0)
 
-    def grown(base, *_):
-        raise LookupError(base.name)
-
-    monkeypatch.setattr(investigation, "by_moment", lambda fit: fit)
-    monkeypatch.setattr(investigation, "Problem", lambda data: data)
-    monkeypatch.setattr(investigation, "fit", fitted)
-    monkeypatch.setattr(investigation, "grow", grown)
-    nominal = SimpleNamespace(problem=SimpleNamespace(data=None), point=None)
+    monkeypatch.setattr(moments, "by_moment", lambda fit: fit)
+    monkeypatch.setattr(moments, "Problem", lambda data: data)
+    monkeypatch.setattr(moments, "fit", fitted)
+    data = SimpleNamespace(model=SimpleNamespace(restored=False))
+    nominal = SimpleNamespace(problem=SimpleNamespace(data=data), point=None)
+    prepared = SimpleNamespace(nominal=nominal, settings=Settings())
     sets = {(name,): SimpleNamespace(fit=name) for name in powers}
-    found = SimpleNamespace(nominal=nominal, hypothesis=sets.get, settings=Settings())
     weighed = [Weighed((name,), 0.1, 0.01) for name in dict.fromkeys((first, "a", "b"))]
     weighed = weighed if first == "unknown" else [replace(one, probability=0.3) for one in weighed]
-    clock = investigation._Clock(None)
-    if taken is None:
-        assert investigation._weigh_by_moment(found, weighed, [], clock) is None
-    else:
-        with pytest.raises(LookupError, match=taken):
-            investigation._weigh_by_moment(found, weighed, [], clock)
+    best = SimpleNamespace(fit=SimpleNamespace(chance=0.01))
+    known = SimpleNamespace(
+        view=SimpleNamespace(prepared=prepared), best=best, fitted=sets.get, weighed=weighed
+    )
+    view = moments.ByMoment.after(prepared, known, Clock())
+    assert (None if view is None else view.base.name) == taken

@@ -16,7 +16,6 @@ from diagnosis.likelihood.prepare import without_start
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import nominal_start, starting_points
-from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
 from diagnosis.where.along_motion import apparent_moment, backbones, drift
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval
@@ -29,7 +28,7 @@ from diagnosis.where.place import (
 )
 from tests.marks import slow
 from tests.unit import gap_campaigns
-from tests.unit.gap_campaigns import INTERVAL, nominal, studied, with_blow
+from tests.unit.gap_campaigns import INTERVAL, answer, nominal, studied, with_blow
 from tunnel_sim.effects import effect_class, effect_from
 
 DURATION = 7.0
@@ -71,11 +70,11 @@ def test_the_place_does_not_depend_on_the_names(cause):
 def test_a_small_cause_beside_the_main_one_is_not_said_to_agree():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     study = studied(data, nominal(data), ("cubic_stiffness", "structural_damping"))
-    alone = (Weighed(("cubic_stiffness",), 0.1, 0.1), Weighed(("structural_damping",), 0.9, 0.0))
-    _, _, said = localise(dataclasses.replace(study, weighed=(*study.answers, *alone)))
+    alone = (answer(("cubic_stiffness",), 0.1, 0.1), answer(("structural_damping",), 0.9, 0.0))
+    _, _, said = localise(dataclasses.replace(study, answers=(*study.answers, *alone)))
     assert (said.compared, said.agrees) == (("cubic_stiffness",), False)
-    turned = (Weighed(("cubic_stiffness",), 0.9, 0.0), Weighed(("structural_damping",), 0.1, 0.1))
-    _, _, said = localise(dataclasses.replace(study, weighed=(*study.answers, *turned)))
+    turned = (answer(("cubic_stiffness",), 0.9, 0.0), answer(("structural_damping",), 0.1, 0.1))
+    _, _, said = localise(dataclasses.replace(study, answers=(*study.answers, *turned)))
     assert (said.compared, said.agrees) == (("structural_damping",), True)
 
 

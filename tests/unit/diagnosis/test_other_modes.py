@@ -91,7 +91,7 @@ def test_a_wandering_zero_is_not_a_missed_motion(form):
     kinds = [effect_class(name) for name in ("sensor_drift", "cubic_stiffness", "coulomb_friction")]
     study = investigate(Campaign("wander", RigProperties(), SensorProperties(100.0), runs), kinds)
     assert not misses_motion(study.nominal)
-    assert not study.cut
+    assert not study.prepared.cut
     if form == "drift":
         assert study.fitted == ("sensor_drift",)
         assert study.answers[0].probability > 0.9

@@ -52,20 +52,19 @@ def test_an_effect_that_acts_is_resolved_by_a_half(name, moment):
     found = study(name, integrated(moment), integrated(moment, 0.2))
     assert found.fitted == (name,)
     assert unresolved(found.chosen) == ()
-    assert not found.unresolved
+    assert not found.refused
 
 
 def test_an_effect_that_only_joins_the_halves_is_not_resolved():
     """The frequency changes at half time, and not with the amplitude."""
     phase = np.cumsum(np.where(TIME < 10.0, 7.0, 7.002)) / 100.0
     found = study("cubic_stiffness", 0.3 * np.exp(-0.08 * TIME) * np.cos(phase))
-    (fitted,) = found.hypotheses
-    assert unresolved(fitted.fit) == ("cubic_stiffness",)
+    assert unresolved(found.of(["cubic_stiffness"]).hypothesis.fit) == ("cubic_stiffness",)
 
 
 def test_an_answer_with_an_effect_that_is_not_resolved_is_refused(monkeypatch):
-    monkeypatch.setattr("diagnosis.search.investigate.unresolved", lambda fit: (fit.problem.effects[0].name,))
+    monkeypatch.setattr("diagnosis.search.compare.unresolved", lambda fit: (fit.problem.effects[0].name,))
     found = study("cubic_stiffness", integrated(lambda angle, _: 10.0 * angle**3))
-    assert dict(found.unresolved) == {("cubic_stiffness",): ("cubic_stiffness",)}
+    assert dict(found.refused) == {("cubic_stiffness",): ("cubic_stiffness",)}
     assert found.fitted == ("unknown",)
-    assert found.hypothesis(("cubic_stiffness",)) is None
+    assert found.of(["cubic_stiffness"]) is None

@@ -15,14 +15,13 @@ from diagnosis.facts.found import Nearly
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import GapSummary, ParameterEstimate, RunGap
-from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
 from diagnosis.words.next_steps import next_steps
 from diagnosis.words.tables import gap_table, parameters_table
 from diagnosis.words.verdict import headline, undecided_words, verdict
 from tests.unit.diagnosis_document import campaign, document
+from tests.unit.gap_campaigns import answer, nominal, studied
 from tests.unit.gap_campaigns import campaign as campaign_with
-from tests.unit.gap_campaigns import nominal, studied
 from tunnel_lab.report import view
 from tunnel_lab.report.page import render_report
 from tunnel_sim.effects import effect_class, effect_from
@@ -278,8 +277,12 @@ def test_springs_that_may_be_off_are_said_with_what_would_tell():
     text = said("spring_miscalibration", choices=[OFF, OFF | {"stiffness": 44.84, "error": 0.02}])
     assert "16.12 N m/rad by -1.961 ± 0.010 % (0.50) or 44.84 N m/rad by +2.000 ± 0.010 % (0.50)" in text
     assert "add runs with a third spring" in text
-    both = {"springs": [OFF, OFF | {"stiffness": 21.0}], "beside": ["coulomb_friction"]}
-    text = said("unknown", springs_off=both)
+    both = {
+        "kind": "two springs off",
+        "springs": [OFF, OFF | {"stiffness": 21.0}],
+        "beside": ["coulomb_friction"],
+    }
+    text = said("unknown", rivals=[both])
     assert "would explain the gap beside coulomb friction, such as 16.12 N m/rad by" in text
     assert text.endswith(": measure their stiffness again.")
 
@@ -307,15 +310,16 @@ def nearly_found(*weighed, noisy=False):
     base = nominal(data)
     lead = starting_points(base, effect_class("quadratic_damping"))[0]
     study = studied(data, base, ("quadratic_damping",), fit(lead.problem, lead.point, base=base))
-    answers = (Weighed(("unknown",), 1.0, 0.6), *weighed)
-    return nearly(replace(study, weighed=answers, test=replace(study.test, noisy=noisy)))
+    answers = (answer(("unknown",), 1.0, 0.6), *weighed)
+    gap = replace(study.gap, test=replace(study.gap.test, noisy=noisy))
+    return nearly(replace(study, answers=answers, gap=gap))
 
 
 def test_what_nearly_explains_a_gap_is_found_with_the_reason_why_it_is_not_named():
-    first = Weighed(("quadratic_damping",), 0.004, 0.3)
+    first = answer(("quadratic_damping",), 0.004, 0.3)
     found = nearly_found(first)
     assert found == Nearly(("quadratic_damping",), 1.0 - 0.004, 0.3)
-    rival = Weighed(("coulomb_friction",), 0.01, 0.2)
+    rival = answer(("coulomb_friction",), 0.01, 0.2)
     assert nearly_found(first, rival) == replace(found, rival=("coulomb_friction",), rival_probability=0.2)
     assert nearly_found(replace(first, probability=0.0), noisy=True).noisy
     assert nearly_found(replace(first, share=0.4)) is None

@@ -13,10 +13,10 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import by_moment
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.similar import similar_campaign
 from diagnosis.result import Diagnosis
+from diagnosis.search.views.by_moment import by_moment
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -25,12 +25,10 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import ParameterEstimate
-from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
 from identification.printing import estimated
 from tests.marks import slow
-from tests.unit.gap_campaigns import CN_BETA, CN_R, campaign, nominal, precise, studied
+from tests.unit.gap_campaigns import CN_BETA, CN_R, answer, campaign, nominal, precise, studied
 from tunnel_sim.effects import ALL_EFFECTS, effect_class, effect_from
 
 CAUSE = "quadratic_damping"
@@ -130,9 +128,9 @@ def test_the_nominal_model_s_coefficients_are_as_uncertain_as_they_are_wrong(dat
 
 def test_answers_count_without_their_part_of_the_even_share(data, base, best):
     names = ((CAUSE,), ("free_play",), ("unknown",))
-    weighed = tuple(Weighed(effects, 0.0, p) for effects, p in zip(names, (0.8, 0.04, 0.16), strict=True))
-    hypotheses = (Hypothesis((CAUSE,), best), Hypothesis(("free_play",), base))
-    study = replace(studied(data, base, (CAUSE,), best), weighed=weighed, hypotheses=hypotheses)
+    known = zip(names, (0.8, 0.04, 0.16), (best, base, None), strict=True)
+    answers = tuple(answer(effects, 0.0, p, fitted) for effects, p, fitted in known)
+    study = replace(studied(data, base, (CAUSE,), best), answers=answers)
     found = possible_answers(study, ())
     assert [one.fit for one in found.possible] == [best, base]
     assert [one.probability for one in found.possible] == pytest.approx(

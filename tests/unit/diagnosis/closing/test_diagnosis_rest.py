@@ -21,10 +21,9 @@ from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import PerInertia
 from diagnosis.result import ParameterEstimate
-from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
 from diagnosis.words.remainder import rest_words
-from tests.unit.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, campaign, nominal, studied
+from tests.unit.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, answer, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.writing import as_json
 
@@ -91,7 +90,11 @@ def judged(study, moved, std, excess=0.4):
 
 def unknown(data, base):
     study = studied(data, base, ("free_play",))
-    return replace(study, weighed=(Weighed(("unknown",), 0.2, 1.0),), test=replace(study.test, p_value=1e-9))
+    return with_p_value(replace(study, answers=(answer(("unknown",), 0.2, 1.0),)), 1e-9)
+
+
+def with_p_value(study, value):
+    return replace(study, gap=replace(study.gap, test=replace(study.gap.test, p_value=value)))
 
 
 @pytest.mark.parametrize(
@@ -126,7 +129,7 @@ def with_effect(base):
 
 def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
     study = studied(data, base, (CAUSE,), base)
-    found = judged(replace(study, test=replace(study.test, p_value=0.0)), 0.0, 0.0001)
+    found = judged(with_p_value(study, 0.0), 0.0, 0.0001)
     assert found.words == "Explained; what remains (0.40 noise powers) moves Cnβ by less than 0.02 %."
     assert judged(study, 0.0, None).words.startswith(
         "Explained; what remains (0.40 noise powers) concerns no"
@@ -135,9 +138,7 @@ def test_a_small_rest_of_a_named_cause_is_said_to_be_small(data, base):
 
 def test_no_gap_leaves_nothing(data, base):
     study = studied(data, base)
-    assert judged(replace(study, test=replace(study.test, p_value=0.7)), 0.0, 0.001).words.startswith(
-        "No gap"
-    )
+    assert judged(with_p_value(study, 0.7), 0.0, 0.001).words.startswith("No gap")
 
 
 @pytest.mark.parametrize(("std", "determined"), [(0.05, True), (1.0, True), (1000.0, False), (0.0, False)])

@@ -26,9 +26,10 @@ from diagnosis.result import Candidate
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise, SpectrumPart
 from diagnosis.search.random_moments import RandomAnswer
-from diagnosis.search.weigh import FittedSet, Weighed
+from diagnosis.search.study import Answer
+from diagnosis.search.weigh import FittedSet
 from diagnosis.settings import Settings
-from tests.unit.gap_campaigns import NOISE, nominal, studied
+from tests.unit.gap_campaigns import NOISE, answer, nominal, studied
 from tunnel_sim.effects import effect_class
 
 CAUSE, IDLE, HUM = "quadratic_damping", "cubic_stiffness", "mains_hum"
@@ -73,7 +74,7 @@ def test_a_hum_is_a_step_of_its_own_power(data, base, both):
 
 
 def test_an_unknown_gap_has_the_nominal_model_only(data, base):
-    study = replace(studied(data, base), weighed=(Weighed(("unknown",), 0.2, 1.0),))
+    study = replace(studied(data, base), answers=(answer(("unknown",), 0.2, 1.0),))
     found = waterfall(study, replace(NO_BASE, hum=0.5), {})
     assert [step.effect for step in found.steps] == [None]
     assert found.steps[0].excess > base.excess
@@ -160,7 +161,7 @@ def test_a_random_moment_comes_last_and_leaves_its_innovations(data, base):
         (kind,), process, Hypothesis((IDLE,), best), FittedSet((kind.name, IDLE), 0.01, np.zeros(6))
     )
     study = studied(data, base, (kind.name, IDLE, HUM))
-    study = replace(study, random=(random,), weighed=(Weighed((kind.name, IDLE), 0.01, 0.9),))
+    study = replace(study, answers=(Answer((kind.name, IDLE), 0.01, 0.9, random=random),))
     found = waterfall(study, replace(NO_BASE, hum=2.0), {})
     residuals = predict_held_out(best).residuals
     still = {run: float(np.mean(left**2)) - 1.0 for run, left in residuals.items()}
