@@ -16,7 +16,6 @@ from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival
 from diagnosis.search.sets import Sets
 from diagnosis.search.weigh import UNKNOWN
-from tunnel_sim.effects import Effect
 
 
 def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
@@ -27,7 +26,9 @@ def compared(sets: Sets, rivals: Sequence[Rival], clock: Clock) -> Sets:
     """
     sets = _with_near_sets(sets, clock)
     with clock.step("pruning"):
-        likely = sets.likely(sets.view.base.settings.search.outside_from)
+        least = sets.view.base.settings.search.outside_from
+        fitted = (sets.fitted(w.effects) for w in sets.weighed if w.probability > least)
+        likely = [hypothesis for hypothesis in fitted if hypothesis is not None]
         tried = (
             FoundRival(one, tuple(one.hypotheses(likely, sets.hypotheses, sets.view.base))) for one in rivals
         )
@@ -77,7 +78,8 @@ def prune(whole: Hypothesis, found: Sequence[Hypothesis]) -> list[Hypothesis]:
         names = tuple(name for name in whole.effects if name != kind.name)
         if names and tuple(sorted(names)) not in known:
             with suppress(FitError, np.linalg.LinAlgError):
-                smaller.append(Hypothesis(names, without(whole.fit, kind)))
+                start = restricted(whole.fit, names)
+                smaller.append(Hypothesis(names, fit(start.problem, start.point)))
     return smaller
 
 
@@ -108,13 +110,3 @@ def exchange(whole: Hypothesis, found: Sequence[Hypothesis], nominal: Fit) -> li
                 fitted = None if child.fit.converged else try_fit(child.fit.problem, child.fit.point)
                 sets.append(child if fitted is None else replace(child, fit=fitted))
     return sets
-
-
-def without(whole: Fit, kind: type[Effect]) -> Fit:
-    """Refit with one effect taken out, starting from the values of the others.
-
-    Raises:
-        FitError: when the model cannot be integrated.
-    """
-    start = restricted(whole, {other.name for other in whole.problem.effects} - {kind.name})
-    return fit(start.problem, start.point)

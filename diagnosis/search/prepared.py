@@ -96,15 +96,6 @@ class Prepared:
         """The second mode, where it alone makes up for a motion that the nominal model misses."""
         return second_mode_alone(self.nominal, self.able) if misses_motion(self.nominal) else None
 
-    @property
-    def in_stretches(self) -> bool:
-        """Whether the phase of the motion is lost, so that effects are sought in stretches of the runs.
-
-        An input holds the phase.
-        """
-        lost = self.ringing is None and misses_motion(self.nominal) and not self.campaign.driven
-        return bool(self.able) and lost
-
     def left_by_read_off(self, base: Fit) -> Array:
         """χ² by channel that no set of effects has to explain, shape (6,), dimensionless.
 

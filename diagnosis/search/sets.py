@@ -83,11 +83,6 @@ class Sets:
         found = self.fitted(names)
         return found if self.moment(names, found) is None else None
 
-    def likely(self, least: float) -> list[Hypothesis]:
-        """The fitted sets that are more probable than a fraction, the most probable first."""
-        found = (self.fitted(w.effects) for w in self.weighed if w.probability > least)
-        return [hypothesis for hypothesis in found if hypothesis is not None]
-
     def without(self, names: Names, lost: Names) -> Sets:
         """The sets without one, some of whose effects no half of the records shows.
 

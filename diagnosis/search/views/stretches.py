@@ -156,8 +156,9 @@ class InStretches(View):
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
-        """The first view of a motion whose phase the nominal model loses."""
-        if known is not None or not prepared.in_stretches:
+        """The first view of a motion whose phase the nominal model loses; an input holds the phase."""
+        lost = prepared.ringing is None and misses_motion(prepared.nominal) and not prepared.campaign.driven
+        if known is not None or not prepared.able or not lost:
             return None
         with clock.step("effects"):
             return cls.of(prepared)

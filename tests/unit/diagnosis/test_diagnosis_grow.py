@@ -12,7 +12,7 @@ from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search import grow as growth
-from diagnosis.search.compare import exchange, prune, without
+from diagnosis.search.compare import exchange, prune
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, with_forms
 from diagnosis.search.weigh import weigh
@@ -210,7 +210,8 @@ def test_an_effect_taken_out_leaves_the_fit_without_it():
     second = starting_points(ringing, effect_class("quadratic_damping"))[0]
     both = fit(second.problem, second.point, base=ringing)
     assert list(both.problem.parameters.own_places) == ["second_mode"]
-    left = without(both, effect_class("second_mode"))
+    pruned = prune(Hypothesis(("second_mode", "quadratic_damping"), both), [])
+    (left,) = (one.fit for one in pruned if one.effects == ("quadratic_damping",))
     direct = starting_points(base, effect_class("quadratic_damping"))[0]
     assert left.problem.effects == (effect_class("quadratic_damping"),)
     assert left.point.release.shape == base.point.release.shape
