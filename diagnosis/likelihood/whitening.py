@@ -10,23 +10,19 @@ from scipy.linalg import solve_triangular
 
 from tunnel_sim.vocabulary.record import Array
 
-#: The filter of white noise, which changes nothing.
-WHITE: Array = np.ones(1)
-
 
 def whiten(values: Array, whitening: Array) -> Array:
     """Predict every value from those before it, and keep the errors.
 
     Args:
         values: of a record, or of several in columns, shape (n,) or (n, k), any unit.
-        whitening: the errors' filter, 1 and the negative autoregressive coefficients, shape (order + 1,).
+        whitening: the errors' filter, 1 and the negative autoregressive coefficients, shape (order + 1,),
+            of order 1 or more.
 
     Returns:
         Of the values' shape and unit. Noise of that spectrum becomes white with the variance of its innovations;
         the first values are predicted from the fewer before them, and scaled to the same variance.
     """
-    if whitening.size == 1:
-        return values
     start = _start(whitening.tobytes())[: len(values), : len(values)]
     with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
         errors = _convolved(values, whitening)
@@ -41,8 +37,6 @@ def colour(errors: Array, whitening: Array) -> Array:
         errors: shape (n,), any unit.
         whitening: the filter, shape (order + 1,).
     """
-    if whitening.size == 1:
-        return errors
     from scipy.signal import lfilter, lfiltic  # only here: slow to load
 
     start = _start(whitening.tobytes())[: errors.size, : errors.size]
@@ -79,7 +73,7 @@ def colouring(whitening: Array) -> float:
     Args:
         whitening: the filter, shape (order + 1,).
     """
-    return 1.0 if whitening.size == 1 else 1.0 / float(_start(whitening.tobytes())[0, 0])
+    return 1.0 / float(_start(whitening.tobytes())[0, 0])
 
 
 def _convolved(values: Array, whitening: Array) -> Array:

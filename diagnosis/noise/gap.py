@@ -17,6 +17,7 @@ from diagnosis.likelihood.per_run import excited
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
 from diagnosis.noise.colour import alike_in_all_runs, noise_colour, whitened, zero_wanders
 from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
@@ -90,12 +91,12 @@ def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
     sample. None where none is raised.
     """
     raised = [
-        float(np.clip(np.mean(error**2), run.noise_variance, run.noise_variance * run.block))
+        float(np.clip(np.mean(error**2), run.noise.variance, run.noise.variance * run.block))
         for run, error in zip(data.runs, errors, strict=True)
     ]
-    if all(run.noise_variance == value for run, value in zip(data.runs, raised, strict=True)):
+    if all(run.noise.variance == value for run, value in zip(data.runs, raised, strict=True)):
         return None
-    runs = [replace(run, noise_variance=value) for run, value in zip(data.runs, raised, strict=True)]
+    runs = [replace(run, noise=WhiteNoise(value)) for run, value in zip(data.runs, raised, strict=True)]
     return data.with_runs(tuple(runs))
 
 
@@ -282,7 +283,7 @@ def gap_or_colour(
         if believed if test.detected else noise_alone:
             return white, coloured, test
     blurred = max(noise.white(step).values()) >= 0.5 * step
-    power = nominal.excess * max(run.noise_variance for run in nominal.problem.data.runs)
+    power = nominal.excess * max(run.noise.variance for run in nominal.problem.data.runs)
     if plain.detected and not coarse_step and not blurred and power < step**2 / 12.0:
         plain = replace(plain, detected=False, p_value=1.0, within_step=True)
     return nominal, noise, plain

@@ -170,7 +170,7 @@ def located(study: Study) -> Place:
     if study.place is not None:
         return study.place
     stated = study.noise.stated_variance if study.coarse else None
-    level = float(np.mean([run.noise_variance * run.block for run in study.nominal.problem.data.runs]))
+    level = float(np.mean([run.noise.variance * run.block for run in study.nominal.problem.data.runs]))
     return locate(
         study.campaign,
         study.nominal,

@@ -89,7 +89,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     records = {run.id: run.record for run in campaign.runs}
     relative = [estimate_variance(records[run.id])[1] for run in data.runs]
     # by sample, not by block: where all runs share one level it was pooled over them
-    levels = [run.noise_variance * run.block for run in data.runs]
+    levels = [run.noise.variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
     relative = [float(np.hypot(value, fit.settings.where.noise_std)) for value in relative]

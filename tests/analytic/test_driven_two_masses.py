@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
 from tunnel_sim.effects import effect_class
@@ -90,7 +91,16 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool) -> None:
     expected = two_masses(hold, 20.0, on_body=True, start=(start[0] * (1.0 + SPRING * COMPLIANCE), start[1]))
     drive = DriveMoment(TIME, MOMENT, held=hold == "zero")
     data = RunData(
-        "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, 1e-8, SPRING, 20.0, DENSITY, TIME[-1], drive=drive
+        "r",
+        np.zeros(TIME.size - 1),
+        1,
+        1.0 / RATE,
+        WhiteNoise(1e-8),
+        SPRING,
+        20.0,
+        DENSITY,
+        TIME[-1],
+        drive=drive,
     )
     body = RIG.body
     problem = Problem(
@@ -106,7 +116,9 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool) -> None:
 def test_a_rod_too_stiff_to_ring_acts_by_its_first_order() -> None:
     """Steps of a fit would not follow its ringing; the rigid rod of the same first order moves alike."""
     kind, drive = effect_class("rod_flexibility"), DriveMoment(TIME, MOMENT)
-    data = RunData("r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, 1e-8, SPRING, 0.0, 0.0, TIME[-1], drive=drive)
+    data = RunData(
+        "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, WhiteNoise(1e-8), SPRING, 0.0, 0.0, TIME[-1], drive=drive
+    )
     problem = Problem(Data((data,), 1.0, 1.0, 1.0, Rig()), (kind,))
     release = np.array([[0.1, 0.3]])
 

@@ -132,7 +132,7 @@ def test_an_effect_beneath_coloured_noise_is_still_a_gap(name, effect):
     fit, noise, found = judged(coloured(campaign(effect), name))
     assert found.detected
     assert noise.colour is not None
-    assert fit.problem.data.runs[0].whitening.size > 1
+    assert not fit.problem.data.runs[0].noise.plain
     assert min(found.tests, key=found.tests.__getitem__) in ("below", "f0", "offset")
 
 
@@ -146,7 +146,7 @@ def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
     fit, noise, found = judged(data)
     assert found.detected
     assert noise.colour is not None
-    assert all(run.whitening.size > 1 for run in fit.problem.data.runs)
+    assert not any(run.noise.plain for run in fit.problem.data.runs)
     still = [r for run, r in zip(fit.problem.data.runs, fit.residuals, strict=True) if not run.wind_on]
     assert np.mean(np.concatenate(still) ** 2) == pytest.approx(1.0, abs=0.3)
 
@@ -182,7 +182,7 @@ def test_white_noise_is_left_alone(seed):
     )
     assert fit is before
     assert noise.colour is None
-    assert all(run.whitening.size == 1 for run in fit.problem.data.runs)
+    assert all(run.noise.plain for run in fit.problem.data.runs)
 
 
 @pytest.mark.parametrize("keep", [(0.0, 15.0, 25.0), (15.0, 25.0), (25.0,)])
@@ -193,7 +193,7 @@ def test_turbulence_is_not_taken_for_coloured_noise(keep):
     fit, noise, found = judged(data)
     assert found.detected
     assert noise.colour is None
-    assert fit.problem.data.runs[0].whitening.size == 1
+    assert fit.problem.data.runs[0].noise.plain
 
 
 @pytest.mark.parametrize(

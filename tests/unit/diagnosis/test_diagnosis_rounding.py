@@ -69,7 +69,7 @@ def test_noise_that_blurs_the_steps_needs_no_allowance():
     noise = campaign_noise(data, Settings().noise)
     fit = fit_nominal(prepare(data, noise.variance))
     assert rounding_errors(fit, noise.white(reading_step(data)), reading_step(data)) is None
-    assert judged(data)[0].problem.data.runs[0].noise_variance == noise.variance["r01"] / 2
+    assert judged(data)[0].problem.data.runs[0].noise.variance == noise.variance["r01"] / 2
 
 
 @pytest.mark.parametrize("share", [0.1, 0.2])
@@ -94,7 +94,7 @@ def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
     for run, error in zip(allowed.runs, errors, strict=True):
         assert run.block == 4
         assert np.mean(error**2) == pytest.approx(DEGREE**2 / 12.0, rel=0.3)
-        assert run.noise_variance > 0.7 * noise.variance[run.id]
+        assert run.noise.variance > 0.7 * noise.variance[run.id]
 
 
 def test_the_errors_of_stretches_are_those_of_their_runs():
