@@ -50,7 +50,7 @@ def diagnose(
     *,
     kinds: Sequence[type[Effect]] | None = None,
     progress: Progress | None = None,
-    model: JointModel | None = None,
+    model: JointModel | NominalModel | None = None,
     settings: Settings = Settings(),
 ) -> Diagnosis:
     """Find where the nominal model departs from the runs, which effect causes it, and how far the gap closes.
@@ -59,7 +59,8 @@ def diagnose(
         campaign: the runs; or their folder, or one file of a data logger.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
-        model: a model of one's own, from `read_model`, which is then the nominal model.
+        model: a model of one's own, from `read_model`, whose joint is then the nominal model; or a nominal model
+            of one's own kind.
         settings: every number that decides.
 
     Returns:
@@ -70,9 +71,9 @@ def diagnose(
             cannot be fitted to them.
     """
     campaign = as_campaign(campaign)
-    own: NominalModel | None = None
-    if model is not None:
-        campaign, own = with_law(campaign, model.law)
+    joint, own = (None, model) if isinstance(model, NominalModel) else (model, None)
+    if joint is not None:
+        campaign, own = with_law(campaign, joint.law)
     refuse_undiagnosable(campaign, own)
     kinds = known_effects() if kinds is None else kinds
     say = progress or (lambda _: None)
@@ -88,11 +89,11 @@ def diagnose(
         where, maps = localise(study)
         patched: PatchedModel | None = None
         unpatched: tuple[str, ...] = ()
-        if model is not None:
+        if joint is not None:
             from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
 
             try:
-                patched = patched_model(study, model)
+                patched = patched_model(study, joint)
             except TunnelError as error:
                 unpatched = (f"{UNPATCHED}: {error.what}.",)
         by_moment = (BY_MOMENT,) if study.by_moment else ()

@@ -39,9 +39,9 @@ def part(share: float) -> str:
     if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
         return f"{100.0 * share:.3g} %"
     ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
-    return (
-        f"a {ordinal}".replace("a eighth", "an eighth") if count == 1 else f"{_CARDINALS[count]} {ordinal}s"
-    )
+    if count > 1:
+        return f"{_CARDINALS[count]} {ordinal}s"
+    return ordinal if ordinal == "half" else f"{'an' if ordinal == 'eighth' else 'a'} {ordinal}"
 
 
 def plain(*names: str) -> str:
@@ -98,7 +98,7 @@ def decision(
     for answer in sorted(answers, key=lambda given: -given[1]):
         credible.append(answer)
         together += answer[1]
-        if together >= chosen.credible:
+        if together >= chosen.credible_from:
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]

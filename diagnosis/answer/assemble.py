@@ -55,8 +55,9 @@ def localise(study: Study) -> tuple[Where, Maps]:
         channel=place.channel.value,
         condition=place.condition.value,
         runs=place.runs,
-        time_s=blow_interval(found, chosen.interval, chosen) or found.maps.time.interval(chosen.interval),
-        amplitude_rad=found.maps.amplitude.interval(chosen.interval),
+        time_s=blow_interval(found, chosen.interval_share, chosen)
+        or found.maps.time.interval(chosen.interval_share),
+        amplitude_rad=found.maps.amplitude.interval(chosen.interval_share),
         frequency_hz=found.frequency_interval,
     )
     bands = bands_beyond_chance(found.maps.bands, chosen)

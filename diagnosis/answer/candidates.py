@@ -18,6 +18,8 @@ from diagnosis.search.investigate import COARSE_STEP, HUM, Study
 from diagnosis.search.process_noise import LONGEST_BANDWIDTH
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import GapSettings
+from identification.signal.decay_fit import Reading, fit_run
+from identification.signal.free_decay import Decay
 from tunnel_sim.effects import known_effects
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.vocabulary.record import Array
@@ -152,7 +154,7 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
             bound = fit.bound(name)
             std = None if bound else fit.std(name) * inflate
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
-            undetermined = study.settings.answer.undetermined
+            undetermined = study.settings.answer.undetermined_from
             found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
@@ -186,6 +188,8 @@ def _parameters(study: Study, effects: tuple[str, ...]) -> dict[str, ParameterEs
 
 
 _CYCLES = 3.0
+_FEWEST = 10  # block means in them
+_CLOSE = 1e-12  # tolerance of the fit of a curve without noise
 _SHARE = 0.5  # of the largest swing: an amplitude that every run passes through
 
 
@@ -236,28 +240,13 @@ def cause_sizes(study: Study) -> tuple[CauseSize, ...]:
     return tuple(sizes)
 
 
-def _decay(interval: float, curve: Array, frequency: float) -> Sequence[float] | None:
+def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, float, float] | None:
     """Angular frequency (rad/s), damping ratio and mean of a few cycles; None where they are no decay."""
-    from scipy.optimize import least_squares  # only here: slow to load
-
-    time = (np.arange(curve.size) + 0.5) * interval
-
-    def left(point: Array) -> Array:
-        omega, delta, a, b, zero = point
-        swing: Array = np.exp(-delta * time) * (a * np.cos(omega * time) + b * np.sin(omega * time)) + zero
-        return swing - curve
-
-    if curve.size < 10 or not np.all(np.isfinite(curve)):
+    if curve.size < _FEWEST or not np.all(np.isfinite(curve)):
         return None
-    size = 0.5 * float(np.ptp(curve))
-    omega = 2.0 * np.pi * frequency
-    try:
-        with np.errstate(over="raise", invalid="raise"):
-            found = least_squares(left, (omega, 0.0, size, 0.0, 0.0), method="lm")
-    except (ValueError, FloatingPointError):
+    reading = Reading(interval * np.arange(curve.size, dtype=np.float64), curve)
+    found = fit_run(reading, Decay(0.0, (2.0 * np.pi * frequency) ** 2), tolerance=_CLOSE)
+    if not found.runs or found.runs[0].decay.stiffness <= 0.0:
         return None
-    if not found.success:
-        return None
-    omega, delta, *_, zero = found.x
-    natural = float(np.hypot(omega, delta))
-    return natural, float(delta) / natural, float(zero)
+    decay = found.runs[0].decay
+    return decay.omega_n, decay.zeta, found.zero

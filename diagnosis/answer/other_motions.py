@@ -40,8 +40,8 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[str, ...]:
     Returns:
         A sentence for each run in which two decaying oscillations leave far less than one, and are farther
         apart than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its
-        first half or its first quarter. What dies out before it swings to the other side is not a mode. Driven runs are left
-        out.
+        first half or its first quarter. What dies out before it swings to the other side is not a mode. Driven
+        runs are left out.
     """
     found = []
     for run in campaign.runs:

@@ -81,7 +81,7 @@ def cautions(
             f"probabilities come from the fits, and may be wrong by as much."
         )
     windy = any(run.wind_on for run in campaign.runs)
-    if len(campaign.runs) < chosen.few_runs:
+    if len(campaign.runs) < chosen.runs_without_caution:
         motion, others = "decay", "with other springs and release angles"
         if campaign.driven:
             motion, others = "motion", "with other inputs"

@@ -17,11 +17,9 @@ from diagnosis.model.rig import Rig
 from diagnosis.model.starts import Shown, responses
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
-from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, one_line
-from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import JointLaw
 
 if TYPE_CHECKING:
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import Recorded
 
 _SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
-_PHASES = 64  # of a cycle, for its mean
 _FEW = 5  # blocks whose readings say how fast a run begins
 _OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
 _SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
@@ -81,9 +78,9 @@ class _OfLaw(NominalModel):
         return {"friction_moment": self.law.friction}
 
     @property
-    def program(self) -> tuple[float, ...]:
-        """The terms of its law."""
-        return departure(self.law).program({}, {"b": "angle", "r": "rate"}) if self.law.terms else ()
+    def moment(self) -> str:
+        """The terms of its law, of the displacement from its rest."""
+        return "".join(f"-({term.coefficient!r})*({term.expression})" for term in self.law.terms)
 
     @property
     def lead(self) -> float:
@@ -190,17 +187,6 @@ class Joint(_OfLaw, Rig):
             for r in data.runs
         ]
         return Start({"yaw_inertia": inertia, "mechanical_damping": damping, "zero": law.rest}, own)
-
-    def springs_at(self, data: Data, amplitude: Array) -> Array:
-        """Stiffness by the law at the amplitude of every run, by harmonic balance, N m/rad, shape (runs,)."""
-        spring = super().springs_at(data, amplitude)
-        if not self.law.terms:
-            return spring
-        phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
-        swing = amplitude[:, None]
-        further = departure(self.law).value({"b": swing * np.cos(phase), "r": 0.0})
-        seen = spring - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude, 1e-12)
-        return np.where(seen > 0.0, seen, spring)
 
     def tells(self, info: ParameterInfo, swing: float) -> bool:
         """Where gravity alone restores the joint, its rest is one with the sensor's zero."""
@@ -333,13 +319,3 @@ def _of_joint(run: Run, drive: Drive, law: JointLaw) -> Drive:
             )
             raise TunnelError(what, where=where, remedy=remedy)
     return replace(drive, gain=actuator.gain)
-
-
-def departure(law: JointLaw) -> Expression:
-    """The moment that a joint's law has beside its linear spring, damper and friction; it has one term or more.
-
-    Returns:
-        Of the displacement ``b`` from rest (rad) and its rate ``r`` (rad/s), in N m.
-    """
-    text = "".join(f"-({term.coefficient!r})*({term.expression})" for term in law.terms)
-    return parse(text, frozenset("br"))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ from diagnosis.likelihood.nondimensional import REFERENCE_STIFFNESS, Similarity
 from diagnosis.model.parameters import Parameter, released
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
+from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
@@ -202,7 +204,7 @@ class NominalModel:
             release_rate=values["release_rate"],
             duration=run.duration,
             parameters=self.law_parameters,
-            program=self.program,
+            program=_program(self.moment, spring) if self.moment else (),
             drive=run.moment(values.get("drive_gain", 1.0), values.get("moment_offset", 0.0)),
         )
 
@@ -218,9 +220,13 @@ class NominalModel:
         return {}
 
     @property
-    def program(self) -> tuple[float, ...]:
-        """The moment beside a linear spring and damper, as the moment law evaluates it; empty: none."""
-        return ()
+    def moment(self) -> str:
+        """The moment beside a linear spring and damper, N m, as an expression; empty: none.
+
+        Of the angle ``b`` (rad) from rest, the rate ``r`` (rad/s) and the stiffness ``Kr`` of the run's spring
+        (N m/rad), as effects of one's own are stated. Effects come beside it.
+        """
+        return ""
 
     @property
     def lead(self) -> float:
@@ -254,13 +260,23 @@ class NominalModel:
         return ()
 
     def springs_at(self, data: Data, amplitude: Array) -> Array:
-        """Stiffness of every run's spring at an amplitude, N m/rad, shape (runs,).
+        """Stiffness of every run's spring at an amplitude, by harmonic balance, N m/rad, shape (runs,).
 
         Args:
             amplitude: rad, shape (runs,).
         """
-        del amplitude
-        return np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+        spring = np.array([run.spring_stiffness for run in data.runs], dtype=np.float64)
+        if not self.moment:
+            return spring
+        phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+        at: dict[str, float | Array] = {
+            "b": amplitude[:, None] * np.cos(phase),
+            "r": 0.0,
+            "Kr": spring[:, None],
+        }
+        further = _expression(self.moment).value(at)
+        seen = spring - 2.0 * np.mean(further * np.cos(phase), axis=1) / np.maximum(amplitude, 1e-12)
+        return np.where(seen > 0.0, seen, spring)
 
     # ---- its starting points ----
 
@@ -373,6 +389,18 @@ class NominalModel:
         return tuple(sorted({round(k * f, 2) for k in data.springs for f in _FACTORS} | set(data.springs)))
 
 
+@lru_cache(maxsize=8)
+def _expression(text: str) -> Expression:
+    return parse(text, frozenset({"b", "r", "Kr"}))
+
+
+@lru_cache(maxsize=64)  # springs of a campaign
+def _program(text: str, spring: float) -> tuple[float, ...]:
+    """A moment beside spring and damper as the moment law evaluates it."""
+    return _expression(text).program({"Kr": spring}, {"b": "angle", "r": "rate"})
+
+
+_PHASES = 64  # of a cycle, for its mean
 _FACTORS = (0.5, 1.0, 2.0)  # on the stiffnesses of the campaign's springs
 ALWAYS_BLIND = (
     "a constant sensor lag or filter: it only shifts the release",

@@ -83,8 +83,9 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     spring = np.array([-offset, physics.spring_stiffness - law.stiffness, 0.0, 0.0])
     damping = np.array([physics.mechanical_damping + loss - law.damping, 0.0, 0.0])
     # the part of the program that effects added to the model's own
-    program = physics.program[len(data.model.program) :]
-    if data.model.program and program:
+    own_program = problem.stated(common, release, data.runs[index]).program
+    program = physics.program[len(own_program) :]
+    if own_program and program:
         program = (_number("number"), 0.0, *program)
     known = {"Kr": physics.spring_stiffness, **physics.parameters}
     for terms, name, grid, forms, native in (

@@ -111,7 +111,7 @@ def chosen_kind(
     most_of_all, most_of_one = (
         max((c.closed for c in kinds.values()), default=0.0) for kinds in (of_all, of_one)
     )
-    if max(most_of_all, most_of_one) < chosen.least_closed:
+    if max(most_of_all, most_of_one) < chosen.closable_from:
         return "noise" if len(of_all) + len(of_one) == len(common) + len(single) else None
     among = of_all if most_of_all >= chosen.common_first * most_of_one else of_one
     best = max(among.values(), key=lambda one: one.closed)

@@ -217,7 +217,7 @@ def _worth_fitting(
         needed, own = [], own_gain(parent.fit.problem)
         for kind, starts in scored[: chosen.grown_by]:
             by_chance = own_gain(starts[0].problem) - own
-            if starts[0].predicted_drop > chosen.predicted_drop + by_chance:
+            if starts[0].predicted_drop > chosen.least_drop + by_chance:
                 needed.append((kind, starts))
         return needed
     limit = chosen.predicted_share * parent.fit.total

@@ -29,7 +29,7 @@ class WhereSettings:
         "judgement",
         "The skirt of a resonance has less.",
     )
-    noise_std: float = setting(
+    run_noise_std: float = setting(
         0.015,
         "Standard deviation of a single run's noise about that of the campaign.",
         "judgement",
@@ -46,7 +46,7 @@ class WhereSettings:
     one_run_of: int = setting(
         3, "Fewest runs among which one may have most of the excess.", "judgement", unit="runs"
     )
-    interval: float = setting(0.8, "Share of the excess in a stated interval.", "judgement")
+    interval_share: float = setting(0.8, "Share of the excess in a stated interval.", "judgement")
     blow_share: float = setting(
         0.5, "Share of the missing moment's energy in the time of a blow.", "convention", "Most of it."
     )
@@ -113,7 +113,9 @@ class AnswerSettings:
         "judgement",
         "An answer that predicts less has followed the readings that it was fitted to.",
     )
-    credible: float = setting(0.9, "Probability of the smallest set of answers that is stated.", "convention")
+    credible_from: float = setting(
+        0.9, "Probability of the smallest set of answers that is stated.", "convention"
+    )
     in_common: float = setting(
         0.9, "Probability from which an effect or a channel is common to the likely answers.", "convention"
     )
@@ -217,7 +219,7 @@ class AnswerSettings:
         "convention",
         "Derivatives are quoted to a per cent.",
     )
-    undetermined: float = setting(
+    undetermined_from: float = setting(
         10.0,
         "Standard deviation over a parameter's value and usual size from which it is not determined.",
         "judgement",

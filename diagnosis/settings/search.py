@@ -21,7 +21,7 @@ class SearchSettings:
     predicted_share: float = setting(
         0.01, "Predicted drop, as a share of χ², from which others are fitted too.", "judgement"
     )
-    predicted_drop: float = setting(
+    least_drop: float = setting(
         20.0,
         "Predicted drop of χ² from which an effect is fitted beside others.",
         "judgement",

@@ -22,7 +22,7 @@ class RemainderSettings:
         "judgement",
         "Of a small excess, laws may close more than all.",
     )
-    least_closed: float = setting(
+    closable_from: float = setting(
         0.1, "Share of what is left that some law must close for it to be more than noise.", "judgement"
     )
     common_first: float = setting(
@@ -86,7 +86,7 @@ class RemainderSettings:
 class WordsSettings:
     """What is said."""
 
-    few_runs: int = setting(3, "With fewer runs a caution is given.", "judgement", unit="runs")
+    runs_without_caution: int = setting(3, "With fewer runs a caution is given.", "judgement", unit="runs")
     noise_contradicted: float = setting(
         3.0,
         "A caution is given where the stated noise is wrong by this factor.",
@@ -144,7 +144,10 @@ class WordsSettings:
         0.005, "Probability from which an answer is listed in a table.", "judgement"
     )
     answer_drawn: float = setting(
-        0.01, "Probability from which an answer is drawn or described in the report.", "judgement"
+        0.01, "Probability from which an answer is drawn in the report.", "judgement"
+    )
+    answer_described: float = setting(
+        0.01, "Probability from which an answer is described in the report.", "judgement"
     )
     effect_listed: float = setting(
         0.01, "Probability from which an effect is listed among the causes.", "judgement"

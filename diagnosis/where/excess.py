@@ -92,7 +92,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     levels = [run.noise.variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
-    relative = [float(np.hypot(value, fit.settings.where.noise_std)) for value in relative]
+    relative = [float(np.hypot(value, fit.settings.where.run_noise_std)) for value in relative]
     shared = len(fit.problem.names) / len(data.runs)
     return [
         RunExcess(

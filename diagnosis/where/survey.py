@@ -147,7 +147,7 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     # no bin is narrower than the shortest record resolves
     resolved = max(float(run.frequency[1]) for run in excesses)
     fine = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
-    interval = _spectrum(kept, fine).interval(settings.interval)
+    interval = _spectrum(kept, fine).interval(settings.interval_share)
     if interval is not None:
         interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
     return Survey(maps, excesses, interval, energy, z)

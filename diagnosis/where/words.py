@@ -87,7 +87,7 @@ def describe(
     if where.frequency_hz is not None:
         places.append(f"at {where.frequency_hz[0]:.2f} to {where.frequency_hz[1]:.2f} Hz")
     if places:
-        parts.append(f"{part(settings.where.interval).capitalize()} of it lie {', '.join(places)}.")
+        parts.append(f"{part(settings.where.interval_share).capitalize()} of it lie {', '.join(places)}.")
     whole = sum(max(band.excess, 0.0) for band in found.maps.bands)
     shown = [b for b in found.maps.bands if b.band in bands and b.excess > chosen.band_listed * whole]
     if shown and whole > 0.0:

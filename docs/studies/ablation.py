@@ -1,9 +1,9 @@
-"""What is lost without a constant of the diagnosis? On campaigns whose truth is open.
+"""What is lost without a setting of the diagnosis? On campaigns whose truth is open.
 
 Every number that decides is moved by a factor of two either way, or switched off, and campaigns are answered again:
 
-- the constants of the weighing (decision 0007) on the fits that are there: the sets are only weighed again;
-- any other constant of `diagnosis.policy` by whole diagnoses, which takes as long as they do.
+- the settings of the weighing (decision 0007) on the fits that are there: the sets are only weighed again;
+- any other setting by whole diagnoses, which takes as long as they do.
 
     python -m docs.studies.ablation SET [--count N] [--rerun NAME ...] [--odds] [--search]
 
@@ -20,46 +20,46 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from diagnosis.policy import DECIDED_FROM
 from scipy.optimize import minimize
 
-from diagnosis import diagnose, policy
+from diagnosis import Settings, diagnose
 from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.search import investigate as investigation
 from diagnosis.search import weigh as decide
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed
-from diagnosis.settings import Settings
+from diagnosis.settings import WeighingSettings
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 WEIGHING = (
-    "STEEPNESS",
-    "SET_PRICE",
-    "FORM_PRICE",
-    "MODEL_ERROR",
-    "FORM_ERROR",
-    "LEAK",
-    "NEEDLESS_CHI2",
-    "CHANCE_STDS",
-    "UNKNOWN_AT",
-    "UNKNOWN_GAP",
-    "UNKNOWN_LEFT",
-    "EVEN_SHARE",
+    "weighing.steepness",
+    "weighing.set_price",
+    "weighing.form_price",
+    "weighing.model_error",
+    "weighing.form_error",
+    "weighing.leak",
+    "weighing.needless_chi2",
+    "weighing.chance_stds",
+    "weighing.unknown_at",
+    "weighing.unknown_gap",
+    "weighing.unknown_left",
+    "weighing.least_closed",
+    "weighing.unknown_from",
+    "weighing.even_share",
 )
-"""Constants that only weigh fits."""
+"""Settings that only weigh fits."""
 FACTORS = (0.0, 0.5, 2.0)
 """By which each is multiplied; 0 switches it off."""
 
-ODDS = ("UNKNOWN_AT", "UNKNOWN_GAP", "UNKNOWN_LEFT")
+ODDS = ("weighing.unknown_at", "weighing.unknown_gap", "weighing.unknown_left")
 _LEAST = 0.02  # of a probability: what is certain and wrong must not decide alone
 
 Names = tuple[str, ...]
@@ -89,17 +89,18 @@ class Case:
         """Whether an answer is the truth, but for small effects."""
         return set(causes) - self.small == set(self.truth)
 
-    def answers(self, withheld: str | None = None) -> list[tuple[Names, float]]:
+    def answers(
+        self, withheld: str | None = None, chosen: WeighingSettings = Settings().weighing
+    ) -> list[tuple[Names, float]]:
         """The answers with their probabilities, the answer first.
 
         Args:
             withheld: an effect whose sets are deleted.
+            chosen: how the sets are weighed.
         """
         if self.nominal is None:
             return [(self.causes, 1.0)]
-        found = decide.weigh(
-            [s for s in self.sets if withheld not in s.effects], self.nominal, Settings().weighing
-        )
+        found = decide.weigh([s for s in self.sets if withheld not in s.effects], self.nominal, chosen)
         return [
             (UNKNOWN if a.effects == UNKNOWN else tuple(sorted({*self.read_off, *a.effects})), a.probability)
             for a in found
@@ -136,12 +137,13 @@ class Tally:
         )
 
 
-def tally(cases: Sequence[Case]) -> Tally:
+def tally(cases: Sequence[Case], settings: Settings = Settings()) -> Tally:
     """Answer all cases and count."""
+    chosen, decided_from = settings.weighing, settings.answer.decided_from
     exact = false = named = stated = trials = 0
     logs = []
     for case in cases:
-        answers = case.answers()
+        answers = case.answers(chosen=chosen)
         causes = answers[0][0]
         exact += case.right(causes)
         logs.append(np.log(max(sum(p for names, p in answers if case.right(names)), 1e-3)))
@@ -151,31 +153,21 @@ def tally(cases: Sequence[Case]) -> Tally:
         if case.nominal is None or case.truth == UNKNOWN:
             continue
         for effect in set(case.truth) - set(case.read_off):
-            causes, probability = case.answers(effect)[0]
+            causes, probability = case.answers(effect, chosen)[0]
             trials += 1
-            stated += causes != UNKNOWN and probability >= DECIDED_FROM
+            stated += causes != UNKNOWN and probability >= decided_from
     return Tally(exact, len(cases), false, named, float(np.mean(logs)), stated, trials)
 
 
-@contextmanager
-def changed(name: str, factor: float) -> Iterator[None]:
-    """Multiply a constant of the policy wherever it is used.
+def moved(name: str, factor: float) -> Settings:
+    """The settings with one of them multiplied.
 
     Args:
-        name: of the constant.
+        name: of the setting, with its stage.
         factor: dimensionless.
     """
-    value = getattr(policy, name)
-    users = [
-        m for key, m in sys.modules.items() if key.startswith("diagnosis") and getattr(m, name, None) is value
-    ]
-    try:
-        for module in users:
-            setattr(module, name, type(value)(value * factor))
-        yield
-    finally:
-        for module in users:
-            setattr(module, name, value)
+    value = Settings().values()[name]
+    return Settings().changed({name: type(value)(value * factor)})
 
 
 @contextmanager
@@ -183,9 +175,9 @@ def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterato
     """Keep what is weighed meanwhile."""
     weigh = decide.weigh
 
-    def kept(sets: Sequence[FittedSet], nominal: ChannelMisfit) -> list[Weighed]:
+    def kept(sets: Sequence[FittedSet], nominal: ChannelMisfit, chosen: WeighingSettings) -> list[Weighed]:
         seen.append((sets, nominal))
-        return weigh(sets, nominal)
+        return weigh(sets, nominal, chosen)
 
     investigation.weigh = kept  # type: ignore[attr-defined]
     try:
@@ -195,7 +187,11 @@ def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterato
 
 
 def read_case(
-    folder: Path, truth: Sequence[str], small: Sequence[str], only: Sequence[str] | None = None
+    folder: Path,
+    truth: Sequence[str],
+    small: Sequence[str],
+    only: Sequence[str] | None = None,
+    settings: Settings = Settings(),
 ) -> Case:
     """Diagnose a campaign, and keep the sets that are weighed last.
 
@@ -209,7 +205,7 @@ def read_case(
     kinds = None if only is None else [effect_class(name) for name in only]
     try:
         with _weighings(seen):
-            found = diagnose(read_campaign(folder), kinds=kinds)
+            found = diagnose(read_campaign(folder), kinds=kinds, settings=settings)
     except TunnelError:
         return replace(given, causes=("refused",))
     read_off = tuple(set(found.causes) & {"mains_hum", "sensor_quantisation"})
@@ -219,9 +215,12 @@ def read_case(
     return replace(given, read_off=read_off, sets=tuple(sets), nominal=nominal)
 
 
-def read_cases(folder: Path, count: int) -> list[Case]:
+def read_cases(folder: Path, count: int, settings: Settings = Settings()) -> list[Case]:
     """The first campaigns of an opened set, with its key."""
-    return [read_case(folder / name, effects, small) for name, effects, small in _truths(folder, count)]
+    return [
+        read_case(folder / name, effects, small, settings=settings)
+        for name, effects, small in _truths(folder, count)
+    ]
 
 
 def _truths(folder: Path, count: int) -> list[tuple[str, list[str], list[str]]]:
@@ -232,27 +231,25 @@ def _truths(folder: Path, count: int) -> list[tuple[str, list[str], list[str]]]:
 
 
 def fitted_odds(cases: Sequence[Case]) -> dict[str, float]:
-    """The constants of the odds against ``unknown`` under which the truth is most probable.
+    """The settings of the odds against ``unknown`` under which the truth is most probable.
 
     Args:
         cases: whose sets are weighed again, with all effects and without each true one in turn.
     """
-    start = [getattr(policy, name) for name in ODDS]
+    start = [Settings().values()[name] for name in ODDS]
 
-    def log_probability(case: Case) -> float:
+    def log_probability(case: Case, chosen: WeighingSettings) -> float:
         """Of the truth, and half of that of ``unknown`` with every true effect withheld in turn."""
-        right = sum(p for names, p in case.answers() if case.right(names))
+        right = sum(p for names, p in case.answers(chosen=chosen) if case.right(names))
         total = float(np.log(max(right, _LEAST)))
         if case.truth != UNKNOWN:
             for effect in set(case.truth) - set(case.read_off):
-                total += 0.5 * float(np.log(max(dict(case.answers(effect))[UNKNOWN], _LEAST)))
+                total += 0.5 * float(np.log(max(dict(case.answers(effect, chosen))[UNKNOWN], _LEAST)))
         return total
 
     def loss(values: Array) -> float:
-        with ExitStack() as stack:
-            for name, value, before in zip(ODDS, values, start, strict=True):
-                stack.enter_context(changed(name, float(value) / before))
-            return -sum(log_probability(case) for case in cases if case.nominal is not None)
+        chosen = Settings().changed(dict(zip(ODDS, values.tolist(), strict=True))).weighing
+        return -sum(log_probability(case, chosen) for case in cases if case.nominal is not None)
 
     found = minimize(loss, start, method="Nelder-Mead", options={"xatol": 0.01, "fatol": 0.01})
     return dict(zip(ODDS, found.x.tolist(), strict=True))
@@ -272,18 +269,17 @@ def misses(folder: Path, count: int) -> Iterator[str]:
 
 
 def table(folder: Path, count: int, rerun: Sequence[str]) -> Iterator[str]:
-    """The table, line by line; ``rerun`` are further constants, by whole diagnoses."""
+    """The table, line by line; ``rerun`` are further settings, by whole diagnoses."""
     cases = read_cases(folder, count)
-    yield "| constant | exact | false | log score | wrong set stated |\n|---|---|---|---|---|"
+    yield "| setting | exact | false | log score | wrong set stated |\n|---|---|---|---|---|"
     yield tally(cases).row("as they are")
     for name in WEIGHING:
         for factor in FACTORS:
-            with changed(name, factor):
-                yield tally(cases).row(f"`{name}` × {factor:g}")
+            yield tally(cases, moved(name, factor)).row(f"`{name}` × {factor:g}")
     for name in rerun:
         for factor in FACTORS[1:]:
-            with changed(name, factor):
-                yield tally(read_cases(folder, count)).row(f"`{name}` × {factor:g}")
+            settings = moved(name, factor)
+            yield tally(read_cases(folder, count, settings), settings).row(f"`{name}` × {factor:g}")
 
 
 def main() -> None:
@@ -291,7 +287,7 @@ def main() -> None:
     reader = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     reader.add_argument("set", type=Path, help="folder made by tunnel blind make")
     reader.add_argument("--count", type=int, default=100, help="campaigns, from the first")
-    reader.add_argument("--rerun", nargs="*", default=(), help="further constants, by whole diagnoses")
+    reader.add_argument("--rerun", nargs="*", default=(), help="further settings, by whole diagnoses")
     reader.add_argument("--odds", action="store_true", help="fit the odds against unknown instead")
     reader.add_argument(
         "--search", action="store_true", help="say of wrong answers what missed the truth instead"

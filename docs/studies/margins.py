@@ -1,12 +1,12 @@
-"""Which decisions would a constant of half or twice its size change? On campaigns whose truth is open.
+"""Which decisions would a setting of half or twice its size change? On campaigns whose truth is open.
 
     python -m docs.studies.margins FOLDER [FOLDER ...] [--count N] [--kept FILE]
 
-Each folder is a campaign, or a set made by ``tunnel blind make``. Every number of `diagnosis.policy` that is not
+Each folder is a campaign, or a set made by ``tunnel blind make``. Every setting of the diagnosis that is not
 whole is replaced by one that remembers what it would be at half and at twice its size. Each comparison that it
-takes part in is then made three times, so that one diagnosis of each campaign says of all constants how often a
-comparison comes out differently. Where none does, the constant decides nothing in these campaigns. Where some do,
-the answer need not change: `docs.studies.ablation` moves one constant at a time and answers again. A constant
+takes part in is then made three times, so that one diagnosis of each campaign says of all settings how often a
+comparison comes out differently. Where none does, the setting decides nothing in these campaigns. Where some do,
+the answer need not change: `docs.studies.ablation` moves one setting at a time and answers again. A setting
 that becomes part of an array before it is compared is not followed. FILE keeps the counts of every campaign; the
 same command goes on where it was interrupted. They are those of one state of the code.
 """
@@ -16,17 +16,16 @@ from __future__ import annotations
 import argparse
 import json
 import operator
-import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.progress import track
 
-from diagnosis import diagnose, policy
+from diagnosis import Settings, diagnose
 from tunnel_lab.terminal.outputs import console
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.files.writing import write_json
@@ -34,16 +33,16 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 FACTORS = (0.5, 2.0)
 
-#: By constant: comparisons made, and how many come out differently at each factor, since `watched` was entered.
+#: By setting: comparisons made, and how many come out differently at each factor, since `watched` was called.
 Counts = defaultdict[str, list[int]]
 _counts: Counts = defaultdict(lambda: [0, 0, 0])
 
 
 class Watched(float):
-    """A number that remembers what it would be if constants that it is made from were of another size.
+    """A number that remembers what it would be if settings that it is made from were of another size.
 
     Args:
-        at: by name of a constant, its value at each of `FACTORS`.
+        at: by name of a setting, its value at each of `FACTORS`.
     """
 
     at: Mapping[str, tuple[float, ...]]
@@ -70,7 +69,7 @@ def _plain(value: Any) -> Any:
 
 
 def _moved(inputs: Sequence[Any], name: str, place: int) -> list[Any]:
-    """The inputs at a factor of a constant; a number that is not made from it stays as it is."""
+    """The inputs at a factor of a setting; a number that is not made from it stays as it is."""
     return [
         one.at[name][place] if isinstance(one, Watched) and name in one.at else _plain(one) for one in inputs
     ]
@@ -116,28 +115,20 @@ for _name in ("lt", "le", "gt", "ge"):
 _COMPARISONS = (np.less, np.less_equal, np.greater, np.greater_equal)
 
 
-@contextmanager
-def watched() -> Iterator[Counts]:
-    """Watch every constant of the policy that is not whole, in all modules that use it."""
+def watched() -> tuple[Settings, Counts]:
+    """The usual settings, every one that is not whole watched, and the counts of their comparisons from now."""
     _counts.clear()
-    users = [module for name, module in sys.modules.items() if name.startswith(("diagnosis", "tunnel_lab"))]
-    before = []
-    for name, value in vars(policy).items():
-        if name.isupper() and isinstance(value, float):
-            number = Watched(value, {name: tuple(factor * value for factor in FACTORS)})
-            for module in users:
-                if getattr(module, name, None) is value:
-                    before.append((module, name, value))
-                    setattr(module, name, number)
-    try:
-        yield _counts
-    finally:
-        for module, name, value in before:
-            setattr(module, name, value)
+    usual = Settings()
+    numbers = {
+        name: Watched(value, {name: tuple(factor * value for factor in FACTORS)})
+        for name, value in usual.values().items()
+        if isinstance(value, float)
+    }
+    return usual.changed(numbers), _counts
 
 
 def table(folders: list[Path], count: int, known: dict[str, Any], kept: Path | None = None) -> Iterator[str]:
-    """Rows of Markdown, one of every constant that is not whole.
+    """Rows of Markdown, one of every setting that is not whole.
 
     Args:
         count: of the campaigns of each folder, from the first.
@@ -148,8 +139,9 @@ def table(folders: list[Path], count: int, known: dict[str, Any], kept: Path | N
     total: dict[str, Any] = defaultdict(lambda: np.zeros(5, int))
     for campaign in track(campaigns, "diagnosing", console=console(stderr=True)):
         if str(campaign) not in known:
-            with suppress(TunnelError), watched() as found:
-                diagnose(read_campaign(campaign))
+            settings, found = watched()
+            with suppress(TunnelError):
+                diagnose(read_campaign(campaign), settings=settings)
             known[str(campaign)] = {name: list(numbers) for name, numbers in found.items()}
             if kept is not None:
                 write_json(kept, known)
@@ -157,10 +149,10 @@ def table(folders: list[Path], count: int, known: dict[str, Any], kept: Path | N
             total[name] += np.array([*numbers, *(number > 0 for number in numbers[1:])])
     yield f"{len(campaigns)} campaigns"
     yield ""
-    yield "| constant | comparisons | otherwise at half | in campaigns | otherwise at twice | in campaigns |"
+    yield "| setting | comparisons | otherwise at half | in campaigns | otherwise at twice | in campaigns |"
     yield "|---|---:|---:|---:|---:|---:|"
-    for name, value in vars(policy).items():
-        if name.isupper() and isinstance(value, float):
+    for name, value in Settings().values().items():
+        if isinstance(value, float):
             made, half, twice, by_half, by_twice = total[name].tolist()
             yield f"| `{name}` | {made:,} | {half} | {by_half} | {twice} | {by_twice} |"
 

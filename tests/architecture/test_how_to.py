@@ -82,6 +82,12 @@ def test_the_joint_of_a_robot_is_diagnosed_as_shown(tmp_path: Path) -> None:
     assert len(shown) == 4
 
 
+def test_a_kind_of_rig_is_added_in_one_class(tmp_path: Path) -> None:
+    shown = steps(PAGES / "add-a-kind-of-rig.md")
+    assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
+    assert [bool(text) for _, text in shown] == [False, False, True, True]
+
+
 @pytest.mark.slow
 def test_the_class_of_ones_own_is_found(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-an-effect.md")

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
-from diagnosis import policy
-from diagnosis.search import weigh
+from diagnosis import Settings
 from docs.studies.margins import Watched, main, table, watched
 
 
@@ -38,27 +37,31 @@ def test_two_constants_are_moved_one_at_a_time():
 
 
 def test_comparisons_that_come_out_differently_are_counted_by_constant():
-    with watched() as counts:
-        assert np.float64(5.0) > number()  # not at twice
-        assert number() < 100.0  # always
-        assert np.array_equal(np.array([3.0, 7.0]) > number(), [False, True])  # otherwise at both
+    _, counts = watched()
+    assert np.float64(5.0) > number()  # not at twice
+    assert number() < 100.0  # always
+    assert np.array_equal(np.array([3.0, 7.0]) > number(), [False, True])  # otherwise at both
     assert counts["C"] == [3, 1, 2]
 
 
-def test_constants_are_watched_where_they_are_used_and_put_back():
-    before = policy.STEEPNESS
-    with watched():
-        assert weigh.policy.STEEPNESS.at == {"STEEPNESS": (0.5 * before, 2.0 * before)}
-        assert before == weigh.policy.STEEPNESS
-    assert type(policy.STEEPNESS) is float
+def test_every_setting_that_is_not_whole_is_watched():
+    settings, _ = watched()
+    before = Settings().weighing.steepness
+    assert settings.weighing.steepness.at == {"weighing.steepness": (0.5 * before, 2.0 * before)}
+    assert settings == Settings()
+    whole = {name for name, value in settings.values().items() if not isinstance(value, Watched)}
+    assert whole == {name for name, value in Settings().values().items() if isinstance(value, int)}
 
 
 def test_campaigns_counted_before_are_not_diagnosed_again(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "campaign.toml").touch()
-    counted = {str(tmp_path / "a"): {"LEAK": [7, 0, 2]}, str(tmp_path / "b"): {"LEAK": [3, 1, 0]}}
-    assert "| `LEAK` | 10 | 1 | 1 | 2 | 1 |" in table([tmp_path], 10, counted)
+    counted = {
+        str(tmp_path / "a"): {"weighing.leak": [7, 0, 2]},
+        str(tmp_path / "b"): {"weighing.leak": [3, 1, 0]},
+    }
+    assert "| `weighing.leak` | 10 | 1 | 1 | 2 | 1 |" in table([tmp_path], 10, counted)
 
 
 def test_counts_that_cannot_be_read_are_refused_in_one_line(tmp_path, monkeypatch, capsys):

@@ -252,7 +252,7 @@ def others(document: Document) -> str:
 
 
 def _listed(document: Document) -> int:
-    least = settings_of(document).words.answer_drawn
+    least = settings_of(document).words.answer_described
     probable = [c for c in document["candidates"] if c["probability"] >= least]
     return max(3, len(probable))
 

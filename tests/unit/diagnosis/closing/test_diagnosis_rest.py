@@ -136,7 +136,7 @@ def test_no_gap_leaves_nothing(data, base):
 def test_a_parameter_without_an_order_of_magnitude_is_not_determined(std, determined):
     (info,) = effect_class("cubic_stiffness").parameters()[:1]
     given = ParameterEstimate(0.2, std, "1/rad2")
-    found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined)
+    found = meant_parameter(given, replace(info, scale=0.5), 0.3, Settings().answer.undetermined_from)
     assert (found.std == std, found.determined) == (determined, determined)
 
 
@@ -144,10 +144,10 @@ def test_a_range_no_wider_than_chance_determines_nothing():
     info = effect_class("coulomb_friction").parameters()[0]
     bounded = replace(info, fit_lower=1.0, fit_upper=3.0, scale=100.0)
     assert meant_parameter(
-        ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined
+        ParameterEstimate(2.0, 0.5, "1"), bounded, 0.3, Settings().answer.undetermined_from
     ).determined
     assert not meant_parameter(
-        ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined
+        ParameterEstimate(2.0, 0.6, "1"), bounded, 0.3, Settings().answer.undetermined_from
     ).determined
 
 
