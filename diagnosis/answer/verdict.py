@@ -11,8 +11,8 @@ from scipy.special import chdtrc
 from diagnosis.closure import Move, Remainder, of_swing, rms_shown
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import CHANNELS, misfit
-from diagnosis.noise.gap import gap_test, rounding_errors
-from diagnosis.noise.sensor_noise import Noise
+from diagnosis.noise.gap import gap_test
+from diagnosis.noise.kinds import Noise
 from diagnosis.printing import Decision, noise_powers, part, plain, probability, share, undecided_words
 from diagnosis.result import Confirmation, GapSummary, Hidden, ParameterEstimate, RunGap
 from diagnosis.search.investigate import Study
@@ -52,7 +52,7 @@ def cautions(
     std = noise.estimated**0.5
     ratio = std / noise.stated_variance**0.5 if noise.stated_variance else 1.0
     said = f"The records' noise is {ratio:.3g} times what noise_std and resolution state"
-    if noise.source == "floor":
+    if not noise.shown:
         found.append(
             f"The records contain almost no noise ({std:.1g} rad). The accuracy of the fits, "
             f"{noise.used**0.5:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to "
@@ -283,8 +283,8 @@ def remainder(
     elif study.chosen is study.nominal:
         p_value = study.test.p_value
     else:  # no cause changes the tests of the noise itself: those of the residuals count
-        errors = rounding_errors(study.chosen, study.noise.white(study.step), study.step)
-        p_value = gap_test(study.chosen, study.noise, study.trend, coarse_step=True, errors=errors).p_value
+        noise = study.noise.rounded(study.chosen, study.step)
+        p_value = gap_test(study.chosen, noise, study.trend, coarse_step=True).p_value
     further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
     by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
     shown = further is not None and by_effect < chosen.remains_rate <= p_value

@@ -192,8 +192,7 @@ class _Skipping:
         self.run = run
         self.basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
         rate = np.gradient(run.reading - run.unscaled(residual), run.interval)
-        filled = 1.0 if run.samples is None else np.sqrt(run.samples.count / run.block)
-        scale = filled / run.noise.scale * np.ones(rate.size)
+        scale = np.sqrt(run.counts / run.block) / run.noise.scale
         # a at the skip, b after it, z; not whitened
         self.terms: list[tuple[np.ndarray, np.ndarray, complex]] = [(np.ones(rate.size), rate, 1.0)]
         if with_input and run.drive is not None:

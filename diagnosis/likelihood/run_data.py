@@ -234,9 +234,14 @@ class RunData:
         return np.asarray(self.noise.coloured(residual * self.noise.scale), np.float64)
 
     @property
+    def counts(self) -> NDArray[np.int64]:
+        """Samples in each block, shape (n,)."""
+        return np.full(self.reading.size, self.block) if self.samples is None else self.samples.count
+
+    @property
     def filled(self) -> int:
         """Number of blocks with samples."""
-        return self.reading.size if self.samples is None else int(np.count_nonzero(self.samples.count))
+        return int(np.count_nonzero(self.counts))
 
     def means(self, values: Array) -> Array:
         """Block means of one value per sample, shape (n,) or (k, n).

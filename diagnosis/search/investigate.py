@@ -21,10 +21,11 @@ from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similar import similar_campaign
-from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
+from diagnosis.noise.gap import GapTest, gap_or_colour
+from diagnosis.noise.kinds import Noise
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
+from diagnosis.noise.rounding import rounding_errors
 from diagnosis.noise.sensor_noise import (
-    Noise,
     NoiseTrend,
     campaign_noise,
     noise_trend,

@@ -10,6 +10,7 @@ from scipy.stats import binom
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.noise import gap
+from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_remarks
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
@@ -70,7 +71,7 @@ def test_coloured_noise_alone_is_not_a_gap(name):
     assert noise.std == pytest.approx(NOISE * np.sqrt(5.0), rel=0.25 if name == "pink" else 0.1)
     assert abs(fit.excess) < 0.06
     # were it taken for white noise, it would be one
-    assert min(gap.band_p_values(nominal(coloured(campaign(), name)))) < 1e-6
+    assert min(p_values(nominal(coloured(campaign(), name))).values()) < 1e-6
 
 
 def random_walk(count, rng):
@@ -155,7 +156,7 @@ def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
 @pytest.mark.parametrize("damping", [0.02, slow(0.04)])
 def test_a_gap_of_still_air_is_no_colour(effect, size, damping):
     data = campaign(effect_class(effect)(size), damping=damping)
-    _, still = gap._colour_sources(nominal(data))
+    (still,) = gap._in_still_air(nominal(data))
     assert still.excess > 0.5
     _, noise, found = judged(data)
     assert found.detected
