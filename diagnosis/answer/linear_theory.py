@@ -61,7 +61,7 @@ def coefficient_move(fit: Fit, name: str) -> float:
     """
     gradient = fit.problem.data.model.gradient(fit.problem.names, fit.point.common, name)
     chosen = fit.settings.answer
-    _, slope, solutions = normal_equations(fit.jacobian, fit.residuals)
+    _, slope, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
     # the step is what the fit had still to go
     direction, step = fit.covariance @ gradient, fit.covariance @ slope
     rows: list[tuple[float, ...]] = []  # of pieces of one cycle
@@ -239,7 +239,7 @@ def beside(fit: Fit, starts: Starts) -> Beside:
 
 def influences(fit: Fit) -> list[Array]:
     """What a unit of every scaled residual adds to the coefficients, by run, shape (n, coefficients)."""
-    _, _, solutions = normal_equations(fit.jacobian, fit.residuals)
+    _, _, solutions = normal_equations(fit.jacobian, fit.residuals, products=fit.products)
     directions = fit.covariance @ coefficient_gradients(fit).T
     return [
         (common - release @ solution[:, :-1]) @ directions

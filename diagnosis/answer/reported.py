@@ -82,7 +82,7 @@ def confirm(comparisons: Sequence[Comparison], tolerance: float) -> Confirmation
     """Judge whether the two models agree.
 
     Args:
-        tolerance: greatest root mean square difference of a run, in noise standard deviations of a block mean.
+        tolerance: greatest root mean square difference of a run over the noise of a block mean, a ratio.
 
     Returns:
         The largest difference, and the root mean square difference of the run closest to its tolerance.

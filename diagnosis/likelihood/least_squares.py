@@ -20,7 +20,7 @@ class Products:
     """Products of the sensitivities, which every step from one point shares.
 
     Args:
-        own: of every run's own with themselves, shape (runs, own, own).
+        own: of every run's own with themselves, and the precision of their priors, shape (runs, own, own).
         mixed: of the own with the common, shape (runs, own, common).
         common: of the common with themselves, by run, shape (runs, common, common).
     """
@@ -30,10 +30,15 @@ class Products:
     common: Array
 
     @classmethod
-    def of(cls, jacobian: list[tuple[Array, Array]]) -> Products:
-        """The products of sensitivities, as `sensitivities` gives them."""
+    def of(cls, jacobian: list[tuple[Array, Array]], precision: Array | None = None) -> Products:
+        """The products of sensitivities, as `sensitivities` gives them.
+
+        Args:
+            precision: of the own parameters' priors, shape (own,); None: they have none.
+        """
+        own = np.stack([release.T @ release for _, release in jacobian])
         return cls(
-            np.stack([release.T @ release for _, release in jacobian]),
+            own if precision is None or not precision.any() else own + np.diag(precision),
             np.stack([release.T @ common for common, release in jacobian]),
             np.stack([common.T @ common for common, _ in jacobian]),
         )
@@ -44,6 +49,7 @@ def normal_equations(
     residuals: list[Array],
     damping: float = 0.0,
     products: Products | None = None,
+    pull: Array | None = None,
 ) -> tuple[Array, Array, Array]:
     """Normal matrix and gradient of the common parameters, each run's release eliminated; arguments as in `by_run`.
 
@@ -51,7 +57,7 @@ def normal_equations(
         Matrix (common, common), gradient (common,), and the (runs, own, common + 1) solutions that give the
         releases' steps: release = solution[:, -1] − solution[:, :-1] @ common step.
     """
-    matrices, gradients, solutions = by_run(jacobian, residuals, damping, products)
+    matrices, gradients, solutions = by_run(jacobian, residuals, damping, products, pull)
     return matrices.sum(axis=0), gradients.sum(axis=0), solutions
 
 
@@ -60,6 +66,7 @@ def by_run(
     residuals: list[Array],
     damping: float = 0.0,
     products: Products | None = None,
+    pull: Array | None = None,
 ) -> tuple[Array, Array, Array]:
     """As `normal_equations`, before the sum over the runs.
 
@@ -68,6 +75,7 @@ def by_run(
         residuals: scaled.
         damping: of the release's own step, as a share of its diagonal.
         products: of the jacobian, where they are known.
+        pull: of the own parameters' priors, shape (runs, own), as `ParameterSet.pull`; None: none.
 
     Returns:
         Matrices, shape (runs, common, common), gradients, shape (runs, common), and the solutions of
@@ -79,6 +87,7 @@ def by_run(
     ):  # of a run that grew without bound; its step is refused
         known = Products.of(jacobian) if products is None else products
         seen = np.stack([release.T @ r for (_, release), r in columns])[:, :, None]
+        seen = seen if pull is None else seen + pull[:, :, None]
         cross = np.concatenate([known.mixed, seen], axis=2)
         size = np.sqrt(np.maximum(np.diagonal(known.own, axis1=1, axis2=2), 1e-300))
         ridge = known.own / (size[:, :, None] * size[:, None, :]) + (1e-12 + damping) * np.eye(size.shape[1])
@@ -95,6 +104,8 @@ def damped_step(
     jacobian: list[tuple[Array, Array]],
     damping: float,
     products: Products | None = None,
+    *,
+    linear: bool = False,
 ) -> Point:
     """Where a Gauss–Newton step leads, the common parameters inside their bounds.
 
@@ -103,8 +114,12 @@ def damped_step(
         jacobian: from `sensitivities`, of the same rows as the residuals.
         damping: added to the scaled normal matrix's diagonal, dimensionless.
         products: of the jacobian, where they are known.
+        linear: whether the residuals are a change from an optimum, at which priors and readings are in balance.
     """
-    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping, products)
+    parameters = problem.parameters
+    known = Products.of(jacobian, parameters.precision) if products is None else products
+    pull = parameters.pull(point) if parameters.precision.any() and not linear else None
+    matrix, gradient, solutions = normal_equations(jacobian, residuals, damping, known, pull)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     scaled = matrix / np.outer(scale, scale) + damping * np.eye(len(scale))
     lower, upper = problem.bounds
@@ -189,12 +204,12 @@ class Fit:
     @cached_property
     def products(self) -> Products:
         """Products of the sensitivities."""
-        return Products.of(self.jacobian)
+        return Products.of(self.jacobian, self.problem.parameters.precision)
 
     @property
     def total(self) -> float:
-        """χ² of the campaign."""
-        return float(self.chi2.sum())
+        """χ² of the campaign, and how far the runs' own parameters are from their priors."""
+        return float(self.chi2.sum()) + self.problem.parameters.surprise(self.point)
 
     @property
     def count(self) -> int:
@@ -312,7 +327,7 @@ class _State:
         self.problem, self.point = problem, point
         self.prediction = problem.predict([point])[0]
         self.residuals = _scaled(problem, self.prediction)
-        self.cost = _cost(self.residuals)
+        self.cost = _cost(problem, point, self.residuals)
         self.damping = 1e-6
         self.jacobian: list[tuple[Array, Array]] = []
         self.products: Products | None = None
@@ -322,7 +337,7 @@ class _State:
         self.jacobian = sensitivities(self.problem, self.point, base, self.prediction)
         if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in self.jacobian):
             raise FitError("the model's sensitivities are not finite")
-        self.products = Products.of(self.jacobian)
+        self.products = Products.of(self.jacobian, self.problem.parameters.precision)
 
     def improve(self) -> float:
         """Take one damped step; returns the drop of χ², 0 where no step lowers it."""
@@ -331,7 +346,7 @@ class _State:
             trial = clip(self.problem, damped_step(*here, self.damping, self.products))
             prediction = self.problem.predict([trial])[0]
             residuals = _scaled(self.problem, prediction)
-            cost = _cost(residuals)
+            cost = _cost(self.problem, trial, residuals)
             if cost < self.cost:
                 gain = self.cost - cost
                 self.point, self.prediction, self.residuals, self.cost = trial, prediction, residuals, cost
@@ -376,8 +391,8 @@ def _scaled(problem: Problem, prediction: list[Array]) -> list[Array]:
         ]
 
 
-def _cost(residuals: list[Array]) -> float:
-    total = sum(float(r @ r) for r in residuals)
+def _cost(problem: Problem, point: Point, residuals: list[Array]) -> float:
+    total = sum(float(r @ r) for r in residuals) + problem.parameters.surprise(point)
     return total if np.isfinite(total) else np.inf
 
 

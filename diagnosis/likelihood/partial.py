@@ -31,8 +31,15 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
         The point found, each run at its own best, and the scaled residuals there by run.
     """
     best, residuals = start, scaled_residuals(problem, start)
+    root = np.sqrt(problem.parameters.precision)
     for _ in range(_RELEASE_STEPS):
-        steps = [np.linalg.lstsq(s, r, rcond=1e-10)[0] for s, r in zip(slopes, residuals, strict=True)]
+        steps = []
+        for slope, residual, away in zip(slopes, residuals, problem.parameters.pull(best), strict=True):
+            rows, values = slope, residual
+            if root.any():  # the priors are further rows
+                rows = np.vstack([slope, np.diag(root)])
+                values = np.append(residual, away / np.where(root > 0.0, root, 1.0))
+            steps.append(np.linalg.lstsq(rows, values, rcond=1e-10)[0])
         trial = Point(best.common, best.release + np.stack(steps))
         moved = scaled_residuals(problem, trial)
         with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
@@ -66,7 +73,7 @@ def fit_seen(
     def look(point: Point) -> tuple[Point, list[Array], list[Array], float]:
         residuals = scaled_residuals(whole.problem, point)
         visible = [r[s] for r, s in zip(residuals, seen, strict=True)]
-        cost = sum(float(r @ r) for r in visible)
+        cost = sum(float(r @ r) for r in visible) + whole.problem.parameters.surprise(point)
         return point, residuals, visible, cost if np.isfinite(cost) else np.inf
 
     damping = 1e-6

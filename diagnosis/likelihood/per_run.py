@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.residuals import linear_coefficients, resonance
+from diagnosis.likelihood.mains_lines import mains_line
+from diagnosis.likelihood.residuals import Line, linear_coefficients, resonance, wind_line
 from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
+from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.vocabulary.record import Array
 
 _RINGING_PADDING = 4  # zero padding of the spectra
@@ -19,23 +21,42 @@ _EDGE = 8  # blocks at either end of a run in which a skip cannot be seen, or di
 
 
 @dataclass(frozen=True, eq=False)
-class PerRunParameters:
-    """What was found.
+class ResidualsOf:
+    """The residuals of a fit, as effects search them (`tunnel_sim.effects.evidence.Residuals`)."""
 
-    Args:
-        values: of the effect's parameters that belong to its textbook form, in their order.
-        numbers: of every run its phase (rad), shape (runs,), or its instants (shares of the run), shape (runs, n).
-        drop: of χ² by taking it out, dimensionless.
-        of_input: the value of the parameter that says what the effect has to do with the input, dimensionless.
-    """
+    fit: Fit
 
-    values: tuple[float, ...]
-    numbers: Array
-    drop: float
-    of_input: float = 0.0
+    def mains_line(self) -> Sought | None:
+        """As `diagnosis.likelihood.mains_lines.mains_line`."""
+        return _of_line(mains_line(self.fit))
+
+    def wind_line(self, least: float, greatest: float, size: str) -> Sought | None:
+        """As `diagnosis.likelihood.residuals.wind_line`.
+
+        Args:
+            least: frequency times size over wind speed, dimensionless.
+            greatest: likewise.
+        """
+        return _of_line(wind_line(self.fit, least, greatest, size))
+
+    def ringing(self) -> Sought | None:
+        """As `ringing`."""
+        return ringing(self.fit)
+
+    def excited(self) -> Sought | None:
+        """As `excited`."""
+        return excited(self.fit)
+
+    def skips(self, *, with_input: bool) -> Sought | None:
+        """As `skip`."""
+        return skip(self.fit, with_input=with_input)
 
 
-def ringing(fit: Fit) -> PerRunParameters | None:
+def _of_line(line: Line | None) -> Sought | None:
+    return None if line is None else Sought((line.amplitude, line.parameter), line.phases, line.drop)
+
+
+def ringing(fit: Fit) -> Sought | None:
     """The strongest decaying line that starts at the release and has one frequency in all runs.
 
     Returns:
@@ -81,14 +102,14 @@ def ringing(fit: Fit) -> PerRunParameters | None:
     omega = abs(exponent)
     found = amplitude[:, at] / exponent ** runs[0].derivative
     mean = float(np.sqrt(np.mean(np.abs(found[beside[:, at]]) ** 2)))
-    return PerRunParameters((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
+    return Sought((mean, omega, float(rate) / omega), np.angle(found), float(drops[best][at]))
 
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1)  # of a mode that the input excites
 _APART = 0.02  # frequencies tried, relative: within the half-power width of the dampings, or near it
 
 
-def excited(fit: Fit) -> PerRunParameters | None:
+def excited(fit: Fit) -> Sought | None:
     """The strongest oscillation beside the motion that the input excites from rest, the same in all runs.
 
     Returns:
@@ -115,7 +136,7 @@ def excited(fit: Fit) -> PerRunParameters | None:
     )
     beside = np.mean([np.abs(grid / one - 1.0) > NEAR_MOTION for one in own], axis=0)
     grid = grid[beside >= fit.settings.search.mode_runs]
-    found = PerRunParameters((0.0, 1.0, 0.0), np.zeros(len(runs)), 0.0)
+    found = Sought((0.0, 1.0, 0.0), np.zeros(len(runs)), 0.0)
     for frequency in grid.tolist():
         for damping_ratio in _DAMPINGS:
             product = power = 0.0
@@ -131,7 +152,7 @@ def excited(fit: Fit) -> PerRunParameters | None:
     return found if found.of_input else None
 
 
-def skip(fit: Fit, *, with_input: bool = False) -> PerRunParameters | None:
+def skip(fit: Fit, *, with_input: bool = False) -> Sought | None:
     """The instants at which the runs jump ahead by one common time.
 
     Args:
@@ -159,7 +180,7 @@ def skip(fit: Fit, *, with_input: bool = False) -> PerRunParameters | None:
             lost = max(float(np.sum(times * weights) / np.sum(weights)), 0.0)
         drop = sum(run.drop(of_run, lost) for run, of_run in zip(runs, steps, strict=True))
         shares = [[run.share(step) for step in of_run] for run, of_run in zip(runs, steps, strict=True)]
-        found.append(PerRunParameters((lost * count,), np.array(shares), drop))
+        found.append(Sought((lost * count,), np.array(shares), drop))
     # of an instant, which is sought among as many blocks
     cost = 2.0 * sum(np.log(run.left.size) for run in runs)
     best = max(found, key=lambda one: one.drop - cost * one.numbers.shape[1])

@@ -158,9 +158,10 @@ class Problem:
             law = tuple(value for name, value in named if name != "zero")
             for r, run in enumerate(self.data.runs):
                 if np.all(np.isfinite(point.release[r])):
-                    like = first.get((law, run.conditions)) if autonomous else None
+                    same = law, run.conditions, *point.release[r, self.parameters.of_physics].tolist()
+                    like = first.get(same) if autonomous else None
                     job = _Job(self, point, r, effects) if like is None else like.released(self, point, r)
-                    first.setdefault((law, run.conditions), job)
+                    first.setdefault(same, job)
                     alike.setdefault(job.motion, []).append((i, r, job))
         motions = list(alike.values())
         groups = -(-len(motions) // _TOGETHER)

@@ -136,21 +136,31 @@ def block_gain(frequency: float, run: RunData) -> float:
     return float(np.sin(run.block * x) / (run.block * np.sin(x))) if run.block > 1 else 1.0
 
 
-def shedding_line(fit: Fit) -> Line | None:
-    """The strongest line at one Strouhal number in all wind-on runs; None without wind or body width."""
+def wind_line(fit: Fit, least: float, greatest: float, size: str) -> Line | None:
+    """The strongest line of a moment whose frequency is in proportion to the wind speed, in all wind-on runs.
+
+    Args:
+        least: frequency times size over wind speed, dimensionless; a Strouhal number where the size is the width.
+        greatest: likewise.
+        size: ``width`` or ``length`` of the body.
+
+    Returns:
+        None without wind, or where the size is not stated.
+    """
     data = fit.problem.data
     concerned = [i for i, run in enumerate(data.runs) if run.wind_on]
-    if not concerned or data.width <= 0.0:
+    metres = {"width": data.width, "length": data.reference_length}[size]
+    if not concerned or metres <= 0.0:
         return None
     spectra = residual_spectra(fit)
     chains = [fit.problem.chain(fit.point.common, fit.point.release[i], data.runs[i]) for i in concerned]
     speeds = np.array([chain.physics().wind_speed for chain in chains])  # corrected by the effects of the fit
-    spacing = 0.1 * data.width / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
-    grid = np.arange(0.02, 0.60, spacing)
+    spacing = 0.1 * metres / (float(speeds.max()) * max(data.runs[i].duration for i in concerned))
+    grid = np.arange(least, greatest, spacing)
     powers, limited = [], []
     for i, speed in zip(concerned, speeds, strict=True):
         own = resonance(fit, i)
-        frequency = grid * speed / data.width
+        frequency = grid * speed / metres
         power = spectra[i].power(frequency)
         power[np.abs(frequency / own - 1.0) < 0.08] = 0.0  # the free motion's own line is not evidence
         powers.append(power)
@@ -163,7 +173,7 @@ def shedding_line(fit: Fit) -> Line | None:
     phases = np.zeros(len(data.runs))
     amplitudes = []
     for i, speed in zip(concerned, speeds, strict=True):
-        frequency = best * speed / data.width
+        frequency = best * speed / metres
         run = data.runs[i]
         inertia, damping, stiffness = linear_coefficients(fit, i)
         omega = 2.0 * np.pi * frequency

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, clip, damped_step, normal_equations
-from diagnosis.likelihood.mains_lines import mains_line
-from diagnosis.likelihood.per_run import PerRunParameters, excited, ringing, skip
+from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import CHANNELS, Line, misfit, shedding_line
+from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.model.parameters import Point
 from tunnel_sim.effects import Effect
@@ -67,21 +65,6 @@ class StartingPoint:
         return dataclasses.replace(self, point=Point(common, self.point.release))
 
 
-def _of_line(line: Line | None) -> PerRunParameters | None:
-    return (
-        None if line is None else PerRunParameters((line.amplitude, line.parameter), line.phases, line.drop)
-    )
-
-
-#: How an effect with a number of its own in every run is found: a periodic one by what sets its frequency.
-_FINDERS: Mapping[str, Sequence[Callable[[Fit], PerRunParameters | None]]] = {
-    "mains": (lambda base: _of_line(mains_line(base)),),
-    "shedding": (lambda base: _of_line(shedding_line(base)),),
-    "ringing": (ringing, excited),
-    "skips": (skip, partial(skip, with_input=True)),
-}
-
-
 def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     """Starting points for adding one effect to a fitted problem, by the drop of χ² predicted, greatest first.
 
@@ -91,8 +74,8 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
         return []
     found: list[StartingPoint] = []
-    if kind.line or kind.skips:
-        for one in filter(None, (find(base) for find in _FINDERS[kind.line or "skips"])):
+    if kind.own_numbers(1):
+        for one in filter(None, kind.sought(ResidualsOf(base))):
             of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
             fixed = (*base.problem.fixed, *(of_input if data.driven else ()))
             instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
@@ -206,7 +189,9 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
 
 def absorbed(base: Fit, change: Sequence[Array]) -> Point:
     """Where the parameters of a fit go to absorb a change of the scaled prediction, by one Gauss–Newton step."""
-    return damped_step(base.problem, base.point, [-c for c in change], base.jacobian, 0.0)
+    return damped_step(
+        base.problem, base.point, [-c for c in change], base.jacobian, 0.0, base.products, linear=True
+    )
 
 
 def change_to(base: Fit, problem: Problem, point: Point) -> list[Array]:

@@ -287,11 +287,16 @@ class NominalModel:
     # ---- what it says of a motion ----
 
     def frequency(self, inertia: float, stiffness: float) -> float:
-        """Frequency of the free motion, Hz; of a body that nothing restores that of the reference rig."""
+        """Frequency of the free motion, Hz; of a body that nothing restores that of the reference rig.
+
+        Args:
+            inertia: kg m².
+            stiffness: of the restoring moment, N m/rad.
+        """
         return float(np.sqrt(max(stiffness, 1e-12) / inertia) / (2.0 * np.pi))
 
     def restoring(self, inertia: float, stiffness: float) -> float:
-        """The stiffness of that frequency, N m/rad."""
+        """The stiffness of that frequency, N m/rad; arguments as in `frequency`."""
         del inertia
         return stiffness
 
@@ -341,7 +346,10 @@ class NominalModel:
     def gradient(self, names: Sequence[str], common: Array, name: str) -> Array:
         """Derivative of a coefficient with respect to the common parameters, shape (common,).
 
-        Zero for a coefficient that is held. Arguments as in `coefficient`.
+        Args:
+            names: of the common parameters.
+            common: their values, shape (common,).
+            name: of the coefficient; the derivative is zero where it is held.
         """
         del common
         return np.array([float(one == name) for one in names])

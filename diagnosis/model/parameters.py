@@ -18,6 +18,19 @@ Owner = Literal["common", "per_run"]
 
 
 @dataclass(frozen=True)
+class Prior:
+    """What is known of a run's own parameter before its record: a normal distribution.
+
+    Args:
+        std: its standard deviation, in the parameter's unit.
+        mean: its mean, in that unit.
+    """
+
+    std: float
+    mean: float = 0.0
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One parameter of a fit.
 
@@ -29,6 +42,7 @@ class Parameter:
         size: a typical value, below which steps of finite differences shrink no further, in the unit.
         of_swing: whether its steps are in proportion to the amplitude of the run, whose multiple ``size`` then is.
         effect: name of the effect that it belongs to; empty: the nominal model.
+        prior: of what a run has of its own; None: nothing is known of it, as of a release.
     """
 
     name: str
@@ -39,6 +53,7 @@ class Parameter:
     owner: Owner = "common"
     of_swing: bool = False
     effect: str = ""
+    prior: Prior | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +112,29 @@ class ParameterSet:
     def of_effects(self) -> int:
         """How many of a run's own parameters are those of effects; they come last."""
         return sum(bool(one.effect) for one in self.own)
+
+    @cached_property
+    def of_physics(self) -> list[int]:
+        """Places of a run's own parameters that change its physics, among its own; those of effects apart."""
+        apart = ("release_angle", "release_rate", "zero")
+        return [i for i, one in enumerate(self.own) if one.name not in apart and not one.effect]
+
+    @cached_property
+    def precision(self) -> Array:
+        """One over the variance of every own parameter's prior, 0 without one, shape (own,)."""
+        return np.array([0.0 if one.prior is None else one.prior.std**-2 for one in self.own])
+
+    def pull(self, point: Point) -> Array:
+        """Half the fall of `surprise` with each own parameter, shape (runs, own)."""
+        means = np.array([0.0 if one.prior is None else one.prior.mean for one in self.own])
+        return np.asarray(self.precision * (means - point.release), np.float64)
+
+    def surprise(self, point: Point) -> float:
+        """How far the own parameters are from their priors, in variances, summed; a part of χ²."""
+        if not self.precision.any():
+            return 0.0
+        away = self.pull(point)
+        return float(np.sum(away**2 / np.where(self.precision > 0.0, self.precision, 1.0)))
 
     def value(self, point: Point, name: str, run: int) -> float | None:
         """A parameter in one run, in its unit; None where there is none of that name.

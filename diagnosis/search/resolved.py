@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.likelihood.least_squares import Fit, fit_at, normal_equations
+from diagnosis.likelihood.least_squares import Fit, Products, fit_at, normal_equations
 from diagnosis.likelihood.partial import fit_seen
 from tunnel_sim.vocabulary.record import Array
 
@@ -69,7 +69,8 @@ def _stds(fitted: Fit, seen: Sequence[NDArray[np.bool_]], held: Collection[str])
     free = np.array([name not in held and fitted.bound(name) is None for name in names])
     rows = [(c[s] * free, r[s]) for (c, r), s in zip(fitted.jacobian, seen, strict=True)]
     left = [r[s] for r, s in zip(fitted.residuals, seen, strict=True)]
-    matrix, _, _ = normal_equations(rows, left)
+    products = Products.of(rows, fitted.problem.parameters.precision)
+    matrix, _, _ = normal_equations(rows, left, products=products)
     shown = np.diag(matrix) > 0.0
     scale = np.sqrt(np.where(shown, np.diag(matrix), 1.0))
     inverse = np.linalg.inv(matrix / np.outer(scale, scale) + _RIDGE * np.eye(scale.size))

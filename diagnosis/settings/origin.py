@@ -15,16 +15,16 @@ BY_CHANCE = "By chance alone two numbers lower χ² by more than 20 once in 22,0
 
 
 def setting(
-    default: float, what: str, origin: Origin, why: str = "", *, unit: str = "1", decision: str = ""
+    default: float, meaning: str, origin: Origin, why: str = "", *, unit: str = "1", decision: str = ""
 ) -> Any:
     """A field of a dataclass of settings.
 
     Args:
         default: the value, in ``unit``.
-        what: what the value decides, in a sentence.
+        meaning: what the value decides, in a sentence.
         why: the reason for the value, or what it was fitted to, in a sentence or two.
         unit: ``1`` of a share, a ratio or a logarithm.
         decision: number of the document in docs/decisions that has more.
     """
-    about = {"unit": unit, "what": what, "origin": origin, "why": why, "decision": decision}
+    about = {"unit": unit, "meaning": meaning, "origin": origin, "why": why, "decision": decision}
     return field(default=default, metadata=about)

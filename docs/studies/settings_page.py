@@ -55,7 +55,7 @@ def _row(one: Field[Any]) -> str:
     origin = " ".join(
         filter(None, (f"{about['origin']}.".capitalize(), about["why"], _link(about["decision"])))
     )
-    return f"| `{one.name}` | {one.default:g}{unit} | {about['what']} | {origin} |\n"
+    return f"| `{one.name}` | {one.default:g}{unit} | {about['meaning']} | {origin} |\n"
 
 
 def _link(number: str) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import exp, pi, sqrt
 
 import numpy as np
 
 from tunnel_sim.effects.base import REFERENCE_SPEED, Drawn, Effect
+from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import (
     EQUATION,
     Circumstances,
@@ -315,6 +316,11 @@ class VortexShedding(Effect):
         "St", "1", "Strouhal number based on the body's width",
         scale=0.15, lower=0.001, upper=2.0, default=0.15,
     )  # fmt: skip
+
+    @classmethod
+    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
+        """A line at one Strouhal number."""
+        return (residuals.wind_line(0.02, 0.60, "width"),)
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Set the terms of the moment law, with the phase drawn for the run."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
+from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
 from tunnel_sim.physics.run_settings import Motion, RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -60,7 +61,7 @@ class Effect:
 
     - ``law_terms``: the moment law's parameters that the effect's own are, in their order; empty: none.
     - ``random``: kind of spectrum of a random moment. Vortex shedding has a line too: its phase may wander or not.
-    - ``line``: what sets the frequency of a periodic effect; its phase differs from run to run.
+    - ``line``: what sets the frequency of a periodic effect, in a word; its phase differs from run to run.
     - ``skips``: whether samples are missing at an instant that differs from run to run (a share of the run).
     - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
     - ``fitted``: whether a fit of the deterministic motion can find it; else it is read off records or spectra.
@@ -87,7 +88,7 @@ class Effect:
 
     law_terms: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[Literal["", "broad_band", "narrow_band"]] = ""
-    line: ClassVar[Literal["", "mains", "shedding", "ringing"]] = ""
+    line: ClassVar[str] = ""
     skips: ClassVar[bool] = False
     autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
@@ -140,6 +141,19 @@ class Effect:
         if cls.skips:
             return tuple(f"instant_{number + 1}" for number in range(instants))
         return ("phase",) if cls.line else ()
+
+    @classmethod
+    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
+        """Where a fit starts for an effect that has a phase or instants of its own in every run.
+
+        Args:
+            residuals: of a fit without it.
+
+        Returns:
+            What is found of it in the residuals, in each way that it may act.
+        """
+        del residuals
+        return ()
 
     @property
     def is_null(self) -> bool:

@@ -10,7 +10,7 @@ from contextvars import ContextVar
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import TypeVar, get_args
+from typing import Any, TypeVar, cast, get_args
 
 from tunnel_sim.effects.base import Channel, Condition, Effect, make_effect
 from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
@@ -98,12 +98,18 @@ def check_kind(kind: object) -> None:
         except TunnelError as error:
             place = f"{where}, parameter {info.name}"
             raise TunnelError(error.what, where=place, remedy=error.remedy) from None
-    if kind.line or kind.skips or kind.random or kind.lattice:
-        raise TunnelError(
-            "line, skips, random and lattice are for built-in effects, which are found by methods of their own",
-            where=where,
-            remedy="leave these traits at their defaults",
-        )
+    if kind.lattice:
+        what = "lattice is for the built-in effect that is read off the records"
+        raise TunnelError(what, where=where, remedy="leave it at its default")
+    if (kind.line or kind.skips) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
+        what = "has a phase or instants in every run, and does not say how they are found"
+        raise TunnelError(what, where=where, remedy="override sought")
+    if kind.random and len(kind.parameters()) != _OF_SPECTRUM:
+        what = "is a random moment, whose parameters are an intensity and a bandwidth or Strouhal number"
+        raise TunnelError(what, where=where, remedy="declare these two")
+
+
+_OF_SPECTRUM = 2  # parameters of a random moment
 
 
 @functools.cache
@@ -120,6 +126,11 @@ def answering_with(kinds: Sequence[type[Effect]]) -> Iterator[None]:
     own = [kind for kind in kinds if kind not in ALL_EFFECTS]
     for kind in own:
         check_kind(kind)
+    for band in {kind.random for kind in own if kind.random}:
+        same = [kind.name for kind in kinds if kind.random == band]
+        if len(same) > 1:
+            what = f"has the spectrum of {same[0]}, and no run could tell them apart"
+            raise TunnelError(what, where=f"effect {same[-1]}", remedy="leave one of them out")
     names = [kind.name for kind in kinds]
     for name in names:
         if names.count(name) > 1:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tunnel_sim.effects.base import NEAR_MOTION, REFERENCE_RELEASE, Drawn, Effect
+from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
 from tunnel_sim.physics.forward import backlash
 from tunnel_sim.physics.run_settings import RunSettings
@@ -243,6 +244,11 @@ class DroppedSamples(Effect):
         scale=1.0, lower=0.0, upper=1.0, of_input=True,
     )  # fmt: skip
 
+    @classmethod
+    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
+        """Jumps of the reading alone, and of the input too."""
+        return (residuals.skips(with_input=False), residuals.skips(with_input=True))
+
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
         """The instant, as a share of the run, well inside it."""
         del stated
@@ -295,6 +301,11 @@ class MainsHum(Effect):
     frequency: float = parameter(
         "f", "Hz", "mains frequency", scale=0.05, lower=45.0, upper=65.0, default=50.0
     )
+
+    @classmethod
+    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
+        """A line of the mains."""
+        return (residuals.mains_line(),)
 
     def on_angle(self, angle: Array, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """Add the hum at the phase drawn for the run."""
@@ -358,6 +369,11 @@ class SecondMode(Effect):
         "k", "1", "whether the input of a driven run excites it: 0 or 1, or -1 against its sense",
         scale=1.0, lower=-1.0, upper=1.0, of_input=True,
     )  # fmt: skip
+
+    @classmethod
+    def sought(cls, residuals: Residuals) -> Iterable[Sought | None]:
+        """What rings from the release on, and what the input excites."""
+        return (residuals.ringing(), residuals.excited())
 
     def plausible(self, omega: float) -> bool:
         """Whether it is an oscillation of its own: it decays, is not the motion's, and not as slow as a drift."""

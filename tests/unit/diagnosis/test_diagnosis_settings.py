@@ -51,7 +51,7 @@ KNOWN_IN_SEVERAL = {
 }
 
 #: Where usual settings may be made: what people call, and what has no campaign.
-VERBS = {"_diagnose.py", "by_hand.py", "investigate.py", "prepare.py", "__init__.py"}
+VERBS = {"_diagnose.py", "by_hand.py", "investigate.py", "lead.py", "prepare.py", "__init__.py"}
 
 
 def sources():
@@ -74,7 +74,7 @@ def reads(tree, names, owner=""):
 @pytest.mark.parametrize("name", FIELDS)
 def test_a_setting_says_what_it_decides_and_where_it_comes_from(name):
     about = FIELDS[name].metadata
-    assert about["what"].endswith(".")
+    assert about["meaning"].endswith(".")
     assert about["unit"]
     assert about["origin"] in get_args(Origin)
     assert about["origin"] != "estimated" or about["why"]

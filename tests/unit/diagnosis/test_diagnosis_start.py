@@ -8,7 +8,7 @@ import pytest
 from diagnosis.likelihood.least_squares import fit, fit_at
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import residual_spectra, resonance, shedding_line
+from diagnosis.likelihood.residuals import residual_spectra, resonance, wind_line
 from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, project_out, starting_points
 from diagnosis.model.joint import Joint
@@ -193,7 +193,7 @@ def test_a_shedding_line_gives_its_strouhal_number_amplitude_and_phase():
     own = [[0.35, 0.0, phase] for phase in phases]
     data = readings_of(replace(prepared(duration=10.0), width=0.225), shed, NOMINAL, own, NOISE)
     base = fit(Problem(data), nominal_start(data))
-    line = shedding_line(base)
+    line = wind_line(base, 0.02, 0.60, "width")
     assert line is not None
     assert line.parameter == pytest.approx(0.16, abs=0.002)
     assert line.amplitude == pytest.approx(0.01, rel=0.15)
@@ -216,7 +216,7 @@ def test_what_the_damping_leaves_at_the_bodys_own_frequency_is_not_a_shedding_li
     base = nominal(replace(data, runs=data.runs[3:5]))
     own, spectrum = resonance(base, 1), residual_spectra(base)[1]
     assert spectrum.power(own) > 5.0 * spectrum.power(0.16 * 15.0 / 0.225)
-    assert shedding_line(base).parameter == pytest.approx(0.16, abs=0.002)
+    assert wind_line(base, 0.02, 0.60, "width").parameter == pytest.approx(0.16, abs=0.002)
 
 
 def test_a_shedding_line_follows_the_wind_speed_that_the_fit_has_corrected():

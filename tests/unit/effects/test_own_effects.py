@@ -17,12 +17,15 @@ from tests.unit.gap_campaigns import campaign
 from tests.unit.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic
 from tunnel_sim.effects import (
     ALL_EFFECTS,
+    Effect,
     effect_class,
     effect_from,
     known_effects,
     register_effect,
     registry,
 )
+from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.expression_effect import read_effects
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.effects.registry import answering_with
@@ -84,7 +87,9 @@ OF_VOLTS = {
         (changed(name="coulomb_friction"), "is the name of a built-in effect"),
         (changed(name="unknown"), "is not a name"),
         (changed(channel="gear"), "unknown channel 'gear'"),
-        (changed(line="mains"), "for built-in effects"),
+        (changed(line="of the gear"), "does not say how they are found"),
+        (changed(lattice=True), "read off the records"),
+        (changed(random="broad_band"), "is a random moment"),
         (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
         (int, "is not a class derived from Effect"),
     ],
@@ -95,6 +100,55 @@ def test_what_cannot_be_an_effect_is_not_registered(kind: type, part: str) -> No
     with pytest.raises(TunnelError, match=part), answering_with([kind]):
         pass
     assert known_effects() == ALL_EFFECTS
+
+
+@dataclasses.dataclass(frozen=True)
+class Wake(Effect):
+    """The wake of a strut: a periodic moment whose frequency follows the wind."""
+
+    name = "wake"
+    channel = "forcing"
+    condition = "wind_on"
+    equation = "c ½ρV²Al sin(2π n V t/width + φ)"
+    signature = "A line whose frequency follows the wind."
+    references = ("one's own",)
+    example = (0.1, 0.2)
+    autonomous = False
+    line = "the strut's wake"
+    amplitude: float = parameter(
+        "c", "1", "of the moment", scale=0.01, lower=0.0, upper=5.0, per_pressure=True
+    )
+    number: float = parameter("n", "1", "of the wake", scale=0.15, lower=0.001, upper=2.0, default=0.15)
+
+    @classmethod
+    def sought(cls, residuals: Residuals) -> tuple[Sought | None, ...]:
+        return (residuals.wind_line(0.1, 0.4, "width"),)
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        del stated
+        line = {"shedding_amplitude": self.amplitude, "strouhal_number": self.number}
+        return (
+            run.with_parameters(line | {"shedding_phase": self.drawn_number(drawn)})
+            if self.amplitude
+            else run
+        )
+
+
+def test_a_line_of_ones_own_is_found_with_a_phase_in_every_run() -> None:
+    built_in = [effect_class(name) for name in ("coulomb_friction", "quadratic_damping", "second_mode")]
+    found = diagnose(campaign(Wake(0.5, 0.23)), kinds=[*built_in, Wake])
+    assert found.causes == ("wake",)
+    number = found.candidates[0].parameters["number"]
+    assert number.std is not None
+    assert abs(number.value - 0.23) < 4.0 * number.std
+
+
+def test_two_random_moments_of_one_spectrum_are_not_answers() -> None:
+    own = dataclasses.dataclass(frozen=True)(type("Gusts", (effect_class("buffeting"),), {"name": "gusts"}))
+    with pytest.raises(TunnelError, match="spectrum of buffeting"), answering_with([*ALL_EFFECTS, own]):
+        pass
+    with answering_with([kind for kind in ALL_EFFECTS if kind.random != "broad_band"] + [own]):
+        assert effect_class("gusts") is own
 
 
 @pytest.mark.usefixtures("clean_registry")
