@@ -104,7 +104,7 @@ def gap_test(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
         The verdict at one rate of false alarms, shared equally among the tests (Bonferroni).
     """
     chosen = fit.settings.gap
-    level, scatter = noise.expected(fit)
+    level, scatter = noise.rounding.expected(fit)
     floor = (1.0 + chosen.noise_tolerance) * noise.margin * level
     noisy: dict[str, float] = {}
     if noise.shown and not coarse_step:
@@ -143,7 +143,7 @@ def gap_or_colour(
         noise small.
     """
     noise = noise.rounded(nominal, step)
-    allowed = noise.allowed_in(nominal.problem.data)
+    allowed = noise.rounding.allowed_in(nominal.problem.data)
     if allowed is not nominal.problem.data:
         nominal = refit(Problem(allowed), nominal.point)
     for candidate in _candidates(nominal, noise):

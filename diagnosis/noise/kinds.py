@@ -1,35 +1,34 @@
-"""The noise of a campaign, one type for each way in which it was found, and what it makes of the tests of a gap."""
+"""The noise of a campaign, one type for each way in which it was found."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar
 
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.run_noise import WhiteNoise
-from diagnosis.noise.bands import TESTS, powers
 from diagnosis.noise.colour import Colour
-from diagnosis.noise.rounding import rounding_errors
+from diagnosis.noise.rounding import Rounding
 from tunnel_sim.vocabulary.record import Array
 
 _LEAST_WHITE = 1e-3  # of the variance: some of it is white, however coarse the step
 
 
 @dataclass(frozen=True, eq=False)
-class Noise(ABC):
-    """A campaign's noise.
+class Noise:
+    """A campaign's noise, white unless a kind says otherwise.
 
     Args:
         variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
         stated_variance: of one sample as the campaign states it, rad²; None where it does not.
-        reason: why this kind was chosen.
+        reason: why it is of this kind.
         estimated: the records' own variance, mean over the runs, rad².
         relative: standard deviation of that estimate, a share of it.
         measured: variance of one sample as the spectrum above the motion shows it, rad², by run id.
+        rounding: what rounding leaves beside white noise.
     """
 
     variance: dict[str, float]
@@ -38,16 +37,12 @@ class Noise(ABC):
     estimated: float
     relative: float
     measured: Mapping[str, float]
+    rounding: Rounding = field(default_factory=Rounding)
 
-    @property
-    @abstractmethod
-    def source(self) -> str:
-        """Of the variance used: ``stated``, ``estimated`` or ``floor``."""
-
-    @property
-    def shown(self) -> bool:
-        """Whether the records show it, so that its level and its trend with the motion are tested."""
-        return True
+    #: Of the variance used: ``stated``, ``estimated`` or ``floor``.
+    source: ClassVar[str]
+    #: Whether the records show it, so that its level and its trend with the motion are tested.
+    shown: ClassVar[bool] = True
 
     @property
     def used(self) -> float:
@@ -74,14 +69,6 @@ class Noise(ABC):
         del frequency
         return self.relative
 
-    def expected(self, fit: Fit) -> tuple[Array, Array]:
-        """The power that it gives the residuals of a fit by `TESTS`, and the scatter of that, shape (tests,) each.
-
-        Both are shares of the power of white noise of the fit's variance; the scatter is that beyond white noise's.
-        """
-        del fit
-        return np.ones(len(TESTS)), np.zeros(len(TESTS))
-
     def white(self, step: float) -> dict[str, float]:
         """The white noise before rounding.
 
@@ -102,17 +89,8 @@ class Noise(ABC):
         return found
 
     def rounded(self, fit: Fit, step: float) -> Noise:
-        """The noise with what rounding makes of the residuals of a fit, where that is not white.
-
-        Args:
-            step: of the lattice of the readings, rad; 0 where there is none.
-        """
-        errors = rounding_errors(fit, self.white(step), step)
-        return self if errors is None else Rounded(*self._figures(), self, errors)
-
-    def allowed_in(self, data: Data) -> Data:
-        """Data prepared for white noise, with this noise of block means; the same data where that is white."""
-        return data
+        """The noise with what rounding to a lattice of some step, rad, leaves in the residuals of a fit."""
+        return replace(self, rounding=Rounding.of(fit, self.white(step), step))
 
     def coloured(self, colour: Colour, data: Data) -> Coloured:
         """The same noise, found to have a colour, and with an estimate of all power that the records resolve."""
@@ -121,115 +99,41 @@ class Noise(ABC):
             for run in data.runs
         ]
         whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
-        found = Coloured(*self._figures(), self, colour)
-        return replace(found, estimated=whole, reason=f"it is coloured, {np.sqrt(whole):.3g} rad in all")
-
-    def _figures(self) -> tuple[dict[str, float], float | None, str, float, float, Mapping[str, float]]:
-        return (
-            self.variance, self.stated_variance, self.reason, self.estimated, self.relative, self.measured,
-        )  # fmt: skip
+        known = {one.name: getattr(self, one.name) for one in fields(self)}
+        known |= {"estimated": whole, "reason": f"it is coloured, {np.sqrt(whole):.3g} rad in all"}
+        return Coloured(**known, spectrum=colour)
 
 
 class Stated(Noise):
     """White noise as the campaign states it, with which the records agree."""
 
-    @property
-    def source(self) -> str:
-        """The statement."""
-        return "stated"
+    source = "stated"
 
 
 class Estimated(Noise):
     """White noise as the records show it."""
 
-    @property
-    def source(self) -> str:
-        """The records."""
-        return "estimated"
+    source = "estimated"
 
 
 class Floor(Noise):
     """The accuracy of the fits, as white noise, where the records contain less noise than that."""
 
-    @property
-    def source(self) -> str:
-        """The fits."""
-        return "floor"
-
-    @property
-    def shown(self) -> bool:
-        """It is not the records' own."""
-        return False
+    source, shown = "floor", False
 
 
-@dataclass(frozen=True, eq=False)
-class Rounded(Noise):
-    """Noise of readings on a lattice, whose rounding error is not white.
-
-    Args:
-        before: the noise without regard to that.
-        errors: what noise and rounding alone leave in the block means, by run, repetitions of it, shape
-            (repetitions, blocks), rad.
-    """
-
-    before: Noise
-    errors: Sequence[Array]
-
-    @property
-    def source(self) -> str:
-        """That of the noise."""
-        return self.before.source
-
-    @property
-    def shown(self) -> bool:
-        """As the noise."""
-        return self.before.shown
-
-    def expected(self, fit: Fit) -> tuple[Array, Array]:
-        """From the repetitions; not less than white noise."""
-        found, count = [], np.ones(len(TESTS))
-        for number in range(len(self.errors[0])):
-            residuals = [
-                run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, self.errors, strict=True)
-            ]
-            power, ordinates, _ = powers(fit, residuals)
-            count = np.maximum(ordinates, 0.5)  # any number where there are none
-            found.append(power / count)
-        level = np.mean(found, axis=0)
-        beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
-        return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
-
-    def rounded(self, fit: Fit, step: float) -> Noise:
-        """The noise with what rounding makes of the residuals of another fit."""
-        return self.before.rounded(fit, step)
-
-    def allowed_in(self, data: Data) -> Data:
-        """With noise of block means that is not below the errors.
-
-        It is raised where averaging does not reduce the errors as it reduces white noise, at most to that of one
-        sample.
-        """
-        raised = [
-            float(np.clip(np.mean(error**2), run.noise.variance, run.noise.variance * run.block))
-            for run, error in zip(data.runs, self.errors, strict=True)
-        ]
-        if all(run.noise.variance == value for run, value in zip(data.runs, raised, strict=True)):
-            return data
-        runs = [replace(run, noise=WhiteNoise(value)) for run, value in zip(data.runs, raised, strict=True)]
-        return data.with_runs(tuple(runs))
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Coloured(Estimated):
     """Noise whose spectrum the records show; its variance used is that of the white noise assumed before.
 
     Args:
-        before: that white noise, rounded or not.
         spectrum: its power relative to that.
     """
 
-    before: Noise
     spectrum: Colour
+
+    #: The spectrum is that of the records.
+    margin: ClassVar[float] = 1.0
 
     @property
     def colour(self) -> Colour:
@@ -241,19 +145,6 @@ class Coloured(Estimated):
         """Standard deviation of one sample, all power that the records resolve, rad."""
         return float(np.sqrt(self.estimated))
 
-    @property
-    def margin(self) -> float:
-        """None: the spectrum is that of the records."""
-        return 1.0
-
     def spread(self, frequency: Array) -> float:
         """That of the spectrum."""
         return self.spectrum.spread(frequency)
-
-    def expected(self, fit: Fit) -> tuple[Array, Array]:
-        """As before, since the residuals are whitened."""
-        return self.before.expected(fit)
-
-    def rounded(self, fit: Fit, step: float) -> Noise:
-        """With the colour kept."""
-        return replace(self, before=self.before.rounded(fit, step))

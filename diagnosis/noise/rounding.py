@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.run_data import RunData
+from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import WhiteNoise
+from diagnosis.noise.bands import TESTS, powers
 from tunnel_sim.vocabulary.record import Array
 
 #: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
@@ -61,16 +64,69 @@ def repeated(
         yield run, motion, reading
 
 
-def rounding_errors(
-    fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None
-) -> list[Array] | None:
-    """What noise and rounding alone leave in the block means, arguments as in `repeated`.
+class Rounding:
+    """What rounding leaves in block means beside white noise: nothing, where the noise blurs the lattice."""
 
-    Returns:
-        By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
-        the rounding error white.
+    @classmethod
+    def of(cls, fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None) -> Rounding:
+        """In the residuals of a fit, arguments as in `repeated`."""
+        if min(white.values()) > _BLURS * step:
+            return Rounding()
+        again = repeated(fit, white, step, repetitions(fit, _FEWEST, _MOST), levels)
+        return Rounded([run.means(reading - motion) for run, motion, reading in again])
+
+    def residuals(self, data: Data) -> list[list[Array]]:
+        """What noise and rounding alone leave as white residuals of data, by repetition and by run."""
+        del data
+        return []
+
+    def expected(self, fit: Fit) -> tuple[Array, Array]:
+        """Mean power of the residuals of a fit by `TESTS`, and its scatter, shape (tests,) each.
+
+        Both are shares of the power of white noise of the fit's variance; the scatter is that beyond white noise's.
+        """
+        del fit
+        return np.ones(len(TESTS)), np.zeros(len(TESTS))
+
+    def allowed_in(self, data: Data) -> Data:
+        """Data prepared for white noise, with noise of block means that is not below what rounding leaves."""
+        return data
+
+
+@dataclass(frozen=True, eq=False)
+class Rounded(Rounding):
+    """An error that is not white.
+
+    Args:
+        errors: that noise and rounding leave, by run, repetitions of it, shape (repetitions, blocks), rad.
     """
-    if min(white.values()) > _BLURS * step:
-        return None
-    count = repetitions(fit, _FEWEST, _MOST)
-    return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count, levels)]
+
+    errors: Sequence[Array]
+
+    def residuals(self, data: Data) -> list[list[Array]]:
+        """The errors, scaled."""
+        each = range(len(self.errors[0]))
+        return [[run.scaled(e[k]) for run, e in zip(data.runs, self.errors, strict=True)] for k in each]
+
+    def expected(self, fit: Fit) -> tuple[Array, Array]:
+        """From the repetitions; not less than white noise."""
+        seen = [powers(fit, residuals)[:2] for residuals in self.residuals(fit.problem.data)]
+        count = np.maximum(seen[0][1], 0.5)  # any number where there are none
+        found = [power / count for power, _ in seen]
+        level = np.mean(found, axis=0)
+        beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
+        return np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
+
+    def allowed_in(self, data: Data) -> Data:
+        """Raised where averaging does not reduce the errors as white noise, at most to that of one sample.
+
+        The same data where none is raised.
+        """
+        raised = [
+            float(np.clip(np.mean(error**2), run.noise.variance, run.noise.variance * run.block))
+            for run, error in zip(data.runs, self.errors, strict=True)
+        ]
+        if all(run.noise.variance == value for run, value in zip(data.runs, raised, strict=True)):
+            return data
+        runs = [replace(run, noise=WhiteNoise(value)) for run, value in zip(data.runs, raised, strict=True)]
+        return data.with_runs(tuple(runs))

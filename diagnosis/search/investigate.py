@@ -24,7 +24,7 @@ from diagnosis.model.similar import similar_campaign
 from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.kinds import Noise
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
-from diagnosis.noise.rounding import rounding_errors
+from diagnosis.noise.rounding import Rounding
 from diagnosis.noise.sensor_noise import (
     NoiseTrend,
     campaign_noise,
@@ -462,19 +462,14 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
     own = np.zeros(len(CHANNELS))
     if found.hum is not None:
         own += weighing.hum_left * found.hum.excess * base.count * _IN_HARMONICS
-    errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
         white = found.noise.white(typical_step(levels))
         # a coarse step hides the noise, so that what is stated of it is the better guess
         white = dict.fromkeys(white, stated) if stated else white
-        errors = rounding_errors(base, white, found.step, levels)
-    if errors is not None:
-        tries = [
-            misfit(base, [run.scaled(e[k]) for run, e in zip(base.problem.data.runs, errors, strict=True)])
-            for k in range(len(errors[0]))
-        ]
-        own += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
+        rounding = Rounding.of(base, white, found.step, levels)
+        tries = [misfit(base, residuals).excess for residuals in rounding.residuals(base.problem.data)]
+        own += np.maximum(np.mean(tries, axis=0), 0.0) if tries else 0.0
     sets = [h.fitted_set(base) for h in found.hypotheses]
     sets += [h.fitted_set(base, outside=True) for h in found.outside]
     sets += [answer.left for answer in found.random]

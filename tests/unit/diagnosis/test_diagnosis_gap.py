@@ -10,7 +10,8 @@ from diagnosis.likelihood.residuals import resonance
 from diagnosis.noise import gap
 from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import Colour
-from diagnosis.noise.kinds import Estimated, Floor, Rounded, Stated
+from diagnosis.noise.kinds import Estimated, Floor, Stated
+from diagnosis.noise.rounding import Rounded
 from diagnosis.noise.sensor_noise import NoiseTrend
 from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import campaign, nominal
@@ -111,12 +112,12 @@ def test_what_rounding_leaves_beside_white_noise_is_no_gap(fitted):
     runs, std = fitted.problem.data.runs, np.sqrt(3.0)
     louder = replace(fitted, residuals=[std * r for r in white(fitted, rng).residuals])
     errors = [std * run.noise.scale * rng.normal(size=(16, run.reading.size)) for run in runs]
-    rounded = Rounded(NOISE.variance, None, "", NOISE.estimated, 0.0, NOISE.measured, NOISE, errors)
+    rounding = Rounded(errors)
     assert verdict(louder).detected
-    assert not verdict(louder, noise=rounded).detected
-    assert rounded.allowed_in(fitted.problem.data) is fitted.problem.data
+    assert not verdict(louder, noise=replace(NOISE, rounding=rounding)).detected
+    assert rounding.allowed_in(fitted.problem.data) is fitted.problem.data
     averaged = at_a_kilohertz(fitted).problem.data  # of four samples, which reduce white noise by as much
-    raised = [run.noise.variance / NOISE.used for run in rounded.allowed_in(averaged).runs]
+    raised = [run.noise.variance / NOISE.used for run in rounding.allowed_in(averaged).runs]
     assert raised == pytest.approx([3.0] * 6, rel=0.05)
 
 
@@ -127,20 +128,16 @@ def test_every_kind_of_noise_says_how_it_was_found(fitted):
     """Noise of twice the power of the white noise assumed, in all frequencies."""
     data = fitted.problem.data
     for kind, source in ((Stated, "stated"), (Estimated, "estimated"), (Floor, "floor")):
-        white_noise = noise_of(kind, 1.6e-7, 1.6e-7, 1.76e-7)
-        rounded = white_noise.rounded(fitted, 4.0 * NOISE.std)
-        assert isinstance(rounded, Rounded)
-        for noise in (white_noise, rounded):
-            assert (noise.source, noise.shown, noise.colour) == (source, source != "floor", None)
-            assert (noise.margin, noise.std, noise.spread(np.ones(3))) == (pytest.approx(1.1), NOISE.std, 0.0)
-            coloured = noise.coloured(FLAT, data)
-            assert (coloured.source, coloured.shown, coloured.margin) == ("estimated", True, 1.0)
-            assert coloured.std == pytest.approx(np.sqrt(2.0) * NOISE.std)
-            assert coloured.spread(np.ones(3)) == pytest.approx(0.1)
-            assert np.array_equal(coloured.expected(fitted), noise.expected(fitted))
-            again = coloured.rounded(fitted, 4.0 * NOISE.std)
-            assert (again.colour, again.std) == (FLAT, coloured.std)
-            assert np.array_equal(again.expected(fitted), rounded.expected(fitted))
+        noise = noise_of(kind, 1.6e-7, 1.6e-7, 1.76e-7).rounded(fitted, 4.0 * NOISE.std)
+        assert (noise.source, noise.shown, noise.colour) == (source, source != "floor", None)
+        assert (noise.margin, noise.std, noise.spread(np.ones(3))) == (pytest.approx(1.1), NOISE.std, 0.0)
+        coloured = noise.coloured(FLAT, data)
+        assert (coloured.source, coloured.shown, coloured.margin) == ("estimated", True, 1.0)
+        assert coloured.std == pytest.approx(np.sqrt(2.0) * NOISE.std)
+        assert coloured.spread(np.ones(3)) == pytest.approx(0.1)
+        assert coloured.rounding is noise.rounding
+        again = coloured.rounded(fitted, 4.0 * NOISE.std)
+        assert (type(again), again.colour, again.std) == (type(coloured), FLAT, coloured.std)
 
 
 def test_noise_that_misbehaves_is_a_gap_unless_a_coarse_step_explains_it(fitted):
