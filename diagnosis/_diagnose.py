@@ -11,24 +11,19 @@ import numpy as np
 
 from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
+from diagnosis.answer.judgements import springs_off
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
-from diagnosis.answer.verdict import choice_words, spring_words
-from diagnosis.closure import UNPATCHED, PatchedModel
-from diagnosis.diagnosable import (
-    BY_MOMENT,
-    NOT_SOUGHT,
-    choose,
-    gain_words,
-    refuse_undiagnosable,
-)
+from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable
+from diagnosis.facts.found import Fact, as_stated
+from diagnosis.facts.patch import PatchedModel
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
-from diagnosis.noise.gap import noise_remarks
-from diagnosis.noise.mains import hum_remarks
+from diagnosis.noise.gap import noise_noted
+from diagnosis.noise.mains import hum_noted
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
-from diagnosis.search.investigate import Progress
+from diagnosis.search.investigate import Progress, Study
 from diagnosis.search.lead import investigate_with_lead
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
@@ -40,9 +35,6 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from tunnel_sim.engine.joint_model import JointModel
-
-
-_NOT_SOLVED = "How much of what remains could be closed was not found: its equations cannot be solved."
 
 
 def diagnose(
@@ -79,58 +71,89 @@ def diagnose(
     say = progress or (lambda _: None)
     with answering_with(kinds):
         chosen = choose(campaign, kinds, settings.selection, own)
-        try:  # noise, nominal fit, where, search
-            study = investigate_with_lead(chosen.campaign, chosen.kinds, progress, chosen.model, settings)
-        except TunnelError as error:
-            if not chosen.limit_cycles:
-                raise
-            raise refused_limit_cycles(chosen.remarks) from error
+        study = _studied(chosen, progress, settings)
         say("how far it closes")  # where it is, and the answer without what no effect explains
-        where, maps = localise(study)
-        patched: PatchedModel | None = None
-        unpatched: tuple[str, ...] = ()
-        if joint is not None:
-            from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
-
-            try:
-                patched = patched_model(study, joint)
-            except TunnelError as error:
-                unpatched = (f"{UNPATCHED}: {error.what}.",)
-        by_moment = (BY_MOMENT,) if study.by_moment else ()
-        left_out = (*chosen.left_out, *by_moment, *gain_words(chosen.campaign, study.chosen), *unpatched)
-        left_out += study.model.lead_words(study.similarity)
-        assembled = assemble(study, where, maps, left_out, patched, chosen.kinds)
-        sized = replace(
-            assembled,
-            remarks=(
-                *chosen.remarks,
-                *noise_remarks(study.noise, study.trend, study.test),
-                *hum_remarks(study.campaign, study.hum, study.similarity),
-            ),
-            sizes=cause_sizes(study) if study.named else (),
-            data=chosen.examined,
-        )
-        answer = in_own_units(sized, study.similarity)
+        patched, unpatched = (None, ()) if joint is None else _patched(study, joint)
+        answer = _assembled(study, chosen, patched, unpatched)
         if chosen.limit_cycles:
-            return limit_cycle_answer(answer, chosen.remarks)
-        if chosen.campaign.driven:  # the remainder's laws are sought along free decays
-            answer = replace(answer, cautions=(*answer.cautions, NOT_SOUGHT))
+            answer = limit_cycle_answer(answer, chosen.remarks)
         else:
-            say("what no effect explains")
-            decided = answer.decision.decided  # of an undecided diagnosis the whole gap remains
-            significant = not decided or (answer.rest is not None and answer.rest.significant)
-            try:
-                with np.errstate(over="raise"):  # a fitted model that runs away
-                    found = closable(study, significant=significant, decided=decided)
-                answer = replace(answer, closable=found)
-            except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
-                answer = replace(answer, cautions=(*answer.cautions, _NOT_SOLVED))
-        # below one half a set of effects comes first, though each of them may be less probable than none
-        odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
-        likeliest = max(odds, key=odds.__getitem__, default="")
-        modes = second_modes(chosen.campaign, settings.words) if likeliest in UNKNOWN else ()
-        springs = () if answer.decision.decided and likeliest not in UNKNOWN else spring_words(study)
-        return replace(answer, verdict=" ".join((*modes, answer.verdict, *choice_words(study), *springs)))
+            answer = _with_remainder(answer, study, chosen, say)
+        return answer.in_words()
+
+
+def _studied(chosen: Chosen, progress: Progress | None, settings: Settings) -> Study:
+    """Noise, nominal fit, where, search.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted.
+    """
+    try:
+        return investigate_with_lead(chosen.campaign, chosen.kinds, progress, chosen.model, settings)
+    except TunnelError as error:
+        if not chosen.limit_cycles:
+            raise
+        raise refused_limit_cycles(chosen.remarks) from error
+
+
+def _patched(study: Study, model: JointModel) -> tuple[PatchedModel | None, tuple[Fact, ...]]:
+    """The model with the causes written into it; None with a caveat where that fails."""
+    from diagnosis.patch.patched_model import patched_model  # only here: MuJoCo is slow to load
+
+    try:
+        return patched_model(study, model), ()
+    except TunnelError as error:
+        return None, (Fact("unpatched", {"reason": error.what}),)
+
+
+def _assembled(
+    study: Study, chosen: Chosen, patched: PatchedModel | None, unpatched: tuple[Fact, ...]
+) -> Diagnosis:
+    """The answer in the units of the campaign, without what no effect explains and without words."""
+    by_moment = (Fact("by moment"),) if study.by_moment else ()
+    gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
+    lead = map(as_stated, study.model.lead_words(study.similarity))
+    left_out = (*chosen.left_out, *by_moment, *gain, *unpatched, *lead)
+    answer = assemble(study, *localise(study), left_out, patched, chosen.kinds)
+    noted = (
+        *noise_noted(study.noise, study.trend, study.test),
+        *hum_noted(study.campaign, study.hum, study.similarity),
+    )
+    sized = replace(
+        answer,
+        remarks=chosen.remarks,
+        sizes=cause_sizes(study) if study.named else (),
+        found=replace(answer.found, noted=noted),
+        data=chosen.examined,
+    )
+    return in_own_units(sized, study.similarity)
+
+
+def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progress) -> Diagnosis:
+    """The answer with what could be closed of what remains, and what else may explain it."""
+    decided, caution = answer.decision.decided, tuple[Fact, ...]()
+    if chosen.campaign.driven:  # the remainder's laws are sought along free decays
+        caution = (Fact("remainder not sought"),)
+    else:
+        say("what no effect explains")
+        # of an undecided diagnosis the whole gap remains
+        significant = not decided or (answer.rest is not None and answer.rest.significant)
+        try:
+            with np.errstate(over="raise"):  # a fitted model that runs away
+                left = closable(study, significant=significant, decided=decided)
+            answer = replace(answer, closable=left)
+        except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
+            caution = (Fact("remainder not solved"),)
+    # below one half a set of effects comes first, though each of them may be less probable than none
+    odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
+    unknown = max(odds, key=odds.__getitem__, default="") in UNKNOWN
+    found = replace(
+        answer.found,
+        second_modes=second_modes(chosen.campaign, study.settings.words) if unknown else (),
+        springs_off=springs_off(study) if unknown or not decided else None,
+        cautions=(*answer.found.cautions, *caution),
+    )
+    return replace(answer, found=found)
 
 
 def read_model(

@@ -13,15 +13,15 @@ from diagnosis.answer.candidates import candidates
 from diagnosis.answer.held_out import HeldOut, both_ends, excess_base, one_more, predict_held_out
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.units import own_next_run
-from diagnosis.closure import share_closed
 from diagnosis.diagnosable import comparable_runs, diagnosable
+from diagnosis.facts.closure import share_closed
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
-from diagnosis.printing import plain
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.hypothesis import Hypothesis, polish, restricted
 from diagnosis.search.investigate import nominal_study
 from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
+from diagnosis.words.names import plain
 from tunnel_sim.effects import effect_class, known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError

@@ -10,6 +10,7 @@ from statistics import median
 
 import numpy as np
 
+from diagnosis.facts.found import Fact, as_stated
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import free_frequency, response_to_input
 from diagnosis.model.choose import nominal_model
@@ -75,7 +76,7 @@ class Chosen:
         campaign: those of them that one model can be fitted to.
         model: that model.
         kinds: the effects to answer with; none where all runs are in limit cycles.
-        left_out: sentences that say which runs and effects were left out, and why.
+        left_out: which runs and effects were left out, and why.
     """
 
     examined: Campaign
@@ -83,7 +84,7 @@ class Chosen:
     model: NominalModel
     kinds: tuple[type[Effect], ...]
     remarks: tuple[Remark, ...]
-    left_out: tuple[str, ...]
+    left_out: tuple[Fact, ...]
     limit_cycles: bool
 
 
@@ -109,20 +110,16 @@ def choose(
     if compared.sensor.derivative:
         # Their sizes are those of angles, and their ranges too; a mode moves the body.
         kinds = [kind for kind in kinds if kind.channel != "sensor" or kind.line == "ringing"]
-        tried = (
-            "No effect of the sensor is"
-            if compared.driven
-            else "A second mode is the only effect of the sensor that is"
-        )
-        left_out = (*left_out, f"{tried} tried on {compared.sensor.quantity}s.")
+        tried = "no sensor effect tried" if compared.driven else "only a second mode tried"
+        left_out = (*left_out, Fact(tried, {"quantity": compared.sensor.quantity}))
     kinds, said_of_drive = kinds_for(compared, kinds, model)
-    left_out = (*left_out, *said_of_drive, *model.notes())
+    left_out = (*left_out, *map(as_stated, (*said_of_drive, *model.notes())))
     known = () if found.limit_cycles else kinds
     return Chosen(found.campaign, compared, model, known, found.remarks, left_out, found.limit_cycles)
 
 
-def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out the runs that cannot be fitted together with the others, and say in sentences which and why.
+def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Campaign, tuple[Fact, ...]]:
+    """Leave out the runs that cannot be fitted together with the others, and say which and why.
 
     Where some runs state ``spring_stiffness`` and others do not, the larger group remains (those that state it, if
     equal). Of runs that do not state it, those with the same frequency at the same wind speed remain: only they can
@@ -130,24 +127,15 @@ def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Ca
     """
     stated = [run for run in campaign.runs if run.spring_stiffness is not None]
     bare = [run for run in campaign.runs if run.spring_stiffness is None]
-    said = []
+    left_out = []
     kept, derivative = stated if len(stated) >= len(bare) else bare, campaign.sensor.derivative
     if stated and bare:
-        other, what = (bare, "state no") if kept is stated else (stated, "state their")
-        said.append(
-            f"Left out, since they {what} spring_stiffness and the others "
-            f"{'do' if kept is stated else 'do not'}: {_ids(other)}. State it for all runs, or diagnose these "
-            f"separately."
-        )
+        other, why = (bare, "stiffness not stated") if kept is stated else (stated, "stiffness stated")
+        left_out.append(Fact(why, {"runs": [run.id for run in other]}))
     if kept is bare:
         same = _of_one_spring(bare, derivative, settings.same_spring)
         if len(same) < len(bare):
-            other = [run for run in bare if run not in same]
-            said.append(
-                f"Left out, since different frequencies at one wind speed show more than one spring, and these "
-                f"runs may not have the spring of the rest: {_ids(other)}. State spring_stiffness, or diagnose "
-                f"these separately."
-            )
+            left_out.append(Fact("other springs", {"runs": [run.id for run in bare if run not in same]}))
         kept = same
     still: dict[float | None, list[float]] = defaultdict(list)
     for run in kept:
@@ -161,13 +149,11 @@ def comparable_runs(campaign: Campaign, settings: SelectionSettings) -> tuple[Ca
         and free_frequency(run, derivative) > settings.other_mode * median(still[run.spring_stiffness])
     ]
     if elsewhere:
-        said.append(
-            f"Left out, since they swing in another mode, {settings.other_mode:g} times as fast as the same spring "
-            f"with the wind off or faster: {_ids(elsewhere)}. Diagnose these separately."
-        )
+        figures = {"ratio": settings.other_mode, "runs": [run.id for run in elsewhere]}
+        left_out.append(Fact("another mode", figures))
         kept = [run for run in kept if run not in elsewhere]
     order = {run.id for run in kept}
-    return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(said)
+    return replace(campaign, runs=tuple(run for run in campaign.runs if run.id in order)), tuple(left_out)
 
 
 def _ids(runs: Sequence[Run]) -> str:
@@ -202,19 +188,6 @@ def _of_one_spring(runs: Sequence[Run], derivative: int, ratio: float) -> list[R
 
 
 _MOVING_ROOT = "Where the spring's root moves, its loss depends on that motion, and is not tried: {}."
-
-#: Said where effects are compared in this way.
-BY_MOMENT = (
-    "Nothing holds the body, so that small errors of the moment add up in its angle, which departs from every "
-    "model. Effects are therefore compared by the moment that they leave. It counts as random noise beside the "
-    "answer: parameters, coefficients and the shares in the table of answers come from fits with that noise. All "
-    "other sizes and shares are those of the angle."
-)
-
-#: Said of a campaign with driven runs.
-NOT_SOUGHT = (
-    "What could be closed of what remains, and by which formula, is not sought where a run is driven."
-)
 
 
 def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) -> None:

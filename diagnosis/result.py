@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from diagnosis.closure import Closable, Misfit, PatchedModel, Remainder, Waterfall
-from diagnosis.printing import Decision, decision, diagnosis_brief, diagnosis_parts
+from diagnosis.facts.checks import Confirmation, NoiseSummary
+from diagnosis.facts.closure import Misfit, Waterfall
+from diagnosis.facts.decision import Decision, decision
+from diagnosis.facts.found import Found
+from diagnosis.facts.patch import PatchedModel
+from diagnosis.facts.remainder import Closable, Remainder
 from diagnosis.settings import settings_of
+from diagnosis.words.lines import diagnosis_brief, diagnosis_parts
+from diagnosis.words.written import sentences
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text
 from identification.status import Remark
@@ -25,11 +31,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SCHEMA_VERSION = 1
-HELD_OUT = "on runs held out of the fit"
-FITTED = "in the fitted runs (none could be held out)"
 _LAST = (
     "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "hidden", "blind_spots", "cautions", "remarks", "seconds", "maps", "provenance",
+    "hidden", "blind_spots", "cautions", "remarks", "found", "seconds", "maps", "provenance",
 )  # fmt: skip
 
 
@@ -94,7 +98,7 @@ class GapSummary:
             fits; where nothing is found, in the fitted runs.
         excess_after: with the causes added, on the same readings, in units of the noise variance.
         closed: share of the gap closed, 0 to 1.
-        closed_on: what these are measured on, in words.
+        closed_on: what these are measured on (`diagnosis.facts.closure`).
         false_alarm_rate: of the test of detection, a fraction of the campaigns without a gap.
         p_value: of the strongest test, corrected for the number of tests.
         tests: p-value by name of test.
@@ -229,50 +233,11 @@ class Coefficients:
 
 
 @dataclass(frozen=True)
-class Confirmation:
-    """How far the fits' integrator and the MuJoCo model agree on what is reported.
-
-    Args:
-        agrees: whether every run's difference is within the tolerance, and MuJoCo could predict them all.
-        largest_difference: of any block mean of any run, rad.
-        run: id of the run that is closest to its tolerance, or farthest beyond it.
-        rms_difference: root mean square of that run's differences, rad.
-        tolerance: of it, a tenth of a block mean's noise, rad.
-        failure: why MuJoCo could not predict the runs; empty where it did.
-    """
-
-    agrees: bool
-    largest_difference: float
-    run: str
-    rms_difference: float
-    tolerance: float
-    failure: str = ""
-
-    def to_json_dict(self) -> dict[str, Any]:
-        """The fields, with units in their names."""
-        names = {name: f"{name}_rad" for name in ("largest_difference", "rms_difference", "tolerance")}
-        return {"model": "mujoco", **{names.get(name, name): value for name, value in vars(self).items()}}
-
-
-@dataclass(frozen=True)
-class NoiseSummary:
-    """The noise the gap is measured against.
-
-    Args:
-        std: of one sample, quantisation included, rad.
-        stated_std: likewise as the campaign states it, rad; None where it does not.
-        source: ``stated``, ``estimated`` or ``floor``: whose ``std`` is; the floor is the accuracy of the fits.
-    """
-
-    std: float
-    stated_std: float | None
-    source: str
-    reason: str
-
-
-@dataclass(frozen=True)
 class Diagnosis:
     """The whole answer.
+
+    Its text fields are empty until `in_words` writes them: ``verdict``, ``cautions`` and ``note``, ``reason``,
+    ``words`` and ``notes`` of its parts.
 
     Args:
         causes: effect names, sorted; empty: no gap; ``unknown``: a gap that no effect of the vocabulary closes.
@@ -291,12 +256,12 @@ class Diagnosis:
         model: the model given, with the causes written into it; None where none was given.
         closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
         sizes: what each fitted cause does to a swing.
+        found: what the words state beside the numbers.
         data: the runs, which are no part of the JSON; None for an answer that was not made by `diagnose`.
     """
 
     campaign: str
     causes: tuple[str, ...]
-    verdict: str
     gap: GapSummary
     where: Where
     candidates: tuple[Candidate, ...]
@@ -305,6 +270,7 @@ class Diagnosis:
     coefficients: Coefficients
     confirmation: Confirmation
     noise: NoiseSummary
+    verdict: str = ""
     hidden: tuple[Hidden, ...] = ()
     blind_spots: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -318,6 +284,7 @@ class Diagnosis:
     model: PatchedModel | None = None
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()
+    found: Found = field(default_factory=Found)
     data: Campaign | None = field(default=None, compare=False)
 
     @property
@@ -325,6 +292,22 @@ class Diagnosis:
         """Whether the answer is decided, and what the likely answers have in common."""
         chosen = settings_of({"provenance": self.provenance}).answer
         return decision([(c.effect, c.probability) for c in self.candidates], chosen, self.gap.closed)
+
+    def in_words(self) -> Diagnosis:
+        """The answer with its text fields, and the remarks on the noise after those of the examination."""
+        said = sentences(self.to_json_dict())
+        return replace(
+            self,
+            verdict=said.verdict,
+            where=replace(self.where, words=said.where),
+            rest=self.rest and replace(self.rest, words=said.rest),
+            closable=self.closable and replace(self.closable, words=said.closable),
+            coefficients=replace(self.coefficients, note=said.note),
+            noise=replace(self.noise, reason=said.noise),
+            cautions=said.cautions,
+            remarks=(*self.remarks, *(remark for remark in said.remarks if remark not in self.remarks)),
+            model=self.model and replace(self.model, notes=said.patch),
+        )
 
     def to_json_dict(self) -> dict[str, Any]:
         """The answer in JSON's types, by the published schema."""

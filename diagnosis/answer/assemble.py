@@ -1,4 +1,4 @@
-"""From a study to the answer: where, the gap on held-out runs, coefficients, rivals and text."""
+"""From a study to the answer: where, the gap on held-out runs, coefficients, rivals and what is said of them."""
 
 from __future__ import annotations
 
@@ -12,32 +12,27 @@ import numpy as np
 from diagnosis.answer.candidates import candidates, inclusion
 from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
+from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
-from diagnosis.answer.units import own_estimate, own_hidden, size_note, sized_coefficients
-from diagnosis.answer.verdict import (
-    cautions,
-    immaterial_words,
-    nearly_words,
-    remainder,
-    verdict,
-)
-from diagnosis.closure import PatchedModel
-from diagnosis.printing import decision, plain
-from diagnosis.result import Coefficients, Diagnosis, NoiseSummary, Where
+from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
+from diagnosis.facts.checks import NoiseSummary
+from diagnosis.facts.closure import PATCHED
+from diagnosis.facts.found import Fact, Nowhere, PlaceFound
+from diagnosis.facts.patch import PatchedModel
+from diagnosis.result import Coefficients, Diagnosis, Where
 from diagnosis.search.investigate import Study, located
 from diagnosis.search.weigh import UNKNOWN, main_effect
-from diagnosis.where.excess import bands_beyond_chance
+from diagnosis.where.described import described, nowhere
 from diagnosis.where.maps import Maps
 from diagnosis.where.place import blow_interval
 from diagnosis.where.survey import with_answer
-from diagnosis.where.words import agreement, describe, nowhere
 from tunnel_sim.effects import Effect, effect_class
 
 
-def localise(study: Study) -> tuple[Where, Maps]:
-    """Say where the nominal model departs from the runs.
+def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
+    """Say where the nominal model departs from the runs, and why.
 
     The place is that of the residuals alone. The causes only have to agree with it.
     """
@@ -46,7 +41,7 @@ def localise(study: Study) -> tuple[Where, Maps]:
     answer = None if study.chosen is study.nominal else study.chosen
     maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
     if not study.causes:
-        return Where(None, None, words=nowhere(found, within_step=study.test.within_step)), maps
+        return Where(None, None), maps, nowhere(found, within_step=study.test.within_step)
     compared = list(study.read_off) if study.named else []  # what has to agree with the place
     if study.named and study.fitted:
         shares = {answer.effects: answer.share for answer in study.weighed}
@@ -60,29 +55,9 @@ def localise(study: Study) -> tuple[Where, Maps]:
         amplitude_rad=found.maps.amplitude.interval(chosen.interval_share),
         frequency_hz=found.frequency_interval,
     )
-    bands = bands_beyond_chance(found.maps.bands, chosen)
-    words = describe(where, found, bands, place.channel, place.condition, study.settings)
-    agreed = agreement(where, [effect_class(name) for name in compared])
-    return replace(where, words=f"{words} {agreed}".rstrip()), maps
+    return where, maps, described(where, place, [effect_class(name) for name in compared], study.settings)
 
 
-_CUT_RECORDS = (
-    "The nominal model misses the motion grossly, so each record is used only from its second passage through the "
-    "middle until its motion ends. A start driven by hand is not a free decay, and neither is a body at rest. The "
-    "coefficients before the causes may therefore differ from those of identify, which uses the whole record."
-)
-_RESTED = (
-    "The body is at rest at the end of {}. The fits leave that part out: the place where friction stops a body "
-    "says little about its motion."
-)
-_AS_IDENTIFIED = (
-    "With no cause these agree with the values of identify, whose standard deviations allow neither for effects "
-    "that could hide, nor for the rounding of the stated air density or the spectrum of the noise."
-)
-_UNRESOLVED = (
-    "{} was fitted to the whole records and left out of the answer: neither the early nor the late half of them, "
-    "fitted by itself, shows it."
-)
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy")
 
 
@@ -90,14 +65,16 @@ def assemble(
     study: Study,
     where: Where,
     maps: Maps,
-    left_out: Sequence[str] = (),
+    said: PlaceFound | Nowhere,
+    left_out: Sequence[Fact] = (),
     patched: PatchedModel | None = None,
     kinds: Sequence[type[Effect]] = (),
 ) -> Diagnosis:
     """Compose the answer.
 
     Args:
-        left_out: sentences on runs that were left out.
+        said: why the gap is there.
+        left_out: caveats on runs and effects that were left out.
         patched: the model given with the causes written into it; the share closed is then its own.
         kinds: the effects that may act unnamed beside those of an answer.
     """
@@ -115,7 +92,7 @@ def assemble(
     steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
     gap = held_out_totals(gap, steps)
     if patched is not None and study.named:
-        on = f"{patched.closure.on}, simulated with the patched model"
+        on = f"{patched.closure.on}, {PATCHED}"
         gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
     seconds["waterfall"] = time.perf_counter() - begun
     begun = time.perf_counter()
@@ -123,10 +100,7 @@ def assemble(
     answers = possible_answers(study, kinds)
     after = coefficients(answers, study.campaign)
     before = before_the_causes(study.nominal, after) if study.causes else after
-    caveats = [effect_class(name).caveat for name in study.causes if name != "unknown"]
-    identified = _AS_IDENTIFIED if "cn_beta" in before and not study.causes else ""
-    note = " ".join(filter(None, (*caveats, identified, size_note(rig, windy="cn_beta" in before))))
-    found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig), note)
+    found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
     seconds["coefficients"] = time.perf_counter() - begun
     similarity, names = study.similarity, coefficients_of(chosen)
     stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
@@ -145,18 +119,13 @@ def assemble(
     ]
     fitted = [hypothesis.fit for effects in rivals if (hypothesis := study.hypothesis(effects)) is not None]
     noise = study.noise
+    of_answer = cautions(
+        study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
+    )
+    caveats = (*left_out, *of_answer, *outside_the_fits(study))
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
-        verdict=verdict(
-            study.causes,
-            decision([(one.effect, one.probability) for one in weighed], settings.answer, gap.closed),
-            gap,
-            rest=left,
-            both_winds=data.wind_on and any(not run.wind_on for run in data.runs),
-            beside=immaterial_words(before, after, settings.words) if study.named else nearly_words(study),
-            chosen=settings.words,
-        ),
         gap=gap,
         where=where,
         maps=maps.to_json_dict(),
@@ -169,7 +138,6 @@ def assemble(
             noise.std,
             None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance)),
             noise.source,
-            noise.reason,
         ),
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
         blind_spots=study.model.blind_spots(data),
@@ -178,20 +146,9 @@ def assemble(
             "versions": {name: version(name) for name in _PACKAGES},
             "settings": settings.differences(),
         },
-        cautions=(
-            *left_out,
-            *cautions(
-                study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
-            ),
-            *((_CUT_RECORDS,) if study.cut else ()),
-            *(
-                _UNRESOLVED.format(plain(*names).capitalize())
-                for names in dict.fromkeys(study.unresolved.values())
-            ),
-            *((_RESTED.format(", ".join(study.rested)),) if study.rested else ()),
-        ),
         inclusion=inclusion(weighed, study.read_off, settings.gap),
         waterfall=steps,
         rest=left,
         model=patched,
+        found=beside_the_numbers(study, said, before, after, caveats),
     )

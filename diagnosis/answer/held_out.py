@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.closure import Step, Waterfall
+from diagnosis.facts.closure import ON_BOTH, ON_RUNS, ON_STRETCHES, Step, Waterfall
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.partial import fit_seen, refit_releases
 from diagnosis.likelihood.residuals import resonance
@@ -250,10 +250,8 @@ class _Models:
         """What is held out of the fits."""
         runs = len(self._held_out(self._study.nominal).residuals)
         if runs == len(self._ids):
-            return "on runs held out of the fit"
-        if runs == 0:
-            return "on stretches of time held out of the fit"
-        return "on runs held out of the fit, and on stretches of time where a run is the only one of its kind"
+            return ON_RUNS
+        return ON_STRETCHES if runs == 0 else ON_BOTH
 
     def fitted_excess(self, names: Names) -> float:
         """What the causes leave in the readings they are fitted to, in noise variances of a sample."""

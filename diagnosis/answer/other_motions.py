@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from diagnosis.facts.found import Mode, TwoModes
 from diagnosis.result import Candidate, Coefficients, Diagnosis, Where
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import WordsSettings
@@ -34,14 +35,14 @@ class _Modes:
     left: float  # sum of squared residuals, rad²
 
 
-def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[str, ...]:
-    """Name a second mode in each run that shows one.
+def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[TwoModes, ...]:
+    """Find a second mode in each run that shows one.
 
     Returns:
-        A sentence for each run in which two decaying oscillations leave far less than one, and are farther
-        apart than the sum of their half-power widths, harmonics of the motion excepted; over the whole run, its
-        first half or its first quarter. What dies out before it swings to the other side is not a mode. Driven
-        runs are left out.
+        One for each run in which two decaying oscillations leave far less than one, and are farther apart than the
+        sum of their half-power widths, harmonics of the motion excepted; over the whole run, its first half or its
+        first quarter. What dies out before it swings to the other side is not a mode. Driven runs are left
+        out.
     """
     found = []
     for run in campaign.runs:
@@ -67,14 +68,9 @@ def second_modes(campaign: Campaign, chosen: WordsSettings) -> tuple[str, ...]:
             if abs(two.frequency[order[1]] - turns * two.frequency[order[0]]) < resolution:
                 continue  # not resolved, or a harmonic of the motion
             main, second = (
-                f"{two.amplitude[i]:.2g} rad at {two.frequency[i]:.3g} Hz, which decays at {two.rate[i]:.2g} 1/s"
-                for i in order
+                Mode(float(two.amplitude[i]), float(two.frequency[i]), float(two.rate[i])) for i in order
             )
-            found.append(
-                f"{run.id} contains a second mode: {second}, beside {main}. With it, what one free decay leaves "
-                f"falls by {100.0 * (1.0 - two.left / one.left):.0f} %. A rig with one degree of freedom has one "
-                f"mode: look for another motion, such as heave or the mount's."
-            )
+            found.append(TwoModes(run.id, main, second, 1.0 - two.left / one.left))
             break
     return tuple(found)
 
@@ -95,32 +91,28 @@ def _fit_modes(values: Array, interval: float, count: int, vectors: Array) -> _M
     return _Modes(upper.imag / (2.0 * np.pi), -upper.real, amplitude, float(residual @ residual))
 
 
-_NOTE = "no damping ratio and no derivative is stated, since no run is a free decay"
-
-
 def limit_cycle_answer(nominal: Diagnosis, remarks: Sequence[Remark]) -> Diagnosis:
     """The answer without effects replaced by ``unknown`` without coefficients, for runs in a limit cycle."""
     excess = nominal.gap.excess_before
     return replace(
         nominal,
         causes=UNKNOWN,
-        verdict=f"No run is a free decay, so no cause is named. {_recognised(remarks)}.",
         where=Where(None, None, tuple(run.id for run in nominal.gap.runs)),
         candidates=(Candidate("unknown", 1.0, excess, 0.0),),
-        coefficients=Coefficients({}, {}, _NOTE),
+        coefficients=Coefficients({}, {}),
         inclusion={},
         hidden=(),
         blind_spots=(),
         rest=None,
+        found=replace(nominal.found, place=None, nowhere=None, limit_cycles=_recognised(remarks)),
     )
 
 
 def refused_limit_cycles(remarks: Sequence[Remark]) -> TunnelError:
     """The refusal where not even the nominal model can be fitted to runs in a limit cycle."""
-    return TunnelError(
-        f"no run is a free decay: {_recognised(remarks)}", remedy="add decays at a lower wind speed"
-    )
+    what = ". ".join(f"{remark.runs[0]}: {remark.what}" for remark in _recognised(remarks))
+    return TunnelError(f"no run is a free decay: {what}", remedy="add decays at a lower wind speed")
 
 
-def _recognised(remarks: Sequence[Remark]) -> str:
-    return ". ".join(f"{r.runs[0]}: {r.what}" for r in remarks if in_limit_cycle(r.figures))
+def _recognised(remarks: Sequence[Remark]) -> tuple[Remark, ...]:
+    return tuple(remark for remark in remarks if in_limit_cycle(remark.figures))

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from diagnosis.answer.held_out import Base, HeldOut
-from diagnosis.closure import Misfit, Waterfall, share_closed
+from diagnosis.facts.checks import Confirmation
+from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Problem, blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.model.parameters import Point
-from diagnosis.result import FITTED, HELD_OUT, Confirmation, GapSummary, RunGap
+from diagnosis.result import GapSummary, RunGap
 from diagnosis.search.investigate import COARSE_STEP, Study
 from tunnel_sim.physics.run_settings import released_by_spring_end
 from tunnel_sim.physics.steps import report_substeps
@@ -218,7 +219,7 @@ def gap_summary(study: Study, base: Base, shown: Reported) -> GapSummary:
         excess_before=before,
         excess_after=after,
         closed=share_closed(before, after) if study.named else 0.0,
-        closed_on=HELD_OUT if shown.before_out else FITTED,
+        closed_on=ON_RUNS if shown.before_out else FITTED,
         runs=tuple(runs),
         false_alarm_rate=study.settings.gap.detection_rate,
         p_value=0.0 if study.read_off else study.test.p_value,

@@ -68,27 +68,6 @@ def sized_coefficients(
     return sized
 
 
-def size_note(rig: RigProperties, *, windy: bool) -> str:
-    """What is identified in place of the coefficients where sizes are not stated.
-
-    Args:
-        windy: whether there are aerodynamic coefficients at all.
-
-    Returns:
-        A sentence; empty where they are Cnβ and Cnr.
-    """
-    stated = {"frontal_area": rig.frontal_area, "reference_length": rig.reference_length}
-    missing = [name for name, value in stated.items() if value is None]
-    if not missing or not windy:
-        return ""
-    beta = "Cnβ" + "·A" * (rig.frontal_area is None) + "·l" * (rig.reference_length is None)
-    rate = "Cnr" + "·A" * (rig.frontal_area is None) + "·l²" * (rig.reference_length is None)
-    return (
-        f"[rig] states no {' and no '.join(missing)}, so {beta} and {rate} are identified, not Cnβ and Cnr. State "
-        f"{'both' if len(missing) > 1 else 'it'} to get Cnβ and Cnr."
-    )
-
-
 _NEXT_RUN = {"spring_stiffness": "N m/rad", "duration": "s"}
 _STEPS = {
     "spring_stiffness": 0.01,

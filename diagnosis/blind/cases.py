@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from diagnosis.printing import Decision, decision
+from diagnosis.facts.decision import Decision, decision
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
 from identification.statistics import Proportion

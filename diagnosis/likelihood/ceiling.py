@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.closure import Ceiling
+from diagnosis.facts.remainder import Ceiling
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
 from diagnosis.likelihood.run_data import folds

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import bdtrc, chdtrc, stdtr
 
+from diagnosis.facts.found import Fact, Noted
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited
@@ -20,7 +21,6 @@ from diagnosis.noise.kinds import Coloured, Noise
 from diagnosis.noise.rounding import repeated, repetitions, samples
 from diagnosis.noise.sensor_noise import NoiseTrend, trend_statistics
 from diagnosis.settings import GapSettings
-from identification.status import Outcome, Remark
 from tunnel_sim.effects import the_effect
 
 _MOST, _FEWEST = 32, 16  # repetitions of the campaign
@@ -262,32 +262,16 @@ def _beside_mode(nominal: Fit) -> Fit | None:
     return try_fit(driven[0].problem, driven[0].point) if driven else None
 
 
-def noise_remarks(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Remark, ...]:
+def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Noted, ...]:
     """What the user should know of the noise.
 
     Args:
         trend: of the noise with the motion.
 
     Returns:
-        Remarks where the noise is coloured, where the sampling is too slow to compare it with the motion, and where
-        the readings' steps may be all of the gap.
+        Where the readings' steps may be all of the gap, where the noise is coloured, and where the sampling is too
+        slow to compare it with the motion.
     """
-    found = []
-    runs = tuple(noise.variance)
-    if test.within_step:
-        what = (
-            "the model departs from the readings by less than their steps, whose error may follow the motion"
-        )
-        found.append(Remark(Outcome.NOTED, runs, what, "read the angle more finely to see smaller gaps"))
-    if noise.colour is not None:
-        span = noise.colour.frequency[-1] / noise.colour.frequency[0]
-        ratio = np.exp(np.ptp(noise.colour.level))
-        what = (
-            f"the sensor's noise is coloured: {noise.std:.3g} rad in all, and its power per hertz varies by a "
-            f"factor of {ratio:.3g} over a factor of {span:.3g} in frequency, in the same way throughout the runs"
-        )
-        found.append(Remark(Outcome.NOTED, runs, what, "the diagnosis allows for it, and it is not a cause"))
-    if not trend.judged:
-        what = "sampled too slowly to test whether the noise follows the motion or comes in bursts"
-        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to test it"))
-    return tuple(found)
+    within = (Fact("within step"),) if test.within_step else ()
+    slow = () if trend.judged else (Fact("not judged"),)
+    return tuple(Noted(tuple(noise.variance), one) for one in (*within, *noise.noted(), *slow))

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.run_data import Data
 from diagnosis.noise.colour import Colour
@@ -33,7 +34,7 @@ class Noise:
 
     variance: dict[str, float]
     stated_variance: float | None
-    reason: str
+    reason: Fact
     estimated: float
     relative: float
     measured: Mapping[str, float]
@@ -69,6 +70,21 @@ class Noise:
         del frequency
         return self.relative
 
+    def noted(self) -> tuple[Fact, ...]:
+        """What is remarkable of its spectrum."""
+        return ()
+
+    def cautions(self, contradicted: float) -> tuple[Fact, ...]:
+        """The caveat of an answer that is based on it.
+
+        Args:
+            contradicted: factor between standard deviations as stated and as seen, from which on they disagree.
+        """
+        ratio = self.estimated**0.5 / self.stated_variance**0.5 if self.stated_variance else 1.0
+        if 1.0 / contradicted < ratio < contradicted:
+            return ()
+        return (Fact(f"{'more' if ratio > 1.0 else 'less'} noise than stated", {"ratio": ratio}),)
+
     def white(self, step: float) -> dict[str, float]:
         """The white noise before rounding.
 
@@ -100,7 +116,7 @@ class Noise:
         ]
         whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
         known = {one.name: getattr(self, one.name) for one in fields(self)}
-        known |= {"estimated": whole, "reason": f"it is coloured, {np.sqrt(whole):.3g} rad in all"}
+        known |= {"estimated": whole, "reason": Fact("coloured", {"std_rad": float(np.sqrt(whole))})}
         return Coloured(**known, spectrum=colour)
 
 
@@ -120,6 +136,11 @@ class Floor(Noise):
     """The accuracy of the fits, as white noise, where the records contain less noise than that."""
 
     source, shown = "floor", False
+
+    def cautions(self, contradicted: float) -> tuple[Fact, ...]:
+        """That it stands in for the records' own noise."""
+        del contradicted
+        return (Fact("floor", {"records_rad": self.estimated**0.5, "fits_rad": self.used**0.5}),)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -144,6 +165,13 @@ class Coloured(Estimated):
     def std(self) -> float:
         """Standard deviation of one sample, all power that the records resolve, rad."""
         return float(np.sqrt(self.estimated))
+
+    def noted(self) -> tuple[Fact, ...]:
+        """That the noise is coloured, and how much."""
+        span = self.spectrum.frequency[-1] / self.spectrum.frequency[0]
+        ratio = np.exp(np.ptp(self.spectrum.level))
+        figures = {"std_rad": self.std, "power_ratio": float(ratio), "frequency_ratio": float(span)}
+        return (Fact("coloured", figures),)
 
     def spread(self, frequency: Array) -> float:
         """That of the spectrum."""

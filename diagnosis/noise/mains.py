@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtri
 
+from diagnosis.facts.found import Fact, Noted
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import (
     HARMONICS,
@@ -23,7 +24,6 @@ from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
 from diagnosis.likelihood.nondimensional import frequency as motion_frequency
 from diagnosis.noise.sensor_noise import SmoothCurve
 from diagnosis.settings import ReadOffSettings
-from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -179,7 +179,7 @@ def remove_hum(
     return dataclasses.replace(campaign, runs=tuple(cleaned)), hum
 
 
-def hum_remarks(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> tuple[Remark, ...]:
+def hum_noted(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> tuple[Noted, ...]:
     """What the user should know of a hum: which line is stated, and what the sample rate cannot tell.
 
     Args:
@@ -193,19 +193,14 @@ def hum_remarks(campaign: Campaign, hum: Hum | None, similarity: Similarity) -> 
     line = hum.harmonic * mains
     places = [float(abs(apparent(line, interval))) for interval in intervals]
     if hum.harmonic > 1:
-        what = f"the strongest line of the hum is at {line:.5g} Hz, {hum.harmonic} times the mains' frequency"
-        found.append(Remark(Outcome.NOTED, runs, what, "the stated amplitude is that line's"))
+        found.append(Fact("harmonic of the hum", {"line_hz": line, "harmonic": hum.harmonic}))
     if any(abs(place - line) > 1e-6 * line for place in places):
-        span = " to ".join(f"{place:.5g}" for place in sorted({min(places), max(places)}))
-        what = f"the hum's line of {line:.5g} Hz is above half the sample rate and appears at {span} Hz"
-        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to see it where it is"))
+        span = sorted({min(places), max(places)})
+        found.append(Fact("folded hum", {"line_hz": line, "places_hz": span}))
     other = alike(mains, hum.harmonic, intervals)
     if other is not None:
-        what = (
-            f"mains of {other:.5g} Hz would show the same line as mains of {mains:.5g} Hz at this sample rate"
-        )
-        found.append(Remark(Outcome.NOTED, runs, what, "sample faster to tell them apart"))
-    return tuple(found)
+        found.append(Fact("other mains", {"other_hz": other, "mains_hz": mains}))
+    return tuple(Noted(runs, one) for one in found)
 
 
 def _showing(campaign: Campaign, frequency: float, motion: float) -> list[tuple[Record, list[int]]]:

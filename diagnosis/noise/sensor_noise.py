@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.special import gammaincinv, ndtri
 
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.nondimensional import frequency
 from diagnosis.likelihood.prepare import BLOCK_INTERVAL
 from diagnosis.noise.kinds import Estimated, Floor, Noise, Stated
@@ -183,25 +184,23 @@ def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     fewer = sum(floors[run] > value for run, value in estimates.items())
     if fewer:
         used = {run: max(value, floors[run]) for run, value in estimates.items()}
-        reason = (
-            f"the records contain {np.sqrt(pooled):.1g} rad, in {fewer} of {len(used)} runs less than the accuracy "
-            "of the fits, which stands in for it"
-        )
+        reason = Fact("floor", {"std_rad": float(np.sqrt(pooled)), "fewer": fewer, "runs": len(used)})
         return Floor(used, stated, reason, pooled, 0.0, measured)
     apart = -float(ndtri(0.5 * chosen.own_rate / variances.size))
     agrees = -float(ndtri(0.5 * chosen.stated_rate))
     uniform = bool(np.all(np.abs(variances / pooled - 1.0) < apart * relative))
     used = dict.fromkeys(estimates, pooled) if uniform else estimates
-    found = f"{np.sqrt(pooled):.3g} ± {0.5 * uncertainty * np.sqrt(pooled):.1g} rad"
+    std = float(np.sqrt(pooled))
+    level = {"std_rad": std, "uncertainty_rad": 0.5 * uncertainty * std}
     if stated is None:
-        reason = "the campaign states no noise"
+        reason = Fact("not stated")
     elif uniform and abs(pooled / stated - 1.0) < agrees * uncertainty:
-        used, reason = dict.fromkeys(estimates, stated), f"the records agree: {found}"
-        return Stated(used, stated, reason, pooled, uncertainty, measured)
+        used = dict.fromkeys(estimates, stated)
+        return Stated(used, stated, Fact("agrees", level), pooled, uncertainty, measured)
     else:
-        span = f"{np.sqrt(variances.min()):.3g} to {np.sqrt(variances.max()):.3g} rad"
-        said = f"they contain {found}" if uniform else f"their noise differs by run, {span}"
-        reason = f"the records contradict the stated {np.sqrt(stated):.3g} rad: {said}"
+        span = {"least_rad": float(np.sqrt(variances.min())), "most_rad": float(np.sqrt(variances.max()))}
+        beside = {"stated_rad": float(np.sqrt(stated))}
+        reason = Fact("contradicts", beside | level) if uniform else Fact("differs by run", beside | span)
     return Estimated(used, stated, reason, pooled, uncertainty, measured)
 
 

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.answer.held_out import HeldOut, predict_held_out, predict_stretches, turns_of
-from diagnosis.closure import NativeClosure, PatchedModel
+from diagnosis.facts.closure import ON_RUNS, ON_STRETCHES
+from diagnosis.facts.found import Fact
+from diagnosis.facts.patch import NativeClosure, PatchedModel
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.partial import fit_seen
@@ -48,11 +50,11 @@ class FoundLaw:
 
     Args:
         patch: what is written into the model: native elements, and the rest as a program.
-        notes: where the native element is not the same law, and what is left out, in sentences.
+        differences: where the native element is not the same law, and what is left out.
     """
 
     patch: JointPatch
-    notes: tuple[str, ...]
+    differences: tuple[Fact, ...]
 
 
 def found_law(problem: Problem, common: Array, release: Array, noise: float, index: int = 0) -> FoundLaw:
@@ -75,7 +77,7 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
     turn = np.sqrt(physics.spring_stiffness / physics.yaw_inertia) or 2.0 * np.pi * REFERENCE_FREQUENCY
     rate = reach * turn
     r = np.linspace(-rate, rate, _GRID)
-    notes: list[str] = []
+    differences: list[Fact] = []
     loss = physics.parameters.get("loss_factor", 0.0) * np.sqrt(
         physics.spring_stiffness * physics.yaw_inertia
     )
@@ -112,14 +114,12 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
             ):
                 native += found
                 if missed >= 1e-6:
-                    notes.append(
-                        f"The {words} is written as a polynomial of third order, which misses "
-                        f"{100.0 * missed:.2g} % of its greatest moment within the records."
-                    )
+                    figures = {"moment": words, "missed_percent": 100.0 * missed}
+                    differences.append(Fact("polynomial", figures))
             else:
                 added = formula.program(values, {"b": "angle", "r": "rate"})
                 program = (*program, *added, _number("add")) if program else added
-                notes.append(f"The {words} has no native element; the plugin vwt.yaw_moment adds it.")
+                differences.append(Fact("no native element", {"moment": words}))
     units = ("N m", "N m/rad", "N m/rad2", "N m/rad3"), ("N m s/rad", "N m s2/rad2", "N m s3/rad3")
     k0, k1, k2, k3 = (own(float(v), unit) for v, unit in zip(spring, units[0], strict=True))
     c0, c1, c2 = (own(float(v), unit) for v, unit in zip(damping, units[1], strict=True))
@@ -131,34 +131,21 @@ def found_law(problem: Problem, common: Array, release: Array, noise: float, ind
         program=_own_program(program, law.rest + data.similarity.rest, own) if program else (),
         noise=noise,
     )
-    return FoundLaw(patch, (*notes, *_unwritten(physics, problem)))
+    return FoundLaw(patch, (*differences, *_unwritten(physics, problem)))
 
 
-def _unwritten(physics: RunSettings, problem: Problem) -> list[str]:
+def _unwritten(physics: RunSettings, problem: Problem) -> list[Fact]:
     """What the patched model does otherwise than the law found, or leaves out."""
-    notes = []
-    if physics.parameters.get("friction_moment"):
-        notes.append(
-            "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint creeps. Its "
-            "time constant is set to two steps, the shortest allowed."
-        )
-    if physics.parameters.get("presliding"):
-        notes.append("The presliding of the friction has no native element and is left out.")
-    if physics.rod_twist is not None:
-        notes.append("The twist of the rod is left out: it needs a body and a joint of its own.")
-    if any(kind.driven for kind in problem.effects):
-        notes.append(
-            "The delay of the input is not part of the model; the comparison applies it to the input."
-        )
-    if problem.data.wind_on:
-        notes.append("The air's moment is left out: the patched model is that of the runs with the wind off.")
     sensors = [kind.name for kind in problem.effects if kind.channel == "sensor"]
-    if sensors:
-        named = ", ".join(name.replace("_", " ") for name in sensors)
-        notes.append(
-            f"Of the sensor, and not part of the model: {named}; the comparison applies it to the reading."
-        )
-    return notes
+    left_out = {
+        "soft friction": bool(physics.parameters.get("friction_moment")),
+        "presliding": bool(physics.parameters.get("presliding")),
+        "rod": physics.rod_twist is not None,
+        "delayed input": any(kind.driven for kind in problem.effects),
+        "air": problem.data.wind_on,
+    }
+    found = [Fact(kind) for kind, left in left_out.items() if left]
+    return [*found, Fact("sensor", {"effects": sensors})] if sensors else found
 
 
 def _number(operation: str) -> float:
@@ -184,11 +171,6 @@ def _own_program(
         code += replaced.get(element, ())
     return (*code, value, own(1.0, "N m"), _number("multiply"))
 
-
-_EARLY = (
-    "The model's integrator moves the joint half a step, {:.3g} ms, before its input asks for it; RK4 and shorter "
-    "steps do not. The inertia that dampers seem to add in such steps is taken off what is written."
-)
 
 Simulate = Callable[[Array, Start, float], Motion]
 """From common parameters, a run's start and a duration (s) to a motion in the measured rig's units."""
@@ -217,7 +199,6 @@ def native_closure(
     before: list[Array] = []
     fitted: list[Array] = []
     native: list[Array] = []
-    on = "runs" if held else "stretches of time"
     for i in held:
         common, own = chosen_out.points[runs[i].id]
         before.append(nominal_out.residuals[runs[i].id])
@@ -245,7 +226,7 @@ def native_closure(
     nominal_power, fit_power, native_power = (
         float(np.mean(np.concatenate(left) ** 2)) for left in (before, fitted, native)
     )
-    return NativeClosure(nominal_power, fit_power, native_power, f"on {on} held out of the fit")
+    return NativeClosure(nominal_power, fit_power, native_power, ON_RUNS if held else ON_STRETCHES)
 
 
 def _restarted(
@@ -370,11 +351,9 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
     closure = native_closure(study.nominal, chosen, nominal_out, chosen_out, simulate)
     found = law(chosen.point.common)
-    early = given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4)
-    notes = (
-        *found.notes,
-        *((_EARLY.format(500.0 * given.opt.timestep),) if given is not None and early else ()),
-    )
+    differences = found.differences
+    if given is not None and given.opt.integrator != int(mujoco.mjtIntegrator.mjINT_RK4):
+        differences += (Fact("early steps", {"half_step_ms": 500.0 * given.opt.timestep}),)
     own = list(chosen.point.release)
     if given is not None:  # the engine's steps and its input do not begin as those of the fit
         own = [_restarted(problem, chosen.point.common, one, i, simulate)[0] for i, one in enumerate(own)]
@@ -382,4 +361,4 @@ def patched_model(study: Study, model: JointModel) -> PatchedModel:
     spec, written = patched(model, found.patch, starts)
     zeros = [problem.zero(chosen.point.common, own) for own in chosen.point.release]
     zero = float(np.median(zeros)) + change.rest - model.law.rest
-    return PatchedModel(model, spec, written, notes, zero, closure)
+    return PatchedModel(model, spec, written, differences, zero, closure)

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
-from diagnosis.closure import KINDS, Ceiling, Closable, Curve, Law, percent
+from diagnosis.facts.remainder import Ceiling, Closable, Curve, Law, Line
 from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
@@ -21,7 +21,6 @@ from diagnosis.remainder.formula import choose, propose
 from diagnosis.search.investigate import Study
 from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
-from identification.printing import unit_mark, with_std
 from tunnel_sim.vocabulary.record import Array
 
 Events = tuple[Mapping[str, Any], ...]
@@ -76,25 +75,18 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
         {**one, **{end: similarity.own(one[end], "s") for end in ("from_s", "to_s")}} for one in found
     )
     ceilings = tuple(one.ceiling for one in (*common.values(), *single.values()))
-    words = _words(
-        kind,
-        ceilings,
-        law,
-        where,
-        "what the causes leave" if study.named and decided else "the gap",
-        chosen,
+    alike, next_most = _others(kind, ceilings, chosen)
+    return Closable(
+        excess=left.excess / left.problem.data.mean_block,
+        ceilings=ceilings,
+        kind=kind,
+        events=where,
+        curve=shape,
+        law=law,
+        alike=alike,
+        next_most=next_most,
+        line=_own_line(line, similarity, chosen) if line is not None and kind == "line" else None,
     )
-    if line is not None and kind == "line":
-        unit = similarity.reading
-        sizes = [similarity.own(value, "Hz") for value in (line.frequency, line.frequency_std)]
-        sizes += [1e3 * similarity.own(value, unit) for value in (line.amplitude, line.amplitude_std)]
-        words += (
-            f" The line is at {with_std(*sizes[:2])} Hz, with an amplitude of {with_std(*sizes[2:])} "
-            f"m{unit_mark(unit)}, root mean square over the runs; chance alone shows one in less than "
-            f"{100.0 * chosen.steady_line_rate:.2g} % of campaigns."
-        )
-    excess = left.excess / left.problem.data.mean_block
-    return Closable(excess, ceilings, kind, words, where, shape, law)
 
 
 def chosen_kind(
@@ -149,45 +141,38 @@ def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarit
     return Law({**proposal.table, "parameters": own}, values, closed, std)
 
 
-def _words(
-    kind: str,
-    ceilings: tuple[Ceiling, ...],
-    law: Law | None,
-    where: Events,
-    left: str,
-    chosen: RemainderSettings,
-) -> str:
-    """What could be closed of what is left, in a few sentences."""
-    determined = [one for one in ceilings if one.determined(chosen)]
-    if kind == "noise":
-        most = max(determined, key=lambda one: one.closed)
-        bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
-        return (
-            f"No more than {bound} of {left} could be closed by any "
-            "smooth moment or error of the reading: the rest is noise."
-        )
-    best = next(one for one in ceilings if one.kind == kind)
-    said = [
-        f"{percent(best.closed, best.std)} of {left} could be closed by {KINDS[kind]}, measured on {best.held_out} "
-        "held out of the fit."
-    ]
-    # of others, those that the kind is not a case of
+def _others(
+    kind: str, ceilings: tuple[Ceiling, ...], chosen: RemainderSettings
+) -> tuple[tuple[str, ...], float | None]:
+    """The kinds that close about as much as the one chosen, and what the others close at most.
+
+    Of other kinds only those count that the one chosen is not a case of, and that are measured as it is.
+    """
+    best = next((one for one in ceilings if one.kind == kind), None)
+    if best is None:
+        return (), None
     included = (kind, "state") if kind in ("angle", "rate") else (kind,)
-    others = [one for one in determined if one.held_out == best.held_out and one.kind not in included]
-    alike = [one for one in others if one.closed >= best.closed - max(chosen.named_alike, best.std)]
-    if alike:
-        said.append(f"These runs cannot distinguish it from {' or '.join(KINDS[one.kind] for one in alike)}.")
-    elif others:
-        others_most = max(one.closed for one in others)
-        said.append(f"No other kind would close more than {percent(max(others_most, 0.0))}.")
-    if where and kind != "line":
-        run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
-        largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
-        said.append(f"Most of it is in {largest}{run}.")
-    if law is not None:
-        formula = law.effect.get("moment") or law.effect["reading"]
-        said.append(f"The formula {formula} closes {percent(law.closed, law.std)}.")
-    return " ".join(said)
+    others = [
+        one
+        for one in ceilings
+        if one.determined(chosen) and one.held_out == best.held_out and one.kind not in included
+    ]
+    least = best.closed - max(chosen.named_alike, best.std)
+    alike = tuple(one.kind for one in others if one.closed >= least)
+    return alike, max((one.closed for one in others), default=None)
+
+
+def _own_line(line: SteadyLine, similarity: Similarity, chosen: RemainderSettings) -> Line:
+    """The line in the measured campaign's units."""
+    unit = similarity.reading
+    return Line(
+        frequency_hz=similarity.own(line.frequency, "Hz"),
+        frequency_std_hz=similarity.own(line.frequency_std, "Hz"),
+        amplitude=similarity.own(line.amplitude, unit),
+        amplitude_std=similarity.own(line.amplitude_std, unit),
+        unit=unit,
+        false_alarm_rate=chosen.steady_line_rate,
+    )
 
 
 _POINTS, _MAP = 41, 13

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
@@ -27,7 +28,7 @@ class Finding:
     """
 
     value: str | None
-    reason: str
+    reason: Fact
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,29 +85,26 @@ def infer_condition(campaign: Campaign, nominal: Fit, found: Survey) -> Finding:
     runs, shown, chosen = nominal.problem.data.runs, found.maps.runs, nominal.settings.where
     off = tuple(run.id for run in runs if not run.wind_on)
     if len(off) == len(runs):
-        return Finding("always", "it is there with the wind off")
-    undetermined = "whether it needs wind cannot be determined"
+        return Finding("always", Fact("wind off"))
     if not off:
-        return Finding(None, f"{undetermined}, since the wind is on in every run")
+        return Finding(None, Fact("wind on in every run"))
     if min(run.p_value for run in shown) * len(runs) > chosen.run_rate:
-        return Finding(None, f"{undetermined}, since no single run shows it")
+        return Finding(None, Fact("no single run"))
     most = max(shown, key=lambda run: run.share)
     if len(shown) >= chosen.one_run_of and most.share > chosen.one_run and most.id not in off:
-        return Finding(None, f"{undetermined} from one run alone ({most.id})")
+        return Finding(None, Fact("one run", {"run": most.id}))
     # without coefficients and a gain that these runs lack
     data = nominal.problem.data.alone(off)
     try:
         alone = fit(Problem(data), nominal_start(data))
     except FitError:
-        return Finding(None, f"{undetermined}, since the wind-off runs could not be fitted alone")
+        return Finding(None, Fact("wind-off runs not fitted"))
     excesses = run_excesses(campaign, alone)
     tests = [run.p_value() for run in excesses]
     tests += [band.p_value for band in band_excesses(excesses)]
-    count = "the wind-off run" if len(off) == 1 else f"the {len(off)} wind-off runs"
-    show = f"{count}, fitted alone, show{'s' * (len(off) == 1)}"
     if min(tests) * len(tests) < chosen.still_rate:
-        return Finding("always", f"{show} it too")
-    return Finding("wind_on", f"{show} no gap")
+        return Finding("always", Fact("wind-off runs show it", {"runs": len(off)}))
+    return Finding("wind_on", Fact("wind-off runs show none", {"runs": len(off)}))
 
 
 def blow_interval(found: Survey, share: float, chosen: WhereSettings) -> tuple[float, float] | None:
@@ -133,9 +131,7 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
     chosen = nominal.settings.where
     blow = blow_interval(found, chosen.blow_share, chosen)
     if blow is not None:
-        return Finding(
-            "forcing", f"most of the missing moment acts between {blow[0]:.1f} and {blow[1]:.1f} s"
-        )
+        return Finding("forcing", Fact("blow", {"from_s": blow[0], "to_s": blow[1]}))
     # most of the excess may be a line, or lie beside the frequency of the motion
     excess = {band.band: max(band.excess, 0.0) for band in found.maps.bands}
     whole = max(sum(excess.values()), 1e-300)
@@ -145,31 +141,29 @@ def infer_channel(nominal: Fit, found: Survey, condition: str | None) -> Finding
         similar = nominal.problem.data.similarity.similar(hertz, "Hz")
         return Finding(
             "forcing" if similar < chosen.fastest_moment else "sensor",
-            f"it is a spectral line near {hertz:.3g} Hz",
+            Fact("spectral line", {"frequency_hz": hertz}),
         )
     if excess.get("above", 0.0) > chosen.fast_share * whole:
-        return Finding("sensor", "most of it is faster than the rig can move")
+        return Finding("sensor", Fact("too fast"))
     if excess.get("0", 0.0) > chosen.slow_share * whole:
         if excess.get("2f0", 0.0) > chosen.shifted_centre * whole:
-            return Finding("stiffness", "the centre shifts together with the second harmonic of the motion")
+            return Finding("stiffness", Fact("shifted centre and harmonic"))
         if condition == "wind_on":
-            return Finding("forcing", "most of it is a slow shift of the centre that needs wind")
-        return Finding("sensor", "most of it is a slow shift of the centre")
+            return Finding("forcing", Fact("shifted centre with wind"))
+        return Finding("sensor", Fact("shifted centre"))
     if sum(excess.get(band, 0.0) for band in ("2f0", "3f0", "above")) > chosen.harmonic_share * whole:
-        return Finding(
-            "sensor", "it contains harmonics of the motion, without a shift of frequency or damping"
-        )
+        return Finding("sensor", Fact("harmonics"))
     apart = _between_runs(nominal, found)
     if apart is not None:
         return apart
     if all(run.drive is not None for run in nominal.problem.data.runs):
-        return Finding(None, "every run is driven, so that no decay shows it")
+        return Finding(None, Fact("every run driven"))
     frequency, damping = drift(list(found.maps.backbones))
     if frequency > chosen.drift_ratio * max(damping, 0.0) and frequency > 0.0:
-        return Finding("stiffness", "the frequency shifts along the decay more than the damping does")
+        return Finding("stiffness", Fact("frequency along the decay"))
     if damping > chosen.drift_ratio * max(frequency, 0.0) and damping > 0.0:
-        return Finding("damping", "the damping shifts along the decay more than the frequency does")
-    return Finding(None, "the frequency and the damping shift by similar amounts along the decay")
+        return Finding("damping", Fact("damping along the decay"))
+    return Finding(None, Fact("both along the decay"))
 
 
 def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
@@ -187,9 +181,5 @@ def _between_runs(nominal: Fit, found: Survey) -> Finding | None:
         return None
     frequency, damping = np.sum(np.array(shifts) ** 2, axis=0)
     if frequency >= damping:  # as with a wrong spring, but also with gravity or a flexible rod beside several
-        return Finding(
-            None,
-            "each run alone is linear, but the runs' frequencies do not agree with one model: a stated value is "
-            "wrong, or a stiffness is missing",
-        )
-    return Finding("damping", "each run alone is linear, but the runs' damping does not agree with one model")
+        return Finding(None, Fact("frequency between runs"))
+    return Finding("damping", Fact("damping between runs"))

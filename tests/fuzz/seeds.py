@@ -210,6 +210,8 @@ def checkpoint() -> tuple[Any, bytes]:
 def answer_document() -> dict[str, Any]:
     """A diagnosis of one cause, as JSON's types."""
     from diagnosis import result
+    from diagnosis.facts import checks
+    from diagnosis.facts.closure import ON_RUNS
 
     values = {
         "cn_beta": result.ParameterEstimate(0.45, 0.01, "1/rad"),
@@ -217,15 +219,15 @@ def answer_document() -> dict[str, Any]:
     }
     friction = {"friction_moment": result.ParameterEstimate(0.004, 1e-5, "N m")}
     gap = result.GapSummary(
-        True, 2.0, 0.1, 0.99, result.HELD_OUT, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9}
+        True, 2.0, 0.1, 0.99, ON_RUNS, (result.RunGap("r1", 2.0, 0.1),), 1e-3, 1e-9, {"lag": 1e-9}
     )
     return result.Diagnosis(
-        "c1", ("coulomb_friction",), "words", gap,
+        "c1", ("coulomb_friction",), gap,
         result.Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
         (result.Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), result.Candidate("none", 0.1, 2.0, 0.0)),
         ("quadratic_damping",), None, result.Coefficients(values, values),
-        result.Confirmation(True, 0.0, "r1", 0.0, 1e-5),
-        result.NoiseSummary(5e-4, None, "estimated", ""),
+        checks.Confirmation(True, 0.0, "r1", 0.0, 1e-5),
+        checks.NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict() | {"wall_s": 3.0}  # fmt: skip
 
 

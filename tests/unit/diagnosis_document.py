@@ -87,11 +87,16 @@ def document() -> dict[str, Any]:
             "p_value": 1.9e-5,
             "material": False,
             "moves": {
-                "cn_beta": {"value": 0.00043, "relative": 0.000898, "std": 0.0013, "unit": "1/rad"},
-                "cn_r": {"value": 0.00053, "relative": 0.00206, "std": 0.0118, "unit": "1/rad"},
+                "cn_beta": {"value": 0.00043, "relative": 0.000898, "std": 0.0013, "unit": "1/rad",
+                            "material": False},
+                "cn_r": {"value": 0.00053, "relative": 0.00206, "std": 0.0118, "unit": "1/rad", "material": False},
             },
             "words": "",
+            "further": "",
         },
+        "decided": True,
+        "unpredictive": "",
+        "found": found(),
         "ambiguous_with": [RIVAL],
         "next_run": {
             "spring_stiffness": 81.5,
@@ -126,6 +131,35 @@ def document() -> dict[str, Any]:
         "maps": maps(),
         "provenance": {},
     }  # fmt: skip
+
+
+def found() -> dict[str, Any]:
+    """What is found beside the numbers."""
+    return {
+        "place": {
+            "runs": 3,
+            "share": 0.8765,
+            "false_alarm_rate": 0.01,
+            "wind": {"off": 4.25, "on": 17.85},
+            "narrow": ["time_s", "amplitude_rad", "frequency_hz"],
+            "bands": {"f0": 0.7272, "3f0": 0.1313},
+            "channel": {"kind": "damping along the decay"},
+            "condition": {"kind": "wind-off runs show it", "runs": 2},
+            "compared": [CAUSE],
+            "agrees": True,
+        },
+        "nowhere": None,
+        "both_winds": True,
+        "nearly": None,
+        "immaterial": {},
+        "choices": [],
+        "springs_off": None,
+        "second_modes": [],
+        "limit_cycles": [],
+        "noise": {"kind": "not stated"},
+        "cautions": [{"kind": "few runs", "runs": 2, "driven": False, "windy": True}],
+        "noted": [{"kind": "not judged", "runs": list(IDS)}],
+    }
 
 
 def maps() -> dict[str, Any]:

@@ -9,7 +9,8 @@ import polars as pl
 import pytest
 
 from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, RunGap, Where
-from diagnosis.result import HELD_OUT, Confirmation, NoiseSummary
+from diagnosis.facts.checks import Confirmation, NoiseSummary
+from diagnosis.facts.closure import ON_RUNS
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.printing import TextTable, as_html, as_text
 from identification.status import Outcome
@@ -118,7 +119,7 @@ def diagnosis() -> Diagnosis:
             19.0,
             0.01,
             0.99,
-            HELD_OUT,
+            ON_RUNS,
             (RunGap("a", 19.0, 0.01), RunGap("b", 18.0, 0.02, False)),
             0.01,
             1e-9,

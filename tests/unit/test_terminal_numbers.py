@@ -14,7 +14,16 @@ import numpy as np
 import pytest
 from rich.table import Table
 
-from diagnosis import printing
+from diagnosis.words import tables
+from diagnosis.words.lines import closing_lines, inclusion_line
+from diagnosis.words.next_steps import rival_lines, run_words
+from diagnosis.words.numbers import probability, share
+from diagnosis.words.tables import (
+    candidates_table,
+    gap_table,
+    parameters_table,
+    waterfall_table,
+)
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
 from identification.printing import TextTable, coefficients_table, status_lines
 from identification.status import Status
@@ -47,7 +56,7 @@ def short(text: str) -> tuple[float, float]:
 
 
 def test_answers(given: Document) -> None:
-    *listed, last = rows(printing.candidates_table(given))
+    *listed, last = rows(candidates_table(given))
     assert len(listed) == 4
     for cells, candidate in zip(listed, given["candidates"], strict=False):
         assert cells[0] == candidate["effect"]
@@ -60,11 +69,11 @@ def test_answers(given: Document) -> None:
 
 def test_several_effects_of_an_answer_have_a_line_each(given: Document) -> None:
     given["candidates"][0]["effect"] = "free_play + mains_hum + sensor_drift"
-    assert rows(printing.candidates_table(given))[0][0] == "free_play +\nmains_hum +\nsensor_drift"
+    assert rows(candidates_table(given))[0][0] == "free_play +\nmains_hum +\nsensor_drift"
 
 
 def test_parameters_of_the_answer(given: Document) -> None:
-    ((effect, name, text),) = rows(printing.parameters_table(given))
+    ((effect, name, text),) = rows(parameters_table(given))
     assert (effect, name) == (given["causes"][0], "coefficient")
     assert_shows(text, [0.003125, 1.7e-5])
     given["candidates"][0]["parameters"] = {
@@ -72,7 +81,7 @@ def test_parameters_of_the_answer(given: Document) -> None:
         "a.y": {"value": 2.5, "std": None, "unit": "1", "bound": "upper"},
         "b.x": {"value": 0.0, "std": None, "unit": "1", "determined": False},
     }
-    found = rows(printing.parameters_table(given))
+    found = rows(parameters_table(given))
     assert [row[:2] for row in found] == [["a", "x"], ["", "y"], ["b", "x"]]
     assert [row[2] for row in found] == [
         "0.250 ± 0.010",
@@ -81,24 +90,24 @@ def test_parameters_of_the_answer(given: Document) -> None:
     ]
     given["candidates"] = given["candidates"][-2:]
     given["candidates"][0]["parameters"] = {}
-    assert rows(printing.parameters_table(given)) == []
+    assert rows(parameters_table(given)) == []
 
 
 def test_effects_among_the_causes(given: Document) -> None:
-    line = printing.inclusion_line(given)
+    line = inclusion_line(given)
     assert line.endswith(": quadratic_damping 0.93, coulomb_friction 0.07")
     assert line.index("quadratic_damping") < line.index("coulomb_friction")
-    assert printing.inclusion_line(given | {"inclusion": {"free_play": 0.009}}) == ""
+    assert inclusion_line(given | {"inclusion": {"free_play": 0.009}}) == ""
 
 
 def test_the_gap_as_the_causes_are_added(given: Document) -> None:
-    table = printing.waterfall_table(given)
+    table = waterfall_table(given)
     assert given["waterfall_on"] in table.title
     first, second, third = rows(table)
     assert_shows(first[1], both(28.45))
     assert_shows(" ".join(second[1:]), [*both(2.75), *both(21.85)])
     assert_shows(" ".join(third[1:]), [*both(0.1345), *both(2.85)])
-    assert rows(printing.waterfall_table(given | {"waterfall": given["waterfall"][:1]})) == []
+    assert rows(waterfall_table(given | {"waterfall": given["waterfall"][:1]})) == []
 
 
 def both(excess: float) -> list[float]:
@@ -108,30 +117,30 @@ def both(excess: float) -> list[float]:
 
 def test_coefficients_that_are_not_determined(given: Document) -> None:
     given["coefficients"]["after"]["cn_r"] |= {"std": None, "determined": False}
-    cells = rows(printing.coefficients_table(given))[1]
+    cells = rows(tables.coefficients_table(given))[1]
     assert cells[2:] == ["not determined by these runs", "–"]
 
 
 def test_answers_that_have_no_probability_are_counted_with_theirs(given: Document) -> None:
     for candidate in given["candidates"][1:]:
         candidate["probability"] = 0.0046
-    *listed, last = rows(printing.candidates_table(given))
+    *listed, last = rows(candidates_table(given))
     assert len(listed) == 1
     assert_shows(last[0], [6])
     assert last[1] == "0.03"
     for candidate in given["candidates"]:
         candidate["probability"] = 0.005
-    assert len(rows(printing.candidates_table(given))) == 7  # six and the rest
+    assert len(rows(candidates_table(given))) == 7  # six and the rest
     for candidate in given["candidates"]:
         candidate["probability"] = 0.0
-    assert len(rows(printing.candidates_table(given))) == 2  # one always, and the rest
+    assert len(rows(candidates_table(given))) == 2  # one always, and the rest
     given["candidates"] = given["candidates"][:1]
-    assert len(rows(printing.candidates_table(given))) == 1
+    assert len(rows(candidates_table(given))) == 1
 
 
 def test_the_gap(given: Document) -> None:
     gap = given["gap"]
-    whole, *runs = rows(printing.gap_table(given))
+    whole, *runs = rows(gap_table(given))
     assert_shows(whole[1], both(gap["excess_before"]))
     assert_shows(whole[2], both(gap["excess_after"]))
     for cells, run in zip(runs, gap["runs"], strict=True):
@@ -139,46 +148,49 @@ def test_the_gap(given: Document) -> None:
         assert_shows(cells[1], both(run["before"]))
         assert_shows(cells[2], both(run["after"]))
     del gap["misfit"]  # a document of an earlier version
-    assert_shows(rows(printing.gap_table(given))[0][1], [gap["excess_before"]])
+    assert_shows(rows(gap_table(given))[0][1], [gap["excess_before"]])
 
 
 def test_a_gap_without_a_name_has_nothing_after(given: Document) -> None:
-    cells = rows(printing.gap_table(given | {"causes": ["unknown"]}))
+    cells = rows(gap_table(given | {"causes": ["unknown"]}))
     assert [row[2] for row in cells] == ["–"] * 4
     given["gap"]["detected"] = False
-    assert rows(printing.gap_table(given)) == []
+    assert rows(gap_table(given)) == []
 
 
 def test_coefficients(given: Document) -> None:
     before, after = given["coefficients"]["before"], given["coefficients"]["after"]
-    for cells, name in zip(rows(printing.coefficients_table(given)), before, strict=True):
+    for cells, name in zip(rows(tables.coefficients_table(given)), before, strict=True):
         old, new = before[name], after[name]
         assert_shows(cells[1], [old["value"], old["std"]])
         assert_shows(cells[2], [new["value"], new["std"]])
         assert_shows(cells[3].replace("+", ""), [100 * (new["value"] - old["value"]) / abs(old["value"])])
     before["cn_r"]["value"] = 0.0
-    assert rows(printing.coefficients_table(given))[1][3] == "+0 %"
+    assert rows(tables.coefficients_table(given))[1][3] == "+0 %"
     del after["cn_beta"]
-    assert len(rows(printing.coefficients_table(given))) == 1
+    assert len(rows(tables.coefficients_table(given))) == 1
 
 
 def test_the_run_to_make(given: Document) -> None:
     run = given["next_run"]
     keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
-    assert_shows(printing.run_words(run).replace(" rad", ""), [run[key] for key in keys])
-    calm = printing.run_words(run | {"wind_speed": 0.0})
+    assert_shows(run_words(run).replace(" rad", ""), [run[key] for key in keys])
+    calm = run_words(run | {"wind_speed": 0.0})
     assert_shows(calm, [run[key] for key in keys if key != "wind_speed"])
-    assert len(printing.rival_lines(given)) == 2
-    assert len(printing.rival_lines(given | {"next_run": None})) == 2
-    assert printing.rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
+    assert len(rival_lines(given)) == 2
+    assert len(rival_lines(given | {"next_run": None})) == 2
+    close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
+    assert close[1].startswith("No run that can be set distinguishes these answers")
+    assert "by 2.9 standard deviations" in close[1]
+    assert rival_lines(given | {"next_run": None, "ambiguous_with": []}) == []
 
 
 def test_noise_and_confirmation(given: Document) -> None:
-    first, second = printing.closing_lines(given)
+    first, second = closing_lines(given)
     assert_shows(first, [given["noise"]["std"]])
     assert_shows(second, [given["confirmation"]["largest_difference_rad"]])
     given["confirmation"]["agrees"] = False
-    assert len(printing.closing_lines(given)) == 1
+    assert len(closing_lines(given)) == 1
 
 
 @pytest.mark.parametrize(
@@ -186,7 +198,7 @@ def test_noise_and_confirmation(given: Document) -> None:
     [(0.996, "> 0.99"), (0.994, "0.99"), (0.006, "0.01"), (0.004, "< 0.01")],
 )
 def test_probabilities(value: float, text: str) -> None:
-    assert printing.probability(value) == text
+    assert probability(value) == text
 
 
 @pytest.mark.parametrize(
@@ -201,7 +213,7 @@ def test_probabilities(value: float, text: str) -> None:
     ],
 )
 def test_shares(value: float, text: str) -> None:
-    assert printing.share(value) == text
+    assert share(value) == text
 
 
 def quantity(value: float, std: float, unit: str = "1/rad") -> Quantity:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 from nicegui import ui
 
-from diagnosis.printing import plain
+from diagnosis.words.names import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import (
     Fault,
@@ -176,15 +176,15 @@ class Answer:
     """The answer: in words, in figures, and by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from diagnosis import printing
-        from diagnosis.closure import closable_table, closable_words
-        from tunnel_lab.report import view
+        from diagnosis.words import lines, next_steps, remainder, tables
+        from diagnosis.words.verdict import headline
+        from tunnel_lab.report.view import facts
 
-        answer, kind = view.headline(document)
+        answer, kind = headline(document)
         with ui.element("section").classes(f"verdict {kind}").props("aria-label=Verdict"):
             ui.label(answer).classes("answer")
             ui.label(document["verdict"])
-            show_facts((fact.value, fact.label, fact.note) for fact in view.facts(document))
+            show_facts((fact.value, fact.label, fact.note) for fact in facts(document))
         if (document.get("maps") or {}).get("traces"):
             heading("The fit over the data")
             source = f"{address(session, 'fit.html')}?{time.time_ns()}"
@@ -193,12 +193,13 @@ class Answer:
             )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(document), once=True)
-        show_parts([printing.where_line(document), *printing.rival_lines(document)])
-        show_parts([printing.candidates_table(document), printing.parameters_table(document)])
-        show_parts([printing.waterfall_table(document), printing.coefficients_table(document)])
+        show_parts([lines.where_line(document), *next_steps.rival_lines(document)])
+        show_parts([tables.candidates_table(document), tables.parameters_table(document)])
+        show_parts([tables.waterfall_table(document), tables.coefficients_table(document)])
         with ui.expansion("What remains, the runs, and caveats"):
-            show_parts([document["rest"]["words"], closable_words(document), closable_table(document)])
-            show_parts([printing.gap_table(document), *printing.closing_lines(document)])
+            rest, closable = remainder.rest_line(document), remainder.closable_line(document)
+            show_parts([rest, closable, tables.closable_table(document)])
+            show_parts([tables.gap_table(document), *lines.closing_lines(document)])
         if document["gap"]["detected"]:
             ByHandPart(session, document)
 
@@ -283,7 +284,8 @@ class ByHandPart:
 
 def show_closure(closure: Closure, document: dict[str, Any]) -> None:
     """The closure with causes chosen by hand, in the units of the diagnosis' document."""
-    from tunnel_lab.report.view import estimate, misfit_shown, percent
+    from diagnosis.words.numbers import misfit_shown
+    from tunnel_lab.report.view import estimate, percent
 
     show_facts(
         [
@@ -302,19 +304,15 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
-    from diagnosis.printing import rival_lines
-    from tunnel_lab.report.view import next_steps, run_to_make, unplannable
+    from diagnosis.words.next_steps import next_steps, rival_lines, run_to_make, unplannable
 
     document = read_diagnosis(session)
     assert document is not None  # else the stage is closed
     heading("What to do next")
     with ui.element("ol"):
         show_items(next_steps(document))
-    lines, run = rival_lines(document), run_to_make(document)
-    if run is None and document["next_run"] is not None:
-        lines[-1] = _too_close(document["next_run"])
-    show_parts(lines)
-    if run is not None:
+    show_parts(rival_lines(document))
+    if (run := run_to_make(document)) is not None:
         show_run(run)
     if why := unplannable(document):
         ui.label(why).classes("soft")
@@ -328,7 +326,7 @@ class _Rivals:
     """Two answers to choose, and the run that would distinguish them."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from tunnel_lab.report.view import windy
+        from diagnosis.words.names import windy
         from tunnel_sim.effects import known_effects
 
         self._session = session
@@ -358,7 +356,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from tunnel_lab.report.view import LEAST_SEPARATION
+        from diagnosis.words.next_steps import LEAST_SEPARATION, too_close
 
         self._place.clear()
         with self._fault.around():
@@ -378,17 +376,9 @@ class _Rivals:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
                 if run["separation"] < LEAST_SEPARATION:
-                    ui.label(_too_close(run))
+                    ui.label(too_close(run))
                 else:
                     show_run(run)
-
-
-def _too_close(run: Mapping[str, float]) -> str:
-    """That no run distinguishes two answers, in a sentence."""
-    return (
-        "No run that can be set distinguishes these answers: with the best one they differ by "
-        f"{run['separation']:.1f} standard deviations of the noise."
-    )
 
 
 def show_run(run: Mapping[str, float]) -> None:

@@ -215,35 +215,36 @@ def diagnose_with_progress(
 
 def write_patch(answer: Diagnosis, path: Path) -> None:
     """Write the patched model of an answer as MJCF; a `TunnelError` with the reason when it has none."""
-    from diagnosis.closure import UNPATCHED
+    from diagnosis.words.cautions import UNPATCHED
 
     if answer.model is None:
-        reason = next(
-            (caution.rstrip(".") for caution in answer.cautions if caution.startswith(UNPATCHED)), UNPATCHED
-        )
+        said = zip(answer.cautions, answer.found.cautions, strict=True)
+        reason = next((caution.rstrip(".") for caution, fact in said if fact.kind == "unpatched"), UNPATCHED)
         raise TunnelError(reason, where="--patch", remedy="leave out --patch for the answer alone")
     answer.model.write(path)
 
 
 def show(document: dict[str, Any]) -> None:
     """Print an answer: the verdict in words, then the figures behind it."""
-    from diagnosis import printing as parts
-    from diagnosis.closure import closable_table, closable_words, patch_lines, patch_table
+    from diagnosis.words import lines, next_steps, remainder, tables
 
     say(document["verdict"])
-    for line in (parts.where_line(document), *parts.rival_lines(document)):
+    for line in (lines.where_line(document), *next_steps.rival_lines(document)):
         if line:
             say(line)
     say("")
-    answers = (parts.candidates_table, parts.parameters_table)
+    answers = (tables.candidates_table, tables.parameters_table)
     show_tables(*(rich_table(table(document)) for table in answers))
-    if line := parts.inclusion_line(document):
+    if line := lines.inclusion_line(document):
         say(f"{line}\n")
-    if line := closable_words(document):
+    if line := remainder.closable_line(document):
         say(f"{line}\n")
-    shown = (closable_table, parts.waterfall_table, parts.gap_table, parts.coefficients_table, patch_table)
-    show_tables(*(rich_table(table(document)) for table in shown))
-    for line in (*patch_lines(document), *parts.closing_lines(document)):
+    behind = (
+        tables.closable_table, tables.waterfall_table, tables.gap_table, tables.coefficients_table,
+        tables.patch_table,
+    )  # fmt: skip
+    show_tables(*(rich_table(table(document)) for table in behind))
+    for line in (*lines.patch_lines(document), *lines.closing_lines(document)):
         say(line)
 
 
@@ -287,7 +288,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         names: of the documents, each different.
         documents: of diagnoses, the reference first.
     """
-    from diagnosis.printing import excess_std, probability, share
+    from diagnosis.words.numbers import excess_std, probability, share
 
     def excess(document: Document, key: str) -> str:
         """With its standard deviation by chance, where the document has the noise of its runs."""

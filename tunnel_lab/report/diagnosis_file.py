@@ -118,6 +118,12 @@ class DiagnosisDocument(Document):
         default_factory=list,
         description="effects that could hide: the largest size that the runs do not exclude, and its moves",
     )
+    found: Table = Field(
+        default_factory=dict, description="what the sentences state beside the numbers, each with its kind"
+    )
+    unpredictive: str = Field(
+        default="", description="the answer, where it is probable and does not predict held-out readings"
+    )
     blind_spots: list[str] = Field(description="what these runs cannot show")
     cautions: list[str] = Field(description="caveats")
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")

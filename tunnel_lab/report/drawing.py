@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.closure import Misfit, misfit_of, unit_shown
+from diagnosis.facts.closure import Misfit
+from diagnosis.words.numbers import misfit_of, unit_shown
 from tunnel_lab.plotting.style import styled
 from tunnel_sim.vocabulary.record import Array
 

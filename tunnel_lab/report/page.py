@@ -15,13 +15,16 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.closure import closable_table, closable_words, patch_lines, patch_table
-from diagnosis.printing import hidden_table, inclusion_line, plain
+from diagnosis.words.lines import inclusion_line, other_answers, patch_lines
+from diagnosis.words.names import Document, plain
+from diagnosis.words.next_steps import next_steps
+from diagnosis.words.remainder import closable_line
+from diagnosis.words.tables import closable_table, hidden_table, patch_table
+from diagnosis.words.verdict import headline
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text
 from tunnel_lab.report.figures import diagnosis_figures, summary_figures
-from tunnel_lab.report.view import Document
 from tunnel_lab.report.where import Chart, charts, fit_charts, fit_figure
 from tunnel_sim.files.writing import write_encoded, write_whole
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -114,7 +117,7 @@ def render_report(
 
     With ``summary`` it is only what fits one printed page.
     """
-    answer, kind = view.headline(document)
+    answer, kind = headline(document)
     provenance = document.get("provenance") or {}
     alarms = significant(document["gap"]["false_alarm_rate"], 2)
     schema = ("schema of the document", document["schema_version"])
@@ -130,16 +133,16 @@ def render_report(
         "facts": view.facts(document),
         "found": view.causes_found(document),
         "coefficients": view.coefficient_rows(document),
-        "next_steps": view.next_steps(document),
+        "next_steps": next_steps(document),
         "place": view.place_rows(document),
         "lines": view.line_rows(document),
         "candidates": view.candidate_rows(document),
-        "more": view.others(document),
+        "more": other_answers(document),
         "causes": view.cause_paragraphs(document),
         "inclusion": plain(inclusion_line(document)),
         "steps": view.step_rows(document),
         "closable": closable_table(document).rows,
-        "closable_words": closable_words(document),
+        "closable_words": closable_line(document),
         "patch": patch_table(document),
         "patch_lines": [line.removeprefix("- ") for line in patch_lines(document)],
         "rivals": [plain(name) for name in document["ambiguous_with"]],

@@ -1,16 +1,27 @@
-"""The words and numbers of the report, formatted from the document, and what to do next."""
+"""The rows and figures of the report, formatted from the document; its sentences are those of `diagnosis.words`."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from diagnosis.closure import misfit_of, of_swing, rms_shown, unit_shown
-from diagnosis.printing import misfit_text, noise_powers, plain, probability, run_words, share
-from diagnosis.settings import settings_of
+from diagnosis.words.causes import size_words
+from diagnosis.words.lines import listed_answers
+from diagnosis.words.names import ACTS_WHEN, Document, acts_on, plain, windy
+from diagnosis.words.numbers import (
+    misfit_of,
+    misfit_shown,
+    misfit_text,
+    noise_powers,
+    of_swing,
+    probability,
+    rms_shown,
+    share,
+    times_noise,
+    unit_shown,
+)
 from identification.printing import (
     UNDETERMINED,
     at_bound,
@@ -22,26 +33,11 @@ from identification.printing import (
 from tunnel_sim.effects import known_effects
 from tunnel_sim.vocabulary.campaign import Campaign
 
-Document = Mapping[str, Any]
 WITHIN_THE_NOISE = "within the noise"
 """What is left where it is not significant, in the words of the verdict."""
 _UNDETERMINED_PLACE = "cannot be determined from these runs"
-_CONDITIONS = {
-    "always": "with or without wind",
-    "wind_on": "only with the wind on",
-    None: _UNDETERMINED_PLACE,
-}
-_CHANNELS = {
-    "stiffness": "the restoring moment",
-    "damping": "the damping",
-    "forcing": "an imposed moment",
-    "sensor": "the reading",
-    "calibration": "a stated value",
-}
 _POWER = re.compile(r"(?<=[\d)])e([+-]\d+)\b")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_VISIBLE = 0.005  # of a damping ratio: a change that is said
-_VISIBLE_FREQUENCY = 5e-5  # as a fraction, likewise
 
 
 @dataclass(frozen=True)
@@ -53,25 +49,6 @@ class Fact:
     note: str = ""
 
 
-def headline(document: Document) -> tuple[str, str]:
-    """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
-    causes = document["causes"]
-    if not causes:
-        return "No gap", "none"
-    if not document.get("decided", True):
-        effects, channels = document["common"]["effects"], document["common"]["channels"]
-        known = plain(*effects) if effects else " and ".join(f"the {name}" for name in channels)
-        return f"Undecided: {known}, and more" if known else "Undecided", "open"
-    if causes == ["unknown"]:
-        return "Unexplained gap", "unknown"
-    names = plain(*causes)
-    if document["ambiguous_with"]:
-        return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
-    if (document.get("rest") or {}).get("material"):
-        return f"{names}, in part", "open"
-    return names, "found"
-
-
 def facts(document: Document) -> list[Fact]:
     """The figures at the head of the page, each in the form in which the verdict states it."""
     gap, causes = document["gap"], document["causes"]
@@ -79,9 +56,9 @@ def facts(document: Document) -> list[Fact]:
     before, after = gap["excess_before"], gap["excess_after"]
     label = "Misfit of the nominal model"
     if causes:
-        listed = [_misfit_fact(document, label, before, times_noise(before))]
+        listed = [_misfit_fact(document, label, before, typeset(times_noise(before)))]
     else:
-        listed = [Fact(label, WITHIN_THE_NOISE, times_noise(before))]
+        listed = [Fact(label, WITHIN_THE_NOISE, typeset(times_noise(before, decimals=3)))]
     if causes and causes != ["unknown"]:
         label = f"With {'the causes' if decided else 'the most probable answer'} added"
         if _calm(document):
@@ -109,36 +86,6 @@ def _misfit_fact(document: Document, label: str, value: float, powers: str) -> F
     return Fact(label, rms_shown(misfit, value), f"root mean square; {of_swing(misfit, value)}; {powers}")
 
 
-def times_noise(value: float) -> str:
-    """A gap in noise variances (a ratio), as the verdict states it."""
-    text = significant(value, 4) if value >= 10.0 else f"{value:.{3 if abs(value) < 0.1 else 2}f}"
-    return f"{typeset(text)} times the noise power"
-
-
-def misfit_shown(document: Document, value: float) -> str:
-    """A gap as a root mean square; in noise powers for a document without ``misfit``.
-
-    Args:
-        value: the gap as an excess, in noise variances, a ratio.
-    """
-    misfit = misfit_of(document)
-    return times_noise(value) if misfit is None else rms_shown(misfit, value)
-
-
-def windy(document: Document) -> bool:
-    """Whether any run had wind; True where the document does not say."""
-    runs = (document.get("maps") or {}).get("runs")
-    return not runs or any(run["wind_speed"] > 0.0 for run in runs)
-
-
-def acts_on(document: Document, effect: str) -> str:
-    """What an effect acts on and when, such as ``the damping, with or without wind``; empty for an unknown one."""
-    kind = {kind.name: kind for kind in known_effects()}.get(effect)
-    if kind is None:
-        return ""
-    return f"{_CHANNELS[kind.channel]}{f', {_CONDITIONS[kind.condition]}' if windy(document) else ''}"
-
-
 def causes_found(document: Document) -> list[dict[str, Any]]:
     """Every cause of the answer with its size.
 
@@ -149,9 +96,9 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
         return []
     answer = document["candidates"][0]
     names = answer["effect"].split(" + ")
-    does = {size["effect"]: size_words(document, size) for size in document.get("sizes", ())}
+    does = {size["effect"]: typeset(size_words(document, size)) for size in document.get("sizes", ())}
     steps = document.get("waterfall", ())
-    left = [misfit_shown(document, step["excess"]) for step in steps]
+    left = [typeset(misfit_shown(document, step["excess"])) for step in steps]
     if steps and _calm(document):
         left[-1] = WITHIN_THE_NOISE
     closes: dict[str, str] = {}
@@ -173,31 +120,6 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
         }
         for name in names
     ]
-
-
-def size_words(document: Document, size: Document) -> str:
-    """What a cause of ``sizes`` does to a swing, in a sentence; damping and frequency where they change visibly."""
-    mark, factor = unit_shown((document.get("maps") or {}).get("unit", "rad"))
-    angle = unit_shown("rad")[1]
-    said = []
-    zeta, without = size["damping_ratio"], size["damping_ratio_without"]
-    if abs(zeta - without) > _VISIBLE * max(abs(zeta), abs(without)):
-        said.append(f"damping ratio {significant(without, 3)} becomes {significant(zeta, 3)}")
-    if abs(size["frequency_change"]) > _VISIBLE_FREQUENCY:
-        change = 100.0 * size["frequency_change"]
-        said.append(f"frequency {'+' if change > 0.0 else ''}{significant(change, 2)} %")
-    reading = factor * size["reading_change"]
-    if abs(size["zero_change"]) > 0.5 * size["reading_change"]:
-        said.append(f"the middle moves by {significant(factor * size['zero_change'], 2)}{_spaced(mark)}")
-    said.append(f"the reading changes by {significant(reading, 2)}{_spaced(mark)} root mean square")
-    held = angle * size["stands_rad"]
-    stands = f"; it stops the body up to {significant(held, 2)}° from rest" if held > 0.0 else ""
-    amplitude = significant(angle * size["amplitude_rad"], 2)
-    return typeset(f"Over three cycles from {amplitude}°: {', '.join(said)}{stands}")
-
-
-def _spaced(mark: str) -> str:
-    return mark if mark == "°" else f" {mark}"
 
 
 def typeset(text: str) -> str:
@@ -231,30 +153,8 @@ def candidate_rows(document: Document) -> list[dict[str, Any]]:
             "excess": excess(c["excess_after"]),
             "parameters": [(plain(n).replace(".", ": "), estimate(v)) for n, v in c["parameters"].items()],
         }
-        for c in document["candidates"][: _listed(document)]
+        for c in document["candidates"][: listed_answers(document)]
     ]
-
-
-def others(document: Document) -> str:
-    """The answers that are not listed, in words; empty where all are."""
-    probabilities = [c["probability"] for c in document["candidates"][_listed(document) :]]
-    if not probabilities:
-        return ""
-    together = probability(sum(probabilities)).replace("<", "less than")
-    most = probability(max(probabilities)).replace("<", "less than")
-    each = f", each of them {most}" if most.startswith("less") else f", none of them more than {most}"
-    if len(probabilities) == 1:
-        count, each = "1 more answer has", ""
-    else:
-        count = f"{len(probabilities)} more answers have together"
-    words = f"{count} a probability of {together}{'' if most == together else each}."
-    return f"{words} The JSON document lists all."
-
-
-def _listed(document: Document) -> int:
-    least = settings_of(document).words.answer_described
-    probable = [c for c in document["candidates"] if c["probability"] >= least]
-    return max(3, len(probable))
 
 
 def estimate(values: Document) -> str:
@@ -328,7 +228,8 @@ def place_rows(document: Document) -> list[tuple[str, str]]:
         rows.append((label, f"{' to '.join(ends)}{unit}" if ends else "–"))
     rows.append(("Channel", where["channel"] or _UNDETERMINED_PLACE))
     if windy(document):
-        rows.append(("Condition", _CONDITIONS.get(where["condition"], str(where["condition"]))))
+        condition = where["condition"]
+        rows.append(("Condition", _UNDETERMINED_PLACE if condition is None else ACTS_WHEN[condition]))
     return rows
 
 
@@ -379,65 +280,6 @@ def line_rows(document: Document) -> list[dict[str, str]]:
         }
         for line in (document.get("maps") or {}).get("lines", [])
     ]
-
-
-LEAST_SEPARATION = 3.0
-"""Standard deviations between two answers below which a run does not distinguish them: odds of about 100:1."""
-
-
-def run_to_make(document: Document) -> Document | None:
-    """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
-    run: Document | None = document["next_run"]
-    return run if run is not None and run["separation"] >= LEAST_SEPARATION else None
-
-
-def unplannable(document: Document) -> str:
-    """Why no run can be planned from these runs, in a sentence; empty where one can."""
-    known = document["coefficients"]["before"]
-    if not known:
-        return "No run can be planned: the nominal model was not fitted to any run."
-    if "omega_n" in known:
-        return "No run can be planned, because no spring is stated: state spring_stiffness for every run."
-    return ""
-
-
-def next_steps(document: Document) -> list[str]:
-    """What to do next, in the order in which to do it."""
-    causes = document["causes"]
-    steps = [
-        f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
-        for remark in document.get("remarks", ())
-        if remark["outcome"] != "noted"
-    ]
-    if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
-        words = f"Make the run that distinguishes the answers: {run_words(run)}."
-        steps.append(f"{words} Add it to the campaign and diagnose again.")
-    if not causes:
-        return [*steps, "Use the coefficients of the nominal model, within their intervals."]
-    if not document.get("decided", True):
-        springs = not unplannable(document) and document.get("model") is None  # stated, and can be chosen
-        kinds = ["springs"] * springs + ["wind speeds"] * windy(document) + ["release angles"]
-        steps += [
-            f"Add runs with other {plain(*kinds)}, and diagnose again: no answer has a probability of one half.",
-            "Do not repair the rig on this answer, and do not rely on the coefficients of any one cause.",
-        ]
-    elif causes == ["unknown"]:
-        steps += [
-            "Read where the model departs from the runs, and examine the rig there.",
-            "State the effect that you suspect in a file, and diagnose again with --effects-file.",
-        ]
-    else:
-        known = {kind.name: kind.advice for kind in known_effects()}
-        steps += [
-            *(f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in causes),
-            "Measure again, and compare the two diagnoses (tunnel compare).",
-            "Until then use the coefficients with the causes, not those of the nominal model.",
-        ]
-    if (document.get("rest") or {}).get("material"):
-        steps.append(
-            "Do not trust the coefficients beyond their intervals: what remains of the gap moves them."
-        )
-    return steps
 
 
 def next_run_rows(document: Document) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnosis.closure import unit_shown
+from diagnosis.words.numbers import unit_shown
 from tunnel_lab.plotting.style import INTERVAL, WIDTH, figure, figure_text, grid, styled, with_breaks
 from tunnel_lab.report.drawing import (
     AFTER,

@@ -15,13 +15,13 @@ import pytest
 from nicegui import Client, ui
 from starlette.requests import Request
 
+from diagnosis.words.next_steps import next_steps, run_to_make
 from identification.printing import TextTable
 from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay
 from tunnel_lab.bench import diagnosis, parts, work
 from tunnel_lab.bench.parts import Frame
 from tunnel_lab.bench.workspace import Session
-from tunnel_lab.report import view
 from tunnel_lab.terminal import outputs
 from tunnel_lab.terminal.time_left import Reached
 from tunnel_sim.files.campaign_folder import write_campaign
@@ -182,6 +182,6 @@ def test_other_runs_differ_in_what_can_be_chosen() -> None:
         ({"coefficients": NORMALISED}, "other wind speeds and release angles,"),
         ({"model": {"file": "a.xml"}}, "other wind speeds and release angles,"),
     ):
-        steps = view.next_steps(document() | undecided | changes)
+        steps = next_steps(document() | undecided | changes)
         assert any(words in step for step in steps), steps
-    assert view.run_to_make(document() | {"next_run": None}) is None
+    assert run_to_make(document() | {"next_run": None}) is None

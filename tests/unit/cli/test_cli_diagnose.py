@@ -143,7 +143,7 @@ def test_an_interrupted_run_leaves_no_file(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("diagnosis._diagnose.investigate_joint", interrupted)
+    monkeypatch.setattr("diagnosis._diagnose.investigate_with_lead", interrupted)
     (tmp_path / "out").mkdir()
     status, out, err = tunnel("diagnose", gap_free, "--json", tmp_path / "out" / "a.json")
     assert (status, out) == (130, "")

@@ -13,7 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnosis.closure import UNPATCHED
+from diagnosis.facts.found import Fact
+from diagnosis.words.cautions import UNPATCHED
 from tests.reference import robot_joints
 from tests.reference.free_decays import Setting, campaign
 from tests.reference.robot_joints import LEVEL, MOTOR, robot, robot_campaign
@@ -89,7 +90,8 @@ def test_a_patch_needs_a_run_with_the_wind_off(
 
 def test_a_patch_that_fails_after_all_says_why(tmp_path: Path) -> None:
     caution = f"{UNPATCHED}: MuJoCo refuses the patched model (too heavy)."
-    answer = SimpleNamespace(model=None, cautions=("Few runs.", caution))
+    found = SimpleNamespace(cautions=(Fact("few runs"), Fact("unpatched")))
+    answer = SimpleNamespace(model=None, cautions=("Few runs.", caution), found=found)
     with pytest.raises(
         TunnelError, match=r"MuJoCo refuses the patched model \(too heavy\); leave out --patch"
     ):

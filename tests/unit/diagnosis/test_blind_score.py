@@ -11,6 +11,8 @@ import pytest
 from diagnosis import result
 from diagnosis.blind.cases import case
 from diagnosis.blind.score import Score, calibration
+from diagnosis.facts import checks
+from diagnosis.facts.closure import ON_RUNS
 from identification.statistics import Proportion
 from tunnel_lab.report import blind
 
@@ -23,11 +25,11 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
         for k, v, s in zip(("cn_beta", "cn_r"), cn, std, strict=True)
     }
     return result.Diagnosis(
-        "c", tuple(causes), "words",
-        result.GapSummary(bool(causes), 2.0, 0.1, closed, result.HELD_OUT, (), 0.001, 0.5),
+        "c", tuple(causes),
+        result.GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
         result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
-        result.Coefficients(values, values), result.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
-        result.NoiseSummary(5e-4, None, "estimated", ""),
+        result.Coefficients(values, values), checks.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
+        checks.NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict()  # fmt: skip
 
 

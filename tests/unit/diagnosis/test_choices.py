@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from diagnosis.answer.coefficients import coefficients, possible_answers
-from diagnosis.answer.verdict import choice_words
+from diagnosis.answer.judgements import spring_choices
 from diagnosis.likelihood.residuals import misfit
 from diagnosis.search.choices import choices
 from diagnosis.search.investigate import investigate
@@ -45,12 +45,12 @@ def test_the_interval_holds_the_truth_of_either_choice(study):
     assert abs(found.value - CN_BETA) < 2.0 * found.std
 
 
-def test_the_verdict_names_both_springs_and_what_would_tell(study):
-    (words,) = choice_words(study)
-    assert "16.12 N m/rad by -1.96" in words
-    assert "or 44.84 N m/rad by +" in words
-    assert "third spring" in words
-    assert choice_words(replace(study, choices={})) == ()
+def test_both_springs_are_stated_with_their_errors_and_probabilities(study):
+    found = sorted(spring_choices(study), key=lambda one: one.stiffness)
+    assert [one.stiffness for one in found] == pytest.approx([16.12, 44.84])
+    assert [one.error for one in found] == pytest.approx([-0.02 / 1.02, 0.02], rel=1e-2)
+    assert sum(one.probability for one in found) == pytest.approx(1.0)
+    assert spring_choices(replace(study, choices={})) == ()
 
 
 def test_a_third_spring_leaves_no_choice():

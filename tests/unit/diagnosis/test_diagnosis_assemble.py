@@ -319,7 +319,7 @@ def test_the_source_of_the_noise_is_said():
 
 
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
-    answer = assemble(found, *localise(found))
+    answer = assemble(found, *localise(found)).in_words()
     assert f"(probability {answer.candidates[0].probability:.2f})" in answer.verdict
     doubtful = replace(found, test=replace(found.test, p_value=9e-4))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]

@@ -7,8 +7,9 @@ import pytest
 
 from diagnosis.answer import reported as module
 from diagnosis.answer.held_out import predict_held_out
+from diagnosis.answer.judgements import cautions
 from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
-from diagnosis.answer.verdict import cautions
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
@@ -129,32 +130,22 @@ def test_a_motion_that_mujoco_cannot_follow_is_said(monkeypatch):
     assert not verdict.agrees
     assert verdict.failure == "the motion grows without bound"
     data = campaign()
-    said = cautions(
-        data, campaign_noise(data, Settings().noise), (), verdict, named=False, settings=Settings()
-    )
-    assert any("MuJoCo model could not follow" in text for text in said)
-    assert verdict.failure in " ".join(said)
+    noise = campaign_noise(data, Settings().noise)
+    said = cautions(data, noise, (), verdict, named=False, settings=Settings())
+    assert Fact("not followed", {"failure": verdict.failure}) in said
 
 
 def test_a_disagreement_is_a_caution_and_agreement_is_none():
     data = campaign()
-    good = confirm(
-        [Comparison(("r1",), [np.zeros(9)], [np.full(9, 1e-6)], (1e-4,))],
-        Settings().answer.integrator_tolerance,
+    noise, tolerance = campaign_noise(data, Settings().noise), Settings().answer.integrator_tolerance
+    good, bad = (
+        confirm([Comparison(("r1",), [np.zeros(9)], [np.full(9, far)], (1e-4,))], tolerance)
+        for far in (1e-6, 2e-5)
     )
-    bad = confirm(
-        [Comparison(("r1",), [np.zeros(9)], [np.full(9, 2e-5)], (1e-4,))],
-        Settings().answer.integrator_tolerance,
-    )
-    assert (
-        cautions(data, campaign_noise(data, Settings().noise), (), good, named=False, settings=Settings())
-        == ()
-    )
-    (said,) = cautions(
-        data, campaign_noise(data, Settings().noise), (), bad, named=False, settings=Settings()
-    )
-    assert "2.0e-05 rad" in said
-    assert "r1" in said
+    assert cautions(data, noise, (), good, named=False, settings=Settings()) == ()
+    (said,) = cautions(data, noise, (), bad, named=False, settings=Settings())
+    assert (said.kind, said.figures["run"]) == ("not confirmed", "r1")
+    assert (said.figures["rms_rad"], said.figures["tolerance_rad"]) == pytest.approx((2e-5, 1e-5))
 
 
 def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
@@ -176,16 +167,11 @@ def test_nothing_speaks_of_wind_speeds_where_no_run_had_wind():
             settings=Settings(),
         )
         runs = tuple(dataclasses.replace(r, wind_speed=speed) for r in problem().data.runs)
-        found[speed] = (
-            said,
-            " ".join(
-                Rig()
-                .among(runs)
-                .blind_spots(dataclasses.replace(problem().data, runs=runs, model=Rig().among(runs)))
-            ),
-        )
-    assert "Add runs with other springs and release angles." in found[0.0][0]
-    assert "other springs, wind speeds and release angles." in found[10.0][0]
+        model = Rig().among(runs)
+        spots = model.blind_spots(dataclasses.replace(problem().data, runs=runs, model=model))
+        found[speed] = (said, " ".join(spots))
+    assert found[0.0][0].figures == {"runs": 1, "driven": False, "windy": False}
+    assert found[10.0][0].figures == {"runs": 1, "driven": False, "windy": True}
     assert "Cnβ" not in found[0.0][1]
     assert "a scale error of wind speed" in found[10.0][1]
 

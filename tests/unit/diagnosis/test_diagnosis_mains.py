@@ -7,14 +7,16 @@ import pytest
 from scipy.special import chdtri
 
 from diagnosis.likelihood.mains_lines import mains_line, mains_lines
-from diagnosis.noise.mains import find_hum, hum_remarks, refine_frequency, remove_hum
+from diagnosis.noise.mains import find_hum, hum_noted, refine_frequency, remove_hum
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
+from diagnosis.words.cautions import remark
 from tests.marks import slow
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.physics.forward import backlash
 from tunnel_sim.vocabulary.campaign import SensorProperties
 from tunnel_sim.vocabulary.record import Record
@@ -107,7 +109,8 @@ def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, pl
     assert found.hum.harmonic == multiple
     assert found.hum.amplitude == pytest.approx(2e-3, abs=4.0 * found.hum.std)
     assert not found.test.detected
-    said = [remark.what for remark in hum_remarks(found.campaign, found.hum, found.similarity)]
+    noted = hum_noted(found.campaign, found.hum, found.similarity)
+    said = [remark(as_json(one)).what for one in noted]
     assert any(f"appears at {place:.5g} Hz" in one for one in said) == (place != multiple * mains)
     assert any("times the mains' frequency" in one for one in said) == (multiple > 1)
     assert nominal_study(clean, ALL_EFFECTS).hum is None
@@ -120,7 +123,8 @@ def test_what_the_sample_rate_cannot_tell_apart_is_said(rate, multiple):
     found = nominal_study(data, ALL_EFFECTS)
     assert found.hum is not None
     own = found.similarity.own(found.hum.frequency, "Hz")
-    said = [remark.what for remark in hum_remarks(found.campaign, found.hum, found.similarity)]
+    noted = hum_noted(found.campaign, found.hum, found.similarity)
+    said = [remark(as_json(one)).what for one in noted]
     assert own == pytest.approx(50.0, abs=3e-3)
     assert any(one.startswith(f"mains of {110.0 - own:.5g} Hz would show the same line") for one in said)
     assert not found.test.detected

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
+from diagnosis.facts.found import Fact
 from diagnosis.noise.sensor_noise import (
     accuracy,
     campaign_noise,
@@ -78,7 +79,7 @@ def test_stated_noise_that_the_records_bear_out_is_used():
     assert found.used == NOISE**2
     assert found.estimated == pytest.approx(NOISE**2, rel=0.1)
     assert found.estimated != NOISE**2
-    assert found.reason.startswith("the records agree: 0.000")
+    assert (found.reason.kind, found.reason.figures["std_rad"]) == ("agrees", found.estimated**0.5)
 
 
 def test_stated_noise_may_be_that_before_rounding_or_after():
@@ -95,14 +96,15 @@ def test_stated_noise_that_the_records_contradict_is_not_used(factor):
     found = campaign_noise(decays(stated_noise=factor * NOISE), Settings().noise)
     assert (found.source, found.stated_variance) == ("estimated", pytest.approx((factor * NOISE) ** 2))
     assert found.used == found.estimated == pytest.approx(NOISE**2, rel=0.1)
-    assert f"contradict the stated {factor * NOISE:.3g} rad: they contain 0.000" in found.reason
+    assert found.reason.kind == "contradicts"
+    assert found.reason.figures["stated_rad"] == pytest.approx(factor * NOISE)
 
 
 def test_where_no_noise_is_stated_it_is_estimated():
     for stated in (None, 0.0):
         found = campaign_noise(decays(stated_noise=stated), Settings().noise)
         assert (found.source, found.stated_variance) == ("estimated", None)
-        assert found.reason == "the campaign states no noise"
+        assert found.reason == Fact("not stated")
 
 
 @pytest.mark.slow
@@ -123,7 +125,7 @@ def test_records_without_noise_are_held_to_the_fits_own_accuracy(rate, stated):
     data = free_decays.campaign(rate=rate, stated_noise=stated)
     found = campaign_noise(data, Settings().noise)
     assert found.source == "floor"
-    assert "less than the accuracy of the fits" in found.reason
+    assert (found.reason.kind, found.reason.figures["fewer"]) == ("floor", len(data.runs))
     assert np.sqrt(found.estimated) < 1e-7 < 1e-5 < np.sqrt(found.used) < 1e-4
     assert [accuracy(run.record) ** 2 for run in data.runs] == list(found.variance.values())
 

@@ -7,12 +7,13 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
+from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.noise import gap
 from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zero_wanders
-from diagnosis.noise.gap import noise_remarks
+from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
 from diagnosis.settings import Settings
 from tests.marks import slow
@@ -248,14 +249,14 @@ def test_what_is_said_of_the_noise():
     slow = NoiseTrend(0.0, 0.0, 0.0, judged=False)
     data = coloured(campaign(), "pink")
     _, noise, found = judged(data)
-    said = [str(remark) for remark in noise_remarks(noise, slow, found)]
-    assert f"noise is coloured: {noise.std:.3g} rad" in said[0]
+    said = [one.fact for one in noise_noted(noise, slow, found)]
+    assert [one.kind for one in said] == ["coloured", "not judged"]
+    assert said[0].figures["std_rad"] == noise.std
     low, high = noise.colour.frequency[[0, -1]]
-    assert f"over a factor of {high / low:.3g} in frequency" in said[0]
-    assert "too slowly" in said[1]
+    assert said[0].figures["frequency_ratio"] == high / low
     within = dataclasses.replace(found, within_step=True)
-    assert "less than their steps" in str(noise_remarks(noise, slow, within)[0])
-    assert noise_remarks(campaign_noise(campaign(), Settings().noise), NoiseTrend(0.0, 0.0, 0.0), found) == ()
+    assert noise_noted(noise, slow, within)[0].fact == Fact("within step")
+    assert noise_noted(campaign_noise(campaign(), Settings().noise), NoiseTrend(0.0, 0.0, 0.0), found) == ()
 
 
 def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():

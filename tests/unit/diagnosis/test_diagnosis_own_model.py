@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
-from diagnosis.closure import NativeClosure
+from diagnosis.facts.patch import NativeClosure
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.model.joint import reach, with_law
 from diagnosis.model.similar import similar_campaign

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis._diagnose import diagnose, vocabulary
-from diagnosis.answer.units import own_parameters, parameter_unit, size_note, sized_coefficients
+from diagnosis.answer.units import own_parameters, parameter_unit, sized_coefficients
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.rig import PerInertia
 from diagnosis.model.similar import similar_campaign
@@ -63,7 +63,6 @@ def test_what_is_identified_is_the_coefficient_times_the_missing_sizes(data, nam
 def test_other_coefficients_keep_their_names():
     found = {"omega_n": ParameterEstimate(12.0, 0.1, "rad/s")}
     assert sized_coefficients(found, RigProperties()) == found
-    assert size_note(RigProperties(), windy=False) == ""
 
 
 def test_units_without_springs_and_sizes(data):

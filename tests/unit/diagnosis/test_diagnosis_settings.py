@@ -13,11 +13,11 @@ import pytest
 
 from diagnosis import Settings, diagnose
 from diagnosis.likelihood.residuals import ChannelMisfit
-from diagnosis.printing import part
 from diagnosis.search.investigate import investigate
 from diagnosis.search.weigh import FittedSet, weigh
 from diagnosis.settings import settings_of
 from diagnosis.settings.origin import Origin
+from diagnosis.words.numbers import part
 from docs.studies import settings_page
 from tests.unit.gap_campaigns import campaign
 from tunnel_sim.vocabulary.errors import TunnelError

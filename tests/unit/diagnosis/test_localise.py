@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import binom
 
 from diagnosis.answer.assemble import localise
+from diagnosis.facts.found import Fact, Nowhere
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.prepare import without_start
 from diagnosis.likelihood.problem import Problem
@@ -38,19 +39,18 @@ UNKNOWN = ("unknown",)
 
 def test_a_gap_that_needs_wind_is_found_in_the_wind_on_runs():
     data = campaign(effect_from("nonlinear_yaw_moment", {"coefficient": -1.0}))
-    where, maps = localise(studied(data, nominal(data), UNKNOWN))
+    where, maps, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert where.condition == "wind_on"
     assert where.channel == "stiffness"
     # how much of the misfit the joint fit moves to wind-off runs is its own affair: the strong ones are windy
     assert {"r3", "r6"} <= set(where.runs)
     groups = {group.label: group.excess for group in maps.groups if group.by == "wind"}
     assert groups["on"] > 5.0 * groups["off"]
-    assert "only with the wind on" in where.words
 
 
 def test_a_mechanical_gap_shows_with_the_wind_off():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
-    where, _ = localise(studied(data, nominal(data), UNKNOWN))
+    where, _, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert (where.channel, where.condition) == ("damping", "always")
 
 
@@ -60,31 +60,31 @@ def test_a_mechanical_gap_shows_with_the_wind_off():
 def test_the_place_does_not_depend_on_the_names(cause):
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     base = nominal(data)
-    unnamed, _ = localise(studied(data, base, UNKNOWN))
-    named, _ = localise(studied(data, base, (cause,)))
-    assert dataclasses.replace(named, words="") == dataclasses.replace(unnamed, words="")
+    unnamed, _, nothing = localise(studied(data, base, UNKNOWN))
+    named, _, said = localise(studied(data, base, (cause,)))
+    assert named == unnamed
     agrees = effect_class(cause).channel == "damping"
-    said = named.words.removeprefix(unnamed.words).strip()
-    assert said.startswith("That agrees with" if agrees else "That does not agree with")
+    assert said == dataclasses.replace(nothing, compared=(cause,), agrees=agrees)
+    assert nothing.compared == ()
 
 
 def test_a_small_cause_beside_the_main_one_is_not_said_to_agree():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     study = studied(data, nominal(data), ("cubic_stiffness", "structural_damping"))
     alone = (Weighed(("cubic_stiffness",), 0.1, 0.1), Weighed(("structural_damping",), 0.9, 0.0))
-    where, _ = localise(dataclasses.replace(study, weighed=(*study.weighed, *alone)))
-    assert "does not agree with cubic stiffness: it acts on the restoring moment" in where.words
+    _, _, said = localise(dataclasses.replace(study, weighed=(*study.weighed, *alone)))
+    assert (said.compared, said.agrees) == (("cubic_stiffness",), False)
     turned = (Weighed(("cubic_stiffness",), 0.9, 0.0), Weighed(("structural_damping",), 0.1, 0.1))
-    where, _ = localise(dataclasses.replace(study, weighed=(*study.weighed, *turned)))
-    assert where.words.endswith("That agrees with structural damping.")
+    _, _, said = localise(dataclasses.replace(study, weighed=(*study.weighed, *turned)))
+    assert (said.compared, said.agrees) == (("structural_damping",), True)
 
 
 def test_runs_whose_frequencies_disagree_leave_the_channel_open():
     data = campaign(effect_from("wind_speed_offset", {"offset": 0.6}))
-    where, _ = localise(studied(data, nominal(data), ("wind_speed_offset",)))
+    where, _, said = localise(studied(data, nominal(data), ("wind_speed_offset",)))
     assert (where.channel, where.condition) == (None, "wind_on")
-    assert "do not agree with one model" in where.words
-    assert "agrees with wind" not in where.words
+    assert said.channel.kind == "frequency between runs"
+    assert not said.agrees
 
 
 def test_of_two_causes_the_one_that_closes_more_is_named():
@@ -96,13 +96,13 @@ def test_of_two_causes_the_one_that_closes_more_is_named():
     for name in ("quadratic_damping", "sensor_drift"):
         start = starting_points(best, effect_class(name))[0]
         best = fit(start.problem, start.point, base=best)
-    where, _ = localise(studied(data, base, ("quadratic_damping", "sensor_drift"), best))
+    where, _, _ = localise(studied(data, base, ("quadratic_damping", "sensor_drift"), best))
     assert where.channel == "damping"
 
 
 def test_a_blow_is_found_in_time():
     data = with_blow(campaign(), 0.02, 5.5)
-    where, _ = localise(studied(data, nominal(data), UNKNOWN))
+    where, _, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert where.channel == "forcing"
     assert where.time_s is not None
     assert where.time_s[0] <= 5.5 <= where.time_s[1]
@@ -111,7 +111,7 @@ def test_a_blow_is_found_in_time():
 
 def test_a_drift_is_found_below_the_oscillation():
     data = campaign(added=0.004 * np.linspace(0.0, 1.0, round(DURATION / INTERVAL)))
-    where, maps = localise(studied(data, nominal(data), UNKNOWN))
+    where, maps, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert (where.channel, where.condition) == ("sensor", "always")
     assert where.frequency_hz is not None
     assert where.frequency_hz[1] < 0.5 * maps.resonance[0]
@@ -120,7 +120,7 @@ def test_a_drift_is_found_below_the_oscillation():
 def test_hum_in_the_records_is_found_though_the_fit_had_it_taken_out():
     clean = campaign()
     hum = 5e-4 * np.sin(2.0 * np.pi * 50.0 * INTERVAL * np.arange(round(DURATION / INTERVAL)))
-    where, maps = localise(studied(campaign(added=hum), nominal(clean), ("mains_hum",)))
+    where, maps, _ = localise(studied(campaign(added=hum), nominal(clean), ("mains_hum",)))
     assert where.channel == "sensor"
     assert where.frequency_hz is not None
     assert where.frequency_hz[0] < 50.0 < where.frequency_hz[1]
@@ -133,16 +133,17 @@ def test_hum_in_the_records_is_found_though_the_fit_had_it_taken_out():
 
 def test_no_cause_gives_no_place():
     data = campaign()
-    where, maps = localise(studied(data, nominal(data)))
+    where, maps, said = localise(studied(data, nominal(data)))
     assert (where.channel, where.condition, where.runs) == (None, None, ())
     assert (where.time_s, where.amplitude_rad, where.frequency_hz) == (None, None, None)
-    assert where.words.startswith("Nowhere")
+    assert isinstance(said, Nowhere)
+    assert (said.runs, said.within_step) == (len(data.runs), False)
     assert maps.lines == ()
 
 
 def test_maps_are_small_and_plain_json():
     data = campaign(effect_from("coulomb_friction", {"friction_moment": 0.003}))
-    _, maps = localise(studied(data, nominal(data), ("coulomb_friction",)))
+    _, maps, _ = localise(studied(data, nominal(data), ("coulomb_friction",)))
     text = json.dumps(maps.to_json_dict(), allow_nan=False)
     assert len(text) < 200_000
     assert len(json.loads(text)["time"]["by_run"]) == len(data.runs)
@@ -236,7 +237,7 @@ def test_times_count_from_the_start_of_the_record_though_the_fit_begins_later():
     late = without_start(nominal(data).problem.data)
     found = fit(Problem(late), nominal_start(late))
     assert found.residuals[0].size < round(DURATION / INTERVAL)
-    where, maps = localise(studied(data, found, UNKNOWN))
+    where, maps, _ = localise(studied(data, found, UNKNOWN))
     assert where.time_s is not None
     assert where.time_s[0] <= 5.5 <= where.time_s[1]
     assert maps.time.edges[-1] == pytest.approx(DURATION)
@@ -248,7 +249,7 @@ def test_a_line_beside_the_harmonics_has_its_frequency_and_amplitude(frequency, 
     """Above 30 Hz no moment moves a rig of this inertia: the line is then the sensor's."""
     time = INTERVAL * np.arange(round(10.0 / INTERVAL))
     data = campaign(added=5e-4 * np.sin(2.0 * np.pi * frequency * time), duration=10.0)
-    where, maps = localise(studied(data, nominal(data), UNKNOWN))
+    where, maps, _ = localise(studied(data, nominal(data), UNKNOWN))
     assert where.channel == channel
     assert {line.run for line in maps.lines} == {run.id for run in data.runs}
     for line in maps.lines:
@@ -258,9 +259,9 @@ def test_a_line_beside_the_harmonics_has_its_frequency_and_amplitude(frequency, 
 
 def test_a_centre_that_shifts_with_the_second_harmonic_is_the_springs():
     data = campaign(effect_from("asymmetric_stiffness", {"coefficient": 0.1}))
-    where, _ = localise(studied(data, nominal(data), UNKNOWN))
+    where, _, said = localise(studied(data, nominal(data), UNKNOWN))
     assert where.channel == "stiffness"
-    assert "second harmonic" in where.words
+    assert said.channel.kind == "shifted centre and harmonic"
 
 
 @pytest.mark.parametrize(
@@ -282,7 +283,7 @@ def test_the_band_of_most_of_the_excess_decides_the_channel(monkeypatch, bands, 
     given = tuple(SimpleNamespace(band=name, excess=excess) for name, excess in bands.items())
     found = infer_channel(_ONE_DECAY, _without_a_blow(given), condition)
     assert found.value == channel
-    assert ("most of it" in found.reason or "harmonic" in found.reason) == (channel is not None)
+    assert (found.reason.kind != "both along the decay") == (channel is not None)
 
 
 @pytest.mark.parametrize(
@@ -356,7 +357,7 @@ def test_runs_that_are_linear_each_and_do_not_agree_leave_the_channel_open_or_la
 def test_runs_have_their_amplitude_frequency_and_share_of_the_gap():
     data = campaign(effect_from("quadratic_damping", {"coefficient": 0.003}))
     base = nominal(data)
-    _, maps = localise(studied(data, base, UNKNOWN))
+    _, maps, _ = localise(studied(data, base, UNKNOWN))
     assert sum(run.share for run in maps.runs) == pytest.approx(1.0)
     for i, (one, run) in enumerate(zip(maps.runs, base.problem.data.runs, strict=True)):
         inertia, _, stiffness = linear_coefficients(base, i)
@@ -383,4 +384,4 @@ def test_one_windy_run_of_three_or_more_with_nearly_all_of_the_gap_says_nothing_
         for run, share in zip(found.maps.runs, shares, strict=True)
     ]
     found = dataclasses.replace(found, maps=dataclasses.replace(found.maps, runs=tuple(runs)))
-    assert ("from one run alone (r2)" in infer_condition(data, base, found).reason) == lone
+    assert (infer_condition(data, base, found).reason == Fact("one run", {"run": "r2"})) == lone

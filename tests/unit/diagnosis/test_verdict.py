@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
+from diagnosis.answer.judgements import immaterial, nearly
 from diagnosis.answer.reported import held_out_totals
-from diagnosis.answer.verdict import immaterial_words, nearly_words, verdict
-from diagnosis.closure import Misfit, Remainder, Step, Waterfall
+from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Step, Waterfall
+from diagnosis.facts.decision import decision
+from diagnosis.facts.found import Nearly
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
-from diagnosis.printing import decision, gap_table, parameters_table, undecided_words
-from diagnosis.result import FITTED, HELD_OUT, GapSummary, ParameterEstimate, RunGap
+from diagnosis.result import GapSummary, ParameterEstimate, RunGap
 from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
+from diagnosis.words.next_steps import next_steps
+from diagnosis.words.tables import gap_table, parameters_table
+from diagnosis.words.verdict import headline, undecided_words, verdict
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.gap_campaigns import campaign as campaign_with
 from tests.unit.gap_campaigns import nominal, studied
@@ -27,25 +32,30 @@ def gap(*held_out: bool) -> GapSummary:
     runs = tuple(RunGap(f"r{i}", 2.0, 0.1, held_out=held) for i, held in enumerate(held_out))
     misfit = Misfit(0.002, 0.1, "rad")
     return GapSummary(
-        True, 2.0, 0.1, 0.95, HELD_OUT if any(held_out) else FITTED, runs, 0.01, 1e-9, misfit=misfit
+        True, 2.0, 0.1, 0.95, ON_RUNS if any(held_out) else FITTED, runs, 0.01, 1e-9, misfit=misfit
     )
 
 
-def said(
+def answer_of(
     *causes: str,
     size: GapSummary | None = None,
     both_winds: bool = True,
     material: bool = False,
     answers: tuple[tuple[str, float], ...] = (),
-) -> str:
-    return verdict(
-        causes,
-        decision(answers or ((" + ".join(causes), 0.9), ("unknown", 0.1)), Settings().answer),
-        gap(True) if size is None else size,
-        rest=Remainder(material, 0.1, 0.0, material, {}, "What remains is small."),
-        both_winds=both_winds,
-        chosen=Settings().words,
-    )
+    **found: object,
+) -> dict[str, Any]:
+    """The document of an answer, with what is found beside its numbers."""
+    answers = answers or ((" + ".join(causes), 0.9), ("unknown", 0.1))
+    one = document()
+    one["rest"]["material"] = material
+    one["found"] |= {"both_winds": both_winds, **found}
+    summary = gap(True) if size is None else size
+    decided = decision(answers, Settings().answer).to_json_dict()
+    return one | {"causes": list(causes), "gap": summary.to_json_dict(), **decided}
+
+
+def said(*causes: str, **changes: Any) -> str:
+    return verdict(answer_of(*causes, **changes), "What remains is small.")
 
 
 @pytest.mark.parametrize(
@@ -141,9 +151,9 @@ def test_what_remains_and_is_material_is_said_in_the_first_sentence():
     assert "in part" not in said("coulomb_friction")
     given = document()
     given["ambiguous_with"] = []
-    assert view.headline(given) == ("quadratic damping", "found")
+    assert headline(given) == ("quadratic damping", "found")
     given["rest"]["material"] = True
-    assert view.headline(given) == ("quadratic damping, in part", "open")
+    assert headline(given) == ("quadratic damping, in part", "open")
 
 
 UNDECIDED = (
@@ -204,7 +214,7 @@ def test_an_answer_that_predicts_nothing_is_undecided(closed, decided):
     found = decision(answers, Settings().answer, closed)
     assert found.decided is decided
     said_so = "Free play fits best, but does not predict readings held out of the fit." in undecided_words(
-        found, Settings().words
+        found.to_json_dict()
     )
     assert said_so is not decided
     assert decision((("unknown", 0.9), ("free_play", 0.1)), Settings().answer, 0.0).decided
@@ -215,68 +225,108 @@ def test_an_undecided_answer_is_undecided_on_every_page():
     given["candidates"][0]["probability"] = 0.41
     answers = [(one["effect"], one["probability"]) for one in given["candidates"]]
     given |= decision(answers, Settings().answer).to_json_dict()
-    assert view.headline(given) == ("Undecided", "open")
+    assert headline(given) == ("Undecided", "open")
     given["common"]["channels"] = {"damping": 0.95}
-    assert view.headline(given)[0] == "Undecided: the damping, and more"
+    assert headline(given)[0] == "Undecided: the damping, and more"
     given["common"]["effects"] = {"quadratic_damping": 0.93}
-    assert view.headline(given)[0] == "Undecided: quadratic damping, and more"
+    assert headline(given)[0] == "Undecided: quadratic damping, and more"
     labels = [fact.label for fact in view.facts(given)]
     assert "With the most probable answer added" in labels
     assert "Probability of the most probable answer" in labels
-    assert any("Do not repair" in step for step in view.next_steps(given))
+    assert any("Do not repair" in step for step in next_steps(given))
     assert parameters_table(given).title.startswith("Parameters of the most probable answer")
+
+
+def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
+    found = {"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003}
+    assert said("coulomb_friction", immaterial=found).endswith(
+        "What remains is small. The gap is immaterial: its causes change Cnβ by less than 0.08 % and Cnr by less "
+        "than 0.3 %."
+    )
+    assert "immaterial" not in said("coulomb_friction")
+
+
+NEARLY = {
+    "effects": ["quadratic_damping"], "closes": 0.996, "probability": 0.3, "noisy": False, "rival": [],
+    "rival_probability": 0.0, "misfit": [],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, " (probability 0.30): too little to name it."),
+        ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (0.20)."),
+        ({"noisy": True}, " of it, but the noise misbehaves and may be all of a gap as small as this."),
+        (
+            {"misfit": ["zero", "harmonics"]},
+            ", but leaves a significant misfit of the zero and the harmonics.",
+        ),
+    ],
+)
+def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named(changes, words):
+    text = said("unknown", answers=(("unknown", 0.6), ("quadratic_damping", 0.4)), nearly=NEARLY | changes)
+    assert "no effect is named as its cause. Quadratic damping would explain 99.6 % of it" in text
+    assert words in text
+    assert "no effect of the vocabulary explains it" in said("unknown")
+
+
+OFF = {"stiffness": 16.12, "error": -0.01961, "std": 0.0001, "probability": 0.5}
+
+
+def test_springs_that_may_be_off_are_said_with_what_would_tell():
+    text = said("spring_miscalibration", choices=[OFF, OFF | {"stiffness": 44.84, "error": 0.02}])
+    assert "16.12 N m/rad by -1.961 ± 0.010 % (0.50) or 44.84 N m/rad by +2.000 ± 0.010 % (0.50)" in text
+    assert "add runs with a third spring" in text
+    both = {"springs": [OFF, OFF | {"stiffness": 21.0}], "beside": ["coulomb_friction"]}
+    text = said("unknown", springs_off=both)
+    assert "would explain the gap beside coulomb friction, such as 16.12 N m/rad by" in text
+    assert text.endswith(": measure their stiffness again.")
+
+
+def test_a_second_mode_is_said_before_the_gap():
+    main = {"amplitude_rad": 0.3, "frequency_hz": 2.2, "decay_per_s": 0.1}
+    second = {"amplitude_rad": 0.02, "frequency_hz": 2.9, "decay_per_s": 0.2}
+    mode = {"run": "swing", "main": main, "second": second, "closes": 0.98}
+    text = said("unknown", second_modes=[mode])
+    assert text.startswith(
+        "swing contains a second mode: 0.02 rad at 2.9 Hz, which decays at 0.2 1/s, beside 0.3"
+    )
+    assert "falls by 98 %" in text
+
+
+def test_runs_in_limit_cycles_have_a_verdict_of_their_own():
+    remark = {"outcome": "noted", "runs": ["r1"], "what": "it settles at 0.1 rad", "remedy": "none"}
+    text = said("unknown", limit_cycles=[remark])
+    assert text == "No run is a free decay, so no cause is named. r1: it settles at 0.1 rad."
+
+
+def nearly_found(*weighed, noisy=False):
+    """What nearly explains a gap of quadratic damping, `unknown` being the answer."""
+    data = campaign_with(effect_from("quadratic_damping", {"coefficient": 2e-4}))
+    base = nominal(data)
+    lead = starting_points(base, effect_class("quadratic_damping"))[0]
+    study = studied(data, base, ("quadratic_damping",), fit(lead.problem, lead.point, base=base))
+    answers = (Weighed(("unknown",), 1.0, 0.6), *weighed)
+    return nearly(replace(study, weighed=answers, test=replace(study.test, noisy=noisy)))
+
+
+def test_what_nearly_explains_a_gap_is_found_with_the_reason_why_it_is_not_named():
+    first = Weighed(("quadratic_damping",), 0.004, 0.3)
+    found = nearly_found(first)
+    assert found == Nearly(("quadratic_damping",), 1.0 - 0.004, 0.3)
+    rival = Weighed(("coulomb_friction",), 0.01, 0.2)
+    assert nearly_found(first, rival) == replace(found, rival=("coulomb_friction",), rival_probability=0.2)
+    assert nearly_found(replace(first, probability=0.0), noisy=True).noisy
+    assert nearly_found(replace(first, share=0.4)) is None
 
 
 def estimates(**values):
     return {name: ParameterEstimate(value, 0.01, "1/rad") for name, value in values.items()}
 
 
-def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
+def test_a_change_of_two_per_cent_is_not_immaterial():
     before, after = estimates(cn_beta=0.5, cn_r=-0.1), estimates(cn_beta=0.5004, cn_r=-0.1003)
-    words = immaterial_words(before, after, Settings().words)
-    assert (
-        words
-        == "The gap is immaterial: its causes change Cnβ by less than 0.08 % and Cnr by less than 0.3 %."
-    )
-    assert immaterial_words(before, after | estimates(cn_r=-0.102), Settings().words) == ""  # 2 %
-    assert words in verdict(
-        ("coulomb_friction",),
-        decision((("coulomb_friction", 0.9), ("unknown", 0.1)), Settings().answer),
-        gap(True),
-        rest=Remainder(False, 0.0, 1.0, False, {}, "Explained."),
-        both_winds=False,
-        beside=words,
-        chosen=Settings().words,
-    )
-
-
-def nearly(*weighed, noisy=False):
-    """The sentence on what nearly explains a gap of quadratic damping, `unknown` being the answer."""
-    data = campaign_with(effect_from("quadratic_damping", {"coefficient": 2e-4}))
-    base = nominal(data)
-    lead = starting_points(base, effect_class("quadratic_damping"))[0]
-    study = studied(data, base, ("quadratic_damping",), fit(lead.problem, lead.point, base=base))
-    answers = (Weighed(("unknown",), 1.0, 0.6), *weighed)
-    return nearly_words(replace(study, weighed=answers, test=replace(study.test, noisy=noisy)))
-
-
-def test_an_unknown_gap_says_what_would_explain_it_and_why_it_is_not_named():
-    first = Weighed(("quadratic_damping",), 0.004, 0.3)
-    assert nearly(first) == (
-        "Quadratic damping would explain 99.6 % of it (probability 0.30): too little to name it."
-    )
-    rival = Weighed(("coulomb_friction",), 0.01, 0.2)
-    assert "(probability 0.30), and coulomb friction as much (0.20)." in nearly(first, rival)
-    assert "the noise misbehaves" in nearly(replace(first, probability=0.0), noisy=True)
-    assert nearly(replace(first, share=0.4)) == ""
-    text = verdict(
-        ("unknown",),
-        decision((("unknown", 0.6), ("quadratic_damping", 0.3), ("none", 0.1)), Settings().answer),
-        gap(True),
-        rest=Remainder(False, 0.0, 1.0, False, {}, "It hardly matters."),
-        both_winds=False,
-        beside=nearly(first),
-        chosen=Settings().words,
-    )
-    assert "no effect is named as its cause. Quadratic damping would explain" in text
-    assert "no effect of the vocabulary explains it" not in text
+    found = immaterial(before, after, Settings().words)
+    assert found == pytest.approx({"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003})
+    assert immaterial(before, after | estimates(cn_r=-0.102), Settings().words) == {}

@@ -107,7 +107,7 @@ def test_the_document_holds_the_records_and_the_cycles_where_the_models_differ()
     base = nominal(data)
     lead = starting_points(base, effect_class(CAUSE))[0]
     best = fit(lead.problem, lead.point, base=base)
-    _, maps = localise(studied(data, base, (CAUSE,), best))
+    _, maps, _ = localise(studied(data, base, (CAUSE,), best))
     assert {trace.id for trace in maps.traces} == {run.id for run in data.runs}
     records = {run.id: run.record for run in data.runs}
     for trace in maps.traces:

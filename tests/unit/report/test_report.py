@@ -2,22 +2,22 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
 
 from diagnosis.answer.assemble import localise
-from diagnosis.closure import Ceiling, Closable, Curve, Step, Waterfall
+from diagnosis.facts.checks import Confirmation, NoiseSummary
+from diagnosis.facts.closure import ON_RUNS, Step, Waterfall
+from diagnosis.facts.remainder import Ceiling, Closable, Curve
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import (
-    HELD_OUT,
     Candidate,
     Coefficients,
-    Confirmation,
     Diagnosis,
     GapSummary,
-    NoiseSummary,
     ParameterEstimate,
     RunGap,
 )
@@ -46,7 +46,7 @@ def document(data):
     base = nominal(data)
     lead = starting_points(base, effect_class(CAUSE))[0]
     best = fit(lead.problem, lead.point, base=base)
-    where, maps = localise(studied(data, base, (CAUSE,), best))
+    where, maps, _ = localise(studied(data, base, (CAUSE,), best))
     ids = [run.id for run in data.runs]
     excess = [
         (float(a @ a) / a.size - 1.0, float(b @ b) / b.size - 1.0)
@@ -58,10 +58,10 @@ def document(data):
         causes=(CAUSE,),
         verdict="The gap comes from quadratic damping & nothing else.",
         gap=GapSummary(
-            True, base.excess, best.excess, 0.987, HELD_OUT,
+            True, base.excess, best.excess, 0.987, ON_RUNS,
             tuple(RunGap(i, *e) for i, e in zip(ids, excess, strict=True)), 0.01, 1e-9, {"f0": 1e-9},
         ),
-        where=where,
+        where=replace(where, words="The damping of all runs shows it."),
         candidates=(
             Candidate(CAUSE, 0.912, best.excess, 0.987, {"coefficient": ParameterEstimate(0.003, 1e-5, "N m")}),
             Candidate("coulomb_friction", 0.08, 1.5, 0.5),

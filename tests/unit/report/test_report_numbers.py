@@ -14,9 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import printing
-from diagnosis.printing import decision, run_words, undecided_words
+from diagnosis.facts.decision import decision
 from diagnosis.settings import Settings
+from diagnosis.words.causes import size_words
+from diagnosis.words.lines import other_answers
+from diagnosis.words.next_steps import next_steps, run_words
+from diagnosis.words.numbers import noise_powers, probability
+from diagnosis.words.tables import candidates_table
+from diagnosis.words.verdict import headline, undecided_words
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import page as report_page
@@ -104,9 +109,9 @@ def test_the_head_of_the_page(given: Document) -> None:
 def test_what_is_left_has_one_form_in_a_tile(given: Document, value: float) -> None:
     given = copy.deepcopy(given)
     given["gap"]["excess_after"] = value
-    assert view.facts(given)[1].note.endswith(f"; {printing.noise_powers(value)}")
+    assert view.facts(given)[1].note.endswith(f"; {noise_powers(value)}")
     calm = given | {"rest": given["rest"] | {"significant": False}}
-    assert view.facts(calm)[1].note == printing.noise_powers(value)
+    assert view.facts(calm)[1].note == noise_powers(value)
 
 
 @pytest.mark.parametrize(("value", "text"), [(0.9634, "0.96"), (0.9951, "> 0.99"), (0.5712, "0.57")])
@@ -116,11 +121,11 @@ def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
     given = copy.deepcopy(given)
     given["candidates"][0]["probability"] = value
     assert undecided_words(
-        decision([("quadratic_damping", value)], Settings().answer), Settings().words
+        decision([("quadratic_damping", value)], Settings().answer).to_json_dict()
     ).endswith(f": quadratic damping ({text}).")
     assert view.facts(given)[-1].value == text
     assert view.candidate_rows(given)[0]["probability"] == text
-    assert printing.candidates_table(given).rows[0][1] == text
+    assert candidates_table(given).rows[0][1] == text
     drawn = candidates_figure(given)
     assert drawn is not None
     assert drawn.axes[0].texts[0].get_text() == text
@@ -174,12 +179,12 @@ def test_the_causes_have_their_sizes(given: Document, page: Sections) -> None:
     assert_shows(cause["closes"], [both(28.45)[0], both(2.75)[0]])
     text = page.texts["found"]
     assert all(words in text for words in (value, cause["does"], cause["closes"]))
-    moved = view.size_words(given, size | {"zero_change": -0.00285, "stands_rad": 0.0})
-    assert "the middle moves by −0.16°" in moved
+    moved = size_words(given, size | {"zero_change": -0.00285, "stands_rad": 0.0})
+    assert "the middle moves by -0.16°" in moved
     assert "rest" not in moved
     small = size | {"damping_ratio": size["damping_ratio_without"], "frequency_change": 1e-6}
-    assert "damping" not in view.size_words(given, small)
-    assert "frequency" not in view.size_words(given, small)
+    assert "damping" not in size_words(given, small)
+    assert "frequency" not in size_words(given, small)
     for causes in ([], ["unknown"]):
         assert view.causes_found(given | {"causes": causes}) == []
 
@@ -190,7 +195,7 @@ def test_without_wind_no_wind_is_mentioned(given: Document) -> None:
         run["wind_speed"] = 0.0
     undecided = {"decided": False, "common": {"effects": {}, "channels": {}}}
     for one, said in ((given, True), (still, False)):
-        texts = [view.causes_found(one)[0]["acts"], *view.next_steps(one | undecided)]
+        texts = [view.causes_found(one)[0]["acts"], *next_steps(one | undecided)]
         texts += [label for label, _ in view.place_rows(one)]
         assert ("wind" in " ".join(texts).replace(run_words(given["next_run"]), "")) == said
         assert ("Condition" in texts) == said
@@ -232,8 +237,8 @@ def test_narrow_lines(given: Document, page: Sections) -> None:
 def test_answers_weighed(given: Document, page: Sections) -> None:
     for candidate in given["candidates"][:4]:
         text = page.row("which", candidate["effect"].replace("_", " "))
-        assert printing.probability(candidate["probability"]) in text
-        text = text.replace(printing.probability(candidate["probability"]), "", 1)
+        assert probability(candidate["probability"]) in text
+        text = text.replace(probability(candidate["probability"]), "", 1)
         wanted = [] if candidate["effect"] in ("none", "unknown") else [100 * candidate["closed"]]
         wanted += [candidate["excess_after"]]
         for estimate in candidate["parameters"].values():
@@ -268,18 +273,20 @@ def test_a_p_value_is_never_zero(given: Document) -> None:
 def test_answers_left_out_are_counted(given: Document) -> None:
     assert len(view.candidate_rows(given)) == 4
     # 0.4 + 0.05 + 0.03 thousandths
-    assert view.others(given).startswith("3 more answers have together a probability of less than 0.01. The")
+    assert other_answers(given).startswith(
+        "3 more answers have together a probability of less than 0.01. The"
+    )
     likely = given["candidates"][:4] + [{**given["candidates"][6], "probability": 0.0095}] * 5
     words = "5 more answers have together a probability of 0.05, none of them more than 0.01. The"
-    assert view.others(given | {"candidates": likely}).startswith(words)
+    assert other_answers(given | {"candidates": likely}).startswith(words)
     few = given | {"candidates": given["candidates"][:2]}
-    assert view.others(few) == ""
+    assert other_answers(few) == ""
     assert len(view.candidate_rows(few)) == 2
     improbable = given | {"candidates": [c | {"probability": 0.001} for c in given["candidates"]]}
     assert len(view.candidate_rows(improbable)) == 3
     even = given | {"candidates": [c | {"probability": 0.01} for c in given["candidates"]]}
-    assert view.others(even) == ""
-    assert view.others(given | {"candidates": given["candidates"][:5]}).startswith("1 more answer has a ")
+    assert other_answers(even) == ""
+    assert other_answers(given | {"candidates": given["candidates"][:5]}).startswith("1 more answer has a ")
 
 
 def test_the_count_of_answers_left_out_is_on_the_page(page: Sections) -> None:
@@ -382,7 +389,7 @@ def test_the_uncertainty_budget(given: Document) -> None:
     ],
 )  # fmt: skip
 def test_what_to_do_next(given: Document, changes: Document, words: list[str]) -> None:
-    steps = view.next_steps(given | changes)
+    steps = next_steps(given | changes)
     run = given["next_run"] is not None and "ambiguous_with" not in changes and changes
     steps = [step for step in steps if not (run and "distinguishes" in step)]
     assert len(steps) == len(words)
@@ -444,7 +451,7 @@ def test_a_line_cannot_hold_more_than_all() -> None:
     ],
 )
 def test_the_kind_of_the_answer(given: Document, changes: Document, kind: str) -> None:
-    assert view.headline(given | changes)[1] == kind
+    assert headline(given | changes)[1] == kind
     facts = [fact.value for fact in view.facts(given | changes)]
     assert ("98.8 %" in facts) == (kind in ("open", "found"))
 

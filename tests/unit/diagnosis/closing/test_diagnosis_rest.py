@@ -10,11 +10,11 @@ import pytest
 
 from diagnosis.answer.candidates import meant_coefficient, meant_parameter
 from diagnosis.answer.coefficients import Answers, Possible, coefficients
+from diagnosis.answer.judgements import remainder
 from diagnosis.answer.linear_theory import (
     coefficient_move,
     wind_on_runs,
 )
-from diagnosis.answer.verdict import remainder
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
@@ -23,8 +23,10 @@ from diagnosis.model.rig import PerInertia
 from diagnosis.result import ParameterEstimate
 from diagnosis.search.weigh import Weighed
 from diagnosis.settings import Settings
+from diagnosis.words.remainder import rest_words
 from tests.unit.gap_campaigns import CN_BETA, CONDITIONS, INERTIA, campaign, nominal, studied
 from tunnel_sim.effects import effect_class
+from tunnel_sim.files.writing import as_json
 
 CAUSE = "quadratic_damping"
 
@@ -78,7 +80,13 @@ def cut(base, part):
 
 def judged(study, moved, std, excess=0.4):
     stated = {"cn_beta": ParameterEstimate(0.5, std, "1/rad")}
-    return remainder(study, stated, {"cn_beta": moved}, excess)
+    found = remainder(study, stated, {"cn_beta": moved}, excess)
+    document = {
+        "causes": list(study.causes),
+        "rest": as_json(found),
+        "coefficients": {"after": as_json(stated)},
+    }
+    return replace(found, words=rest_words(document))
 
 
 def unknown(data, base):

@@ -1,0 +1,200 @@
+"""What is judged of an answer: caveats, what nearly explains a gap, springs that may be off, and what remains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from diagnosis.facts.checks import Confirmation
+from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError, SpringsOff
+from diagnosis.facts.remainder import Move, Remainder
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import CHANNELS, misfit
+from diagnosis.noise.gap import gap_test
+from diagnosis.noise.kinds import Noise
+from diagnosis.result import Hidden, ParameterEstimate, RunGap
+from diagnosis.search.investigate import Study
+from diagnosis.search.outside import ONE_SPRING, AnotherSpring
+from diagnosis.search.weigh import UNKNOWN
+from diagnosis.settings import Settings, WordsSettings
+from tunnel_sim.vocabulary.campaign import Campaign
+
+Estimates = Mapping[str, ParameterEstimate]
+
+
+def cautions(
+    campaign: Campaign,
+    noise: Noise,
+    runs: Sequence[RunGap],
+    confirmation: Confirmation,
+    *,
+    named: bool,
+    settings: Settings,
+) -> tuple[Fact, ...]:
+    """The caveats of an answer.
+
+    Args:
+        runs: the gap by run, which says whether the run could be held out of the fit.
+        confirmation: whether the fits' integrator agrees with the MuJoCo model.
+        named: whether the answer names effects; only then are runs held out of a fit.
+    """
+    found, chosen = [], settings.words
+    if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
+        found.append(Fact("one spring assumed"))
+    found += noise.cautions(chosen.noise_contradicted)
+    if confirmation.failure:
+        found.append(Fact("not followed", {"failure": confirmation.failure}))
+    elif not confirmation.agrees:
+        figures = {"rms_rad": confirmation.rms_difference, "tolerance_rad": confirmation.tolerance}
+        beside = {"run": confirmation.run, "tolerance": settings.answer.integrator_tolerance}
+        found.append(Fact("not confirmed", figures | beside))
+    windy = any(run.wind_on for run in campaign.runs)
+    if len(campaign.runs) < chosen.runs_without_caution:
+        kind = {"driven": campaign.driven, "windy": windy}
+        found.append(Fact("few runs", {"runs": len(campaign.runs), **kind}))
+    fitted = [run.id for run in runs if not run.held_out]
+    if named and len(fitted) == len(runs):
+        found.append(Fact("none held out", {"windy": windy}))
+    elif named and fitted:
+        found.append(Fact("some not held out", {"runs": fitted}))
+    return tuple(found)
+
+
+def outside_the_fits(study: Study) -> tuple[Fact, ...]:
+    """The parts of the records that no fit uses, and the effects that no half of them shows."""
+    return (
+        *((Fact("cut"),) if study.cut else ()),
+        *(Fact("unresolved", {"effects": names}) for names in dict.fromkeys(study.unresolved.values())),
+        *((Fact("rested", {"runs": study.rested}),) if study.rested else ()),
+    )
+
+
+def beside_the_numbers(
+    study: Study, place: PlaceFound | Nowhere, before: Estimates, after: Estimates, caveats: tuple[Fact, ...]
+) -> Found:
+    """What is said of an answer and is no number of it.
+
+    Args:
+        before: the coefficients without the causes.
+        after: the coefficients with them.
+    """
+    runs = study.nominal.problem.data.runs
+    return Found(
+        place=place if isinstance(place, PlaceFound) else None,
+        nowhere=place if isinstance(place, Nowhere) else None,
+        both_winds=len({run.wind_on for run in runs}) > 1,
+        nearly=nearly(study),
+        immaterial=immaterial(before, after, study.settings.words) if study.named else {},
+        choices=spring_choices(study),
+        noise=study.noise.reason,
+        cautions=caveats,
+    )
+
+
+def nearly(study: Study) -> Nearly | None:
+    """The effects that explain most of a gap without being named; None where none do."""
+    sets, chosen = [answer for answer in study.weighed if answer.effects != UNKNOWN], study.settings.words
+    first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
+    if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
+        return None
+    found = Nearly(first.effects, 1.0 - first.share, first.probability)
+    if study.test.noisy and first.probability == 0.0:
+        return replace(found, noisy=True)
+    alike = [a for a in sets if a is not first and a.share <= first.share + chosen.nearly_alike]
+    rival = max(alike, key=lambda answer: answer.probability, default=None)
+    if rival is not None and rival.probability >= chosen.nearly_rival * first.probability:
+        return replace(found, rival=rival.effects, rival_probability=rival.probability)
+    fitted = study.hypothesis(first.effects)
+    if fitted is None:
+        return found
+    chance = chosen.nearly_misfit_stds * np.sqrt(2.0 * misfit(study.nominal).count)
+    left = [name for name, x, c in zip(CHANNELS, fitted.excess, chance, strict=True) if x > c]
+    return replace(found, misfit=tuple(left))
+
+
+def immaterial(before: Estimates, after: Estimates, chosen: WordsSettings) -> dict[str, float]:
+    """By coefficient, the share by which the causes change it; empty where they change one materially."""
+    known = {name: given for name, given in after.items() if given.std and given.value and name in before}
+    moves = {name: abs(given.value - before[name].value) for name, given in known.items()}
+    limits = {
+        name: min(chosen.immaterial * abs(given.value), given.std or 0.0) for name, given in known.items()
+    }
+    if any(moves[name] > limit for name, limit in limits.items()):
+        return {}
+    return {name: moves[name] / abs(given.value) for name, given in known.items()}
+
+
+def springs_off(study: Study) -> SpringsOff | None:
+    """The likeliest pair of springs that are off; None where none closes most of the gap."""
+    best = min(study.outside, key=lambda pair: pair.fit.total, default=None)
+    least = study.settings.words.two_springs_explain
+    if best is None or best.fit.excess > (1.0 - least) * study.nominal.excess:
+        return None
+    both = (ONE_SPRING.name, AnotherSpring.name)
+    springs = tuple(_spring_error(study, best.fit, name) for name in both)
+    return SpringsOff(springs, tuple(name for name in best.names if name not in both))
+
+
+def spring_choices(study: Study) -> tuple[SpringError, ...]:
+    """The springs of which one may be off, where the runs cannot tell which."""
+    return tuple(
+        replace(_spring_error(study, one.hypothesis.fit, ONE_SPRING.name), probability=one.probability)
+        for one in study.choices.get(study.fitted, ())
+    )
+
+
+def _spring_error(study: Study, fit: Fit, name: str) -> SpringError:
+    """The spring that an effect is off, and its error."""
+    stated = dict(fit.problem.fixed)[f"{name}.{ONE_SPRING.chosen_spring()}"]
+    inflate = float(np.sqrt(1.0 + max(fit.excess, 0.0)))
+    error, std = (of(f"{name}.error") for of in (fit.value, fit.std))
+    return SpringError(study.similarity.own(stated, "N m/rad"), error, inflate * std)
+
+
+def remainder(
+    study: Study, stated: Estimates, moved: Mapping[str, float], excess: float, hidden: Sequence[Hidden] = ()
+) -> Remainder:
+    """Judge what the answer leaves of the gap; what chance explains is never material.
+
+    The tests of bands do not see what coloured noise takes up. A further effect that is significant shows it.
+
+    Args:
+        stated: the coefficients of the answer's fit with their standard deviations.
+        moved: by the same names, how far what remains moves them (`coefficient_move`), in their units.
+        excess: left on readings held out of the fit, in noise variances of a sample.
+        hidden: the effects that could hide beside the answer.
+    """
+    random, chosen = study.random_answer(study.fitted), study.settings.answer
+    if random is not None:  # in its wind it leaves innovations
+        runs = zip(study.chosen.problem.data.runs, study.chosen.residuals, strict=True)
+        still = [residual for run, residual in runs if not run.wind_on]
+        both = np.concatenate([*random.process.innovations, *still])
+        p_value = float(chdtrc(both.size, both @ both))
+    elif study.chosen is study.nominal:
+        p_value = study.test.p_value
+    else:  # no cause changes the tests of the noise itself: those of the residuals count
+        noise = study.noise.rounded(study.chosen, study.step)
+        p_value = gap_test(study.chosen, noise, study.trend, coarse_step=True).p_value
+    further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
+    by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
+    shown = further is not None and by_effect < chosen.remains_rate <= p_value
+    p_value = min(p_value, by_effect)
+    beyond_chance = p_value < chosen.remains_rate
+    moves = {}
+    for name, given in stated.items():
+        relative = moved[name] / abs(given.value) if given.value else None
+        # by its standard deviation, or by a share, where the runs determine it
+        least = chosen.material_share
+        far = given.std is not None and (moved[name] > given.std or (relative or 0.0) > least)
+        moves[name] = Move(moved[name], relative, given.std, given.unit, material=beyond_chance and far)
+    return Remainder(
+        significant=beyond_chance,
+        excess=excess,
+        p_value=p_value,
+        material=any(move.material for move in moves.values()),
+        moves=moves,
+        further=further.effect if shown and further is not None else "",
+    )

@@ -1,0 +1,82 @@
+"""How large a gap is, and how far it closes with each cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tunnel_sim.files.writing import as_json
+
+ON_RUNS = "on runs held out of the fit"
+ON_STRETCHES = "on stretches of time held out of the fit"
+ON_BOTH = f"{ON_RUNS}, and on stretches of time where a run is the only one of its kind"
+PATCHED = "simulated with the patched model"
+FITTED = "in the fitted runs (none could be held out)"
+"""What a gap before and after is measured on, as the document states it."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What turns an excess into a misfit.
+
+    Args:
+        noise: standard deviation of one sample's noise, against which excesses are measured, in ``unit``.
+        swing: root mean square of the readings about the mean of each run, in ``unit``.
+        unit: of the readings: ``rad``, ``rad/s`` or ``rad/s2``.
+    """
+
+    noise: float
+    swing: float
+    unit: str
+
+    def rms(self, excess: float) -> float:
+        """Root mean square in ``unit`` of an excess in noise variances of a sample, which is chance below zero."""
+        return self.noise * math.sqrt(max(excess, 0.0))
+
+
+def share_closed(before: float, after: float) -> float:
+    """Share of a gap that closes, 0 to 1.
+
+    Args:
+        before: excess of the nominal model, in noise variances of a sample.
+        after: excess with the causes, in noise variances of a sample.
+    """
+    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """The model with one more cause.
+
+    Args:
+        effect: name of the cause added; None for the nominal model.
+        excess: with it and all causes before it, on readings held out of the fit, in noise variances of a sample.
+    """
+
+    effect: str | None
+    excess: float
+
+
+@dataclass(frozen=True)
+class Waterfall:
+    """How far the gap closes as the causes are added one after another.
+
+    Args:
+        steps: the nominal model first; then the cause that closes most, and so on.
+        without: excess by cause, when it alone is taken out and the others are refitted, likewise held out. A cause
+            beside a random moment has none: the random moment would absorb it.
+    """
+
+    steps: tuple[Step, ...] = ()
+    without: Mapping[str, float] = field(default_factory=dict)
+    held_out: str = ""
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fields of a document: ``waterfall``, ``waterfall_on`` and ``without``."""
+        return {
+            "waterfall": as_json(self.steps),
+            "waterfall_on": self.held_out,
+            "without": dict(self.without),
+        }

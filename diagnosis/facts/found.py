@@ -1,0 +1,210 @@
+"""What is found beside the numbers of an answer and has to be said, as kinds with figures and without a sentence.
+
+`diagnosis.words` has the sentence of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from identification.status import Remark
+from tunnel_sim.files.writing import as_json
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One thing found, whose sentence is in `diagnosis.words` under its kind.
+
+    Args:
+        figures: what the sentence states, by name, in JSON's types; numbers have their units in their names.
+    """
+
+    kind: str
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The kind, and the figures by name beside it."""
+        return {"kind": self.kind, **as_json(self.figures)}
+
+
+def as_stated(words: str) -> Fact:
+    """A sentence that a nominal model brings, as a fact."""
+    return Fact("stated", {"words": words})
+
+
+@dataclass(frozen=True)
+class Noted:
+    """A fact about the noise of some runs, which is said among the remarks on the records.
+
+    Args:
+        runs: ids of the runs.
+    """
+
+    runs: tuple[str, ...]
+    fact: Fact
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The fact's fields and ``runs``."""
+        return {**self.fact.to_json_dict(), "runs": list(self.runs)}
+
+
+@dataclass(frozen=True)
+class PlaceFound:
+    """Why a gap is placed where it is.
+
+    Args:
+        runs: number of the runs compared.
+        share: of the gap, in the runs that show it, a fraction.
+        false_alarm_rate: at which a run is said to show a gap falsely, all runs together, a fraction.
+        wind: excess by state of the wind, ``on`` and ``off``, a ratio; empty without runs of both.
+        narrow: the intervals that locate the gap: ``time_s``, ``amplitude_rad``, ``frequency_hz``.
+        bands: share of the gap by band beyond chance, the largest first, fractions.
+        channel: the reason for the channel.
+        condition: the reason for the condition.
+        compared: causes whose channels are compared with the place.
+        agrees: whether one of them acts there.
+    """
+
+    runs: int
+    share: float
+    false_alarm_rate: float
+    wind: Mapping[str, float]
+    narrow: tuple[str, ...]
+    bands: Mapping[str, float]
+    channel: Fact
+    condition: Fact
+    compared: tuple[str, ...] = ()
+    agrees: bool = False
+
+
+@dataclass(frozen=True)
+class Nowhere:
+    """Residuals without a gap.
+
+    Args:
+        runs: number of the runs compared.
+        p_value: of the run that differs most, corrected for their number, a probability.
+        within_step: whether the residual is not white, but within the steps of the readings.
+    """
+
+    runs: int
+    p_value: float
+    within_step: bool
+
+
+@dataclass(frozen=True)
+class Nearly:
+    """Effects that explain most of a gap and are not named.
+
+    Args:
+        closes: share of the gap in the fitted runs, a fraction.
+        probability: that they are the answer, a fraction.
+        noisy: whether the noise misbehaves and may be all of the gap.
+        rival: effects that explain as much; empty where none do.
+        rival_probability: of those, a fraction.
+        misfit: channels in which a significant misfit is left.
+    """
+
+    effects: tuple[str, ...]
+    closes: float
+    probability: float
+    noisy: bool = False
+    rival: tuple[str, ...] = ()
+    rival_probability: float = 0.0
+    misfit: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SpringError:
+    """A spring that may not be as stiff as stated.
+
+    Args:
+        stiffness: as stated, N m/rad.
+        error: of it, a fraction.
+        std: standard deviation of the error, a fraction.
+        probability: among the springs that may be off, a fraction; None for one of several that are all off.
+    """
+
+    stiffness: float
+    error: float
+    std: float
+    probability: float | None = None
+
+
+@dataclass(frozen=True)
+class SpringsOff:
+    """Springs that would explain the gap if they all were off.
+
+    Args:
+        beside: effects that act with them.
+    """
+
+    springs: tuple[SpringError, ...]
+    beside: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A decaying oscillation.
+
+    Args:
+        amplitude_rad: at the start, rad.
+        frequency_hz: Hz.
+        decay_per_s: rate of its decay, 1/s.
+    """
+
+    amplitude_rad: float
+    frequency_hz: float
+    decay_per_s: float
+
+
+@dataclass(frozen=True)
+class TwoModes:
+    """Two modes in a run, where a rig has one.
+
+    Args:
+        run: id of the run.
+        main: the mode that one free decay fits.
+        second: the mode beside it.
+        closes: share of what one free decay leaves that falls away with it, a fraction.
+    """
+
+    run: str
+    main: Mode
+    second: Mode
+    closes: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """Everything that is said of an answer and is no number of it.
+
+    Args:
+        place: why the gap is where it is; None where there is none, or no place.
+        nowhere: the residuals of a campaign without a gap; else None.
+        both_winds: whether the wind is off in some runs and on in others.
+        nearly: what nearly explains an unexplained gap; None where nothing does.
+        immaterial: by coefficient, the share by which the causes change it, where they change none materially.
+        choices: springs of which one may be off, the likeliest first.
+        springs_off: springs that would explain a gap whose cause is not known; else None.
+        second_modes: by run, where the gap is not explained.
+        limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
+        noise: why the noise is taken as it is.
+        cautions: caveats.
+        noted: what is noted of the noise.
+    """
+
+    place: PlaceFound | None = None
+    nowhere: Nowhere | None = None
+    both_winds: bool = False
+    nearly: Nearly | None = None
+    immaterial: Mapping[str, float] = field(default_factory=dict)
+    choices: tuple[SpringError, ...] = ()
+    springs_off: SpringsOff | None = None
+    second_modes: tuple[TwoModes, ...] = ()
+    limit_cycles: tuple[Remark, ...] = ()
+    noise: Fact | None = None
+    cautions: tuple[Fact, ...] = ()
+    noted: tuple[Noted, ...] = ()

@@ -1,0 +1,93 @@
+"""A model of one's own with the causes written into it, and how far it closes the gap by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from diagnosis.facts.found import Fact
+from tunnel_sim.files.writing import as_json
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from tunnel_sim.engine.joint_model import JointModel
+    from tunnel_sim.engine.joint_patch import Written
+
+
+@dataclass(frozen=True)
+class NativeClosure:
+    """How far the gap closes on readings held out of the fit.
+
+    Args:
+        before: mean squared residual of the nominal model, in units of the noise power of a block mean.
+        fit: of the fits' own integrator with the causes, in the same unit.
+        native: of the patched model, simulated by the engine, in the same unit.
+    """
+
+    before: float
+    fit: float
+    native: float
+    on: str
+
+    @property
+    def fit_closed(self) -> float:
+        """Share of the gap that the fit closes."""
+        return self._closed(self.fit)
+
+    @property
+    def native_closed(self) -> float:
+        """Share of the gap that the patched model closes."""
+        return self._closed(self.native)
+
+    def _closed(self, after: float) -> float:
+        return min(max(1.0 - max(after - 1.0, 0.0) / max(self.before - 1.0, 1e-9), 0.0), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PatchedModel:
+    """The model with the causes written into it.
+
+    Args:
+        written: attributes that changed.
+        differences: where the native element is not the same law, and what is left out.
+        zero: the reading less the joint's position, rad; the median of the runs.
+        notes: the differences in sentences; empty until they are written.
+    """
+
+    model: JointModel
+    spec: mujoco.MjSpec
+    written: tuple[Written, ...]
+    differences: tuple[Fact, ...]
+    zero: float
+    closure: NativeClosure
+    notes: tuple[str, ...] = ()
+
+    def write(self, path: Path | str) -> Path:
+        """Write the patched model to an MJCF file, which it replaces, completely or not at all.
+
+        Raises:
+            TunnelError: when it cannot be written.
+        """
+        from tunnel_sim.engine.joint_patch import patched_xml
+        from tunnel_sim.files.writing import write_whole
+
+        target = Path(path)
+        return write_whole(target, patched_xml(self.spec, self.model, target.parent).encode())
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """The patch in JSON's types."""
+        return {
+            "file": self.model.path.name,
+            "joint": self.model.joint,
+            "free": list(self.model.law.free),
+            "rest_rad": self.model.law.rest,
+            "zero_rad": self.zero,
+            "written": as_json(self.written),
+            "notes": list(self.notes),
+            "differences": as_json(self.differences),
+            "closed": self.closure.native_closed,
+            "closed_by_fit": self.closure.fit_closed,
+            "closed_on": self.closure.on,
+        }

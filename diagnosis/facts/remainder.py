@@ -1,0 +1,166 @@
+"""What remains of a gap, and how much of that could be closed by what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from diagnosis.settings import RemainderSettings
+from tunnel_sim.files.writing import as_json
+
+KINDS = (
+    "angle", "rate", "state", "wind", "time", "reading", "line", "between", "event", "wander", "noise",
+)  # fmt: skip
+"""Kinds of what may be missing; ``noise`` where none of the others closes much."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """How far what remains moves a coefficient.
+
+    Args:
+        value: half the difference between the halves of the data that differ most, beyond chance, in ``unit``.
+        relative: the same over the coefficient's absolute value, a fraction; None where the coefficient is zero.
+        std: standard deviation stated for the coefficient, in ``unit``; None where the runs do not determine it.
+        material: whether what remains is significant and moves the coefficient by more than its standard deviation
+            or by 1 %.
+    """
+
+    value: float
+    relative: float | None
+    std: float | None
+    unit: str
+    material: bool = False
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What remains after the named causes; the whole gap where none is named.
+
+    Args:
+        significant: whether it is beyond chance, by the tests of the gap.
+        excess: on readings held out of the fit, in noise variances of a sample.
+        p_value: of the strongest test, corrected for the number of tests.
+        material: whether it is significant and moves a coefficient by more than its standard deviation or by 1 %.
+        words: it in sentences; empty until they are written.
+        further: an effect that is significant beside the causes and too small to be named; empty where none is.
+    """
+
+    significant: bool
+    excess: float
+    p_value: float
+    material: bool
+    moves: Mapping[str, Move]
+    words: str = ""
+    further: str = ""
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """How much one kind could close at most.
+
+    Args:
+        kind: of `KINDS`.
+        closed: share of what is left, on readings held out of the fit; negative where the prediction is worse.
+        std: its standard deviation from the scatter of the runs, a share.
+    """
+
+    kind: str
+    closed: float
+    std: float
+    held_out: str
+
+    def determined(self, chosen: RemainderSettings) -> bool:
+        """Whether the share is known well enough; of a small excess, laws may close more than all."""
+        return self.std < chosen.known_to and self.closed < chosen.closes_at_most
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The missing moment, or error of the reading, where it depends on one quantity or two.
+
+    Args:
+        over: the quantities: ``angle`` (rad), ``rate`` (rad/s) or ``time`` (s).
+        values: at all places, the last quantity running fastest, in ``unit``. A part in proportion to angle or rate
+            belongs to the model's own coefficients, and is taken out.
+        std: their standard deviations, in ``unit``.
+        unit: of values and standard deviations.
+    """
+
+    over: tuple[str, ...]
+    places: tuple[tuple[float, ...], ...]
+    values: tuple[float, ...]
+    std: tuple[float, ...]
+    unit: str
+
+
+@dataclass(frozen=True)
+class Line:
+    """A steady line in the readings, beyond chance.
+
+    Args:
+        frequency_hz: Hz.
+        frequency_std_hz: its standard deviation, Hz.
+        amplitude: root mean square over the runs, in ``unit``.
+        amplitude_std: its standard deviation, in ``unit``.
+        unit: of the readings.
+        false_alarm_rate: of lines, a fraction of the campaigns without one.
+    """
+
+    frequency_hz: float
+    frequency_std_hz: float
+    amplitude: float
+    amplitude_std: float
+    unit: str
+    false_alarm_rate: float
+
+
+@dataclass(frozen=True)
+class Law:
+    """A formula that explains what is missing, fitted like any other effect.
+
+    Args:
+        effect: table of an effects file that states it.
+        parameters: value and standard deviation by name, in the unit that the table states.
+        closed: share of what is left that it closes, on runs held out of the fit.
+        std: its standard deviation from the scatter of the runs, a share.
+    """
+
+    effect: Mapping[str, Any]
+    parameters: Mapping[str, tuple[float, float]]
+    closed: float
+    std: float
+
+    def to_json_dict(self) -> dict[str, Any]:
+        """Fields by name; of the parameters ``value`` and ``std``."""
+        parameters = {name: {"value": value, "std": std} for name, (value, std) in self.parameters.items()}
+        found: dict[str, Any] = as_json({**vars(self), "parameters": parameters})
+        return found
+
+
+@dataclass(frozen=True)
+class Closable:
+    """What could be closed of what the answer leaves.
+
+    Args:
+        excess: that the answer leaves in the fitted runs, in noise variances of a sample.
+        kind: the simplest that closes about as much as any, of `KINDS`.
+        words: it in sentences; empty until they are written.
+        events: where a kind that differs from run to run lies: ``run``, its ``share``, ``from_s`` and ``to_s``.
+        curve: of that kind; None where it has none.
+        alike: other kinds that close about as much, measured in the same way.
+        next_most: share that the other kinds close at most, measured in the same way; None without others.
+        line: of the kind ``line``; else None.
+    """
+
+    excess: float
+    ceilings: tuple[Ceiling, ...]
+    kind: str
+    words: str = ""
+    events: tuple[Mapping[str, Any], ...] = ()
+    curve: Curve | None = None
+    law: Law | None = None
+    alike: tuple[str, ...] = ()
+    next_most: float | None = None
+    line: Line | None = None

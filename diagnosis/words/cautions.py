@@ -1,0 +1,226 @@
+"""Caveats, remarks on the noise, and notes, each under the kind of its fact.
+
+A sentence is a template of the fact's figures, or a function of them where it depends on them otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from diagnosis.words.names import Document, plain
+from diagnosis.words.numbers import part
+from identification.status import Outcome, Remark
+from tunnel_sim.effects import effect_class
+
+Figures = Mapping[str, Any]
+Sentence = str | Callable[[Figures], str]
+
+UNPATCHED = "The causes could not be written into the model"
+_NOISE = "The records' noise is {ratio:.3g} times what noise_std and resolution state"
+_LEFT_OUT = (
+    "Left out, since they state {} spring_stiffness and the others {}: {{runs}}. State it for all runs, or "
+)
+
+
+def _not_confirmed(given: Figures) -> str:
+    return (
+        f"The fits' own integrator differs from the MuJoCo model by {given['rms_rad']:.1e} rad (root mean square "
+        f"over {given['run']}), more than {part(given['tolerance'])} of the noise ({given['tolerance_rad']:.1e} "
+        "rad). The gap before and after comes from MuJoCo. The parameters and probabilities come from the fits, "
+        "and may be wrong by as much."
+    )
+
+
+def _few_runs(given: Figures) -> str:
+    motion, others = "decay", "with other springs and release angles"
+    if given["driven"]:
+        motion, others = "motion", "with other inputs"
+    if given["windy"]:
+        others = "with other springs, wind speeds and release angles"
+    number = "is one run" if given["runs"] == 1 else f"are {given['runs']} runs"
+    return (
+        f"There {number} only: causes are distinguished by the form of the {motion} alone. Add runs {others}."
+    )
+
+
+def _none_held_out(given: Figures) -> str:
+    each = "spring, with the wind off and on" if given["windy"] else "run"
+    return (
+        "No run could be held out of the fit, so the share closed is that of the fitted runs. The gap as the "
+        f"causes are added is predicted for stretches of time left out. Repeat every {each}: a run left out tests "
+        "more than a stretch."
+    )
+
+
+def _unresolved(given: Figures) -> str:
+    return (
+        f"{plain(*given['effects']).capitalize()} was fitted to the whole records and left out of the answer: "
+        "neither the early nor the late half of them, fitted by itself, shows it."
+    )
+
+
+CAUTIONS: Mapping[str, Sentence] = {
+    "stated": "{words}",
+    "stiffness not stated": f"{_LEFT_OUT.format('no', 'do')}diagnose these separately.",
+    "stiffness stated": f"{_LEFT_OUT.format('their', 'do not')}diagnose these separately.",
+    "other springs": "Left out, since different frequencies at one wind speed show more than one spring, and these "
+    "runs may not have the spring of the rest: {runs}. State spring_stiffness, or diagnose these separately.",
+    "another mode": "Left out, since they swing in another mode, {ratio:g} times as fast as the same spring with "
+    "the wind off or faster: {runs}. Diagnose these separately.",
+    "no sensor effect tried": "No effect of the sensor is tried on {quantity}s.",
+    "only a second mode tried": "A second mode is the only effect of the sensor that is tried on {quantity}s.",
+    "by moment": "Nothing holds the body, so that small errors of the moment add up in its angle, which departs "
+    "from every model. Effects are therefore compared by the moment that they leave. It counts as random noise "
+    "beside the answer: parameters, coefficients and the shares in the table of answers come from fits with that "
+    "noise. All other sizes and shares are those of the angle.",
+    "unpatched": f"{UNPATCHED}: {{reason}}.",
+    "one spring assumed": "No run states spring_stiffness, so all runs are assumed to have the same spring, and "
+    "moments are per unit inertia. State it, or leave out the runs with another spring: a different spring looks "
+    "like a gap.",
+    "floor": "The records contain almost no noise ({records_rad:.1g} rad). The accuracy of the fits, "
+    "{fits_rad:.1g} rad, stands in for it, and a smaller gap is not detected. Add sensor noise to simulated "
+    "records.",
+    "less noise than stated": f"{_NOISE}. The answer is based on the noise found in the records; correct noise_std "
+    "or leave it out.",
+    "more noise than stated": f"{_NOISE}, and noise above the stated level counts as a gap. If the sensor really "
+    "is as noisy as that, correct noise_std or leave it out.",
+    "not followed": "The MuJoCo model could not follow the fitted motion ({failure}), so all figures come from the "
+    "fits' own integrator. Do not rely on the fitted parameters.",
+    "not confirmed": _not_confirmed,
+    "few runs": _few_runs,
+    "none held out": _none_held_out,
+    "some not held out": "Not held out of the fit, since no other run has the same spring or wind: {runs}. Their "
+    "gap with the causes added is that of the fit; repeat these runs.",
+    "cut": "The nominal model misses the motion grossly, so each record is used only from its second passage "
+    "through the middle until its motion ends. A start driven by hand is not a free decay, and neither is a body "
+    "at rest. The coefficients before the causes may therefore differ from those of identify, which uses the "
+    "whole record.",
+    "unresolved": _unresolved,
+    "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the place where friction "
+    "stops a body says little about its motion.",
+    "remainder not sought": "What could be closed of what remains, and by which formula, is not sought where a run "
+    "is driven.",
+    "remainder not solved": "How much of what remains could be closed was not found: its equations cannot be "
+    "solved.",
+}
+"""Caveats of an answer."""
+
+NOISE: Mapping[str, Sentence] = {
+    "coloured": "it is coloured, {std_rad:.3g} rad in all",
+    "floor": "the records contain {std_rad:.1g} rad, in {fewer} of {runs} runs less than the accuracy of the fits, "
+    "which stands in for it",
+    "not stated": "the campaign states no noise",
+    "agrees": "the records agree: {std_rad:.3g} ± {uncertainty_rad:.1g} rad",
+    "contradicts": "the records contradict the stated {stated_rad:.3g} rad: they contain {std_rad:.3g} ± "
+    "{uncertainty_rad:.1g} rad",
+    "differs by run": "the records contradict the stated {stated_rad:.3g} rad: their noise differs by run, "
+    "{least_rad:.3g} to {most_rad:.3g} rad",
+}
+"""Why the noise is taken as it is: clauses."""
+
+REMARKS: Mapping[str, tuple[Sentence, str]] = {
+    "within step": (
+        "the model departs from the readings by less than their steps, whose error may follow the motion",
+        "read the angle more finely to see smaller gaps",
+    ),
+    "coloured": (
+        "the sensor's noise is coloured: {std_rad:.3g} rad in all, and its power per hertz varies by a factor of "
+        "{power_ratio:.3g} over a factor of {frequency_ratio:.3g} in frequency, in the same way throughout the "
+        "runs",
+        "the diagnosis allows for it, and it is not a cause",
+    ),
+    "not judged": (
+        "sampled too slowly to test whether the noise follows the motion or comes in bursts",
+        "sample faster to test it",
+    ),
+    "harmonic of the hum": (
+        "the strongest line of the hum is at {line_hz:.5g} Hz, {harmonic} times the mains' frequency",
+        "the stated amplitude is that line's",
+    ),
+    "folded hum": (
+        lambda given: (
+            f"the hum's line of {given['line_hz']:.5g} Hz is above half the sample rate and appears at "
+            f"{' to '.join(f'{place:.5g}' for place in given['places_hz'])} Hz"
+        ),
+        "sample faster to see it where it is",
+    ),
+    "other mains": (
+        "mains of {other_hz:.5g} Hz would show the same line as mains of {mains_hz:.5g} Hz at this sample rate",
+        "sample faster to tell them apart",
+    ),
+}
+"""What is noted of the noise, and its remedy."""
+
+PATCH: Mapping[str, Sentence] = {
+    "polynomial": "The {moment} is written as a polynomial of third order, which misses {missed_percent:.2g} % of "
+    "its greatest moment within the records.",
+    "no native element": "The {moment} has no native element; the plugin vwt.yaw_moment adds it.",
+    "soft friction": "frictionloss is a soft constraint: near rest it yields as a damper does, and the joint "
+    "creeps. Its time constant is set to two steps, the shortest allowed.",
+    "presliding": "The presliding of the friction has no native element and is left out.",
+    "rod": "The twist of the rod is left out: it needs a body and a joint of its own.",
+    "delayed input": "The delay of the input is not part of the model; the comparison applies it to the input.",
+    "air": "The air's moment is left out: the patched model is that of the runs with the wind off.",
+    "sensor": lambda given: (
+        f"Of the sensor, and not part of the model: {', '.join(plain(name) for name in given['effects'])}; the "
+        "comparison applies it to the reading."
+    ),
+    "early steps": "The model's integrator moves the joint half a step, {half_step_ms:.3g} ms, before its input "
+    "asks for it; RK4 and shorter steps do not. The inertia that dampers seem to add in such steps is taken off "
+    "what is written.",
+}
+"""Where a patched model is not the same law."""
+
+
+def said(sentences: Mapping[str, Sentence], given: Figures) -> str:
+    """The sentence of a fact of the document."""
+    sentence = sentences[given["kind"]]
+    if callable(sentence):
+        return sentence(given)
+    listed = {name: ", ".join(one) if isinstance(one, list) else one for name, one in given.items()}
+    return sentence.format(**listed)
+
+
+def remark(given: Figures) -> Remark:
+    """The remark of a fact about the noise."""
+    what, remedy = REMARKS[given["kind"]]
+    return Remark(Outcome.NOTED, tuple(given["runs"]), said({given["kind"]: what}, given), remedy)
+
+
+_AS_IDENTIFIED = (
+    "With no cause these agree with the values of identify, whose standard deviations allow neither for effects "
+    "that could hide, nor for the rounding of the stated air density or the spectrum of the noise."
+)
+_NO_DECAY = "no damping ratio and no derivative is stated, since no run is a free decay"
+
+
+def coefficient_note(document: Document) -> str:
+    """How to read the coefficients: where a cause changes their meaning, and what unstated sizes leave open."""
+    if document["found"]["limit_cycles"]:
+        return _NO_DECAY
+    before, causes = document["coefficients"]["before"], document["causes"]
+    caveats = [effect_class(name).caveat for name in causes if name != "unknown"]
+    beta = next((name for name in before if name.startswith("cn_beta")), "")
+    identified = _AS_IDENTIFIED if beta and not causes else ""
+    return " ".join(filter(None, (*caveats, identified, size_note(beta))))
+
+
+def size_note(beta: str) -> str:
+    """What is identified in place of the coefficients where sizes are not stated.
+
+    Args:
+        beta: name of what is identified in place of Cnβ, such as ``cn_beta_area_length``; empty without wind.
+
+    Returns:
+        A sentence; empty where the sizes are stated.
+    """
+    area, length = "_area" in beta, "_length" in beta
+    missing = ["frontal_area"] * area + ["reference_length"] * length
+    if not missing:
+        return ""
+    return (
+        f"[rig] states no {' and no '.join(missing)}, so Cnβ{'·A' * area}{'·l' * length} and Cnr{'·A' * area}"
+        f"{'·l²' * length} are identified, not Cnβ and Cnr. State {'both' if len(missing) > 1 else 'it'} to get "
+        "Cnβ and Cnr."
+    )

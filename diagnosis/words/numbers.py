@@ -1,0 +1,154 @@
+"""How the numbers of a diagnosis are written: probabilities, shares, and gaps in the units that people use."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+from diagnosis.facts.closure import Misfit
+from diagnosis.words.names import Document
+from identification.printing import significant, unit_mark
+
+_ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+_CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+def probability(value: float) -> str:
+    """A probability to two decimals, never rounded to 0 or 1, such as ``0.97`` or ``> 0.99``."""
+    if value >= 0.995:
+        return "> 0.99"
+    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+
+
+def part(share: float) -> str:
+    """A share above 0 and below 1 as a simple fraction in words, such as ``four fifths``; others in per cent."""
+    simple = Fraction(share).limit_denominator(10)
+    if abs(float(simple) - share) > 1e-9 or not 0 < simple < 1:
+        return f"{100.0 * share:.3g} %"
+    ordinal, count = _ORDINALS[simple.denominator - 2], simple.numerator
+    if count > 1:
+        return f"{_CARDINALS[count]} {ordinal}s"
+    return ordinal if ordinal == "half" else f"{'an' if ordinal == 'eighth' else 'a'} {ordinal}"
+
+
+def share(value: float) -> str:
+    """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``."""
+    if value > 0.9995:
+        return "> 99.9 %" if value < 1.0 else "100 %"
+    if 0.0 <= value < 0.0005:
+        return "< 0.1 %" if value > 0.0 else "0 %"
+    return f"{100.0 * value:.1f} %"
+
+
+def percent(share: float, std: float | None = None) -> str:
+    """A share in per cent, such as ``94.2 ± 0.6 %``.
+
+    Args:
+        share: a fraction.
+        std: its standard deviation, a fraction.
+    """
+    beside = "" if std is None else f" ± {max(100.0 * std, 0.1):.1f}"
+    return f"{min(100.0 * share, 100.0):.1f}{beside} %"
+
+
+def rounded_up(value: float) -> str:
+    """Two significant digits, never below the value."""
+    if value <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.2g}"
+
+
+def change_up_to(size: float, given: Mapping[str, Any]) -> str:
+    """A change of a coefficient as its share, rounded up; in its unit where the coefficient itself is uncertain.
+
+    Args:
+        size: the change, in the coefficient's unit.
+        given: the coefficient, as the document has it.
+    """
+    if given["std"] is not None and given["std"] < abs(given["value"]):
+        return f"{rounded_up(100.0 * size / abs(given['value']))} %"
+    return f"{rounded_up(size)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}".strip()
+
+
+def unit_shown(unit: str) -> tuple[str, float]:
+    """The mark of the unit in which readings are shown to people, and the factor on values in the unit given."""
+    return {"rad": "°", "rad/s": "°/s", "rad/s2": "°/s²"}[unit], math.degrees(1.0)
+
+
+def misfit_of(document: Document) -> Misfit | None:
+    """The misfit of a diagnosis' document; None where it has none, as a document of an earlier version."""
+    given = document["gap"].get("misfit")
+    return None if given is None else Misfit(given["noise"], given["swing"], given["unit"])
+
+
+def rms_shown(misfit: Misfit, excess: float) -> str:
+    """A misfit to three digits, such as ``0.134°``.
+
+    Args:
+        excess: in noise variances of a sample, a ratio.
+    """
+    mark, factor = unit_shown(misfit.unit)
+    value = factor * misfit.rms(excess)
+    return f"{significant(value, 3) if value else '0'}{mark if mark == '°' else f' {mark}'}"
+
+
+def of_swing(misfit: Misfit, excess: float) -> str:
+    """A misfit as a share of the swing in words, such as ``2.1 % of the swing``.
+
+    Args:
+        excess: in noise variances of a sample, a ratio.
+    """
+    share = 100.0 * misfit.rms(excess) / misfit.swing if misfit.swing > 0.0 else 0.0
+    return f"{significant(share, 2) if share else '0'} % of the swing"
+
+
+def times_noise(value: float, decimals: int = 2) -> str:
+    """A gap in words, such as ``2.75 times the noise power``.
+
+    Args:
+        value: the gap as an excess, in noise variances, a ratio.
+        decimals: of a gap below ten (a count).
+    """
+    return f"{significant(value, 4) if value >= 10.0 else f'{value:.{decimals}f}'} times the noise power"
+
+
+def noise_powers(excess: float) -> str:
+    """What is left, in noise powers, a ratio, as the verdict states it."""
+    return "less than 0.001 noise powers" if excess < 1e-3 else f"{significant(excess, 2)} noise powers"
+
+
+def held_out_excess(value: float) -> str:
+    """An excess in noise powers, a ratio: three decimals where it is small, or four significant digits."""
+    return f"{round(value, 3) + 0.0:.3f}" if abs(value) < 10.0 else significant(value, 4)
+
+
+def misfit_text(document: Document, excess: float) -> str:
+    """A gap in the units that people use, and in multiples of the noise power.
+
+    Args:
+        excess: in noise powers, a ratio.
+
+    Returns:
+        Text such as ``0.134° (19.34)``; the multiple alone for a document without ``misfit``.
+    """
+    misfit, times = misfit_of(document), held_out_excess(excess)
+    return times if misfit is None else f"{rms_shown(misfit, excess)} ({times})"
+
+
+def misfit_shown(document: Document, value: float) -> str:
+    """A gap as a root mean square; in noise powers for a document without ``misfit``.
+
+    Args:
+        value: the gap as an excess, in noise variances, a ratio.
+    """
+    misfit = misfit_of(document)
+    return times_noise(value) if misfit is None else rms_shown(misfit, value)
+
+
+def excess_std(document: Document) -> float | None:
+    """Standard deviation of the campaign's excess by chance, in noise powers; None where there are no maps."""
+    runs = (document.get("maps") or {"runs": []})["runs"]
+    return math.sqrt(sum(run["std"] ** 2 for run in runs)) / len(runs) if runs else None

@@ -1,0 +1,127 @@
+"""What remains of a gap, and what could be closed of that, in sentences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from diagnosis.facts.remainder import Ceiling
+from diagnosis.settings import settings_of
+from diagnosis.words.names import KINDS, Document, plain
+from diagnosis.words.numbers import change_up_to, noise_powers, percent
+from identification.printing import COEFFICIENTS, unit_mark, with_std
+from tunnel_sim.effects import known_effects
+
+
+def rest_words(document: Document) -> str:
+    """What remains, in sentences; empty for a document without it."""
+    rest, causes = document["rest"], document["causes"]
+    if rest is None:
+        return ""
+    after, named = document["coefficients"]["after"], causes not in ([], ["unknown"])
+    moves, excess = rest["moves"], rest["excess"]
+    left = f"what remains ({noise_powers(excess)})" if named else "it"
+    explained = f"Explained; {left}" if named else "It"
+    material = [name for name, move in moves.items() if move["material"]]
+    known = [name for name, move in moves.items() if move["std"] is not None]
+    if not causes:
+        words = "No gap: nothing remains beyond the noise."
+    elif not rest["significant"]:
+        words = f"Explained; {left} is within the noise."
+    elif material:
+        moved = _each({name: change_up_to(moves[name]["value"], after[name]) for name in material})
+        start = f"Not all is explained: {left}" if named else "It"
+        words = f"{start} could move {moved}. Do not trust the coefficients beyond the intervals given."
+    elif not known:
+        words = f"{explained} concerns no coefficient that these runs determine."
+    else:
+        most = {name: max(moves[name]["value"], moves[name]["std"] or 0.0) for name in known}
+        bounds = _each({name: f"less than {change_up_to(size, after[name])}" for name, size in most.items()})
+        words = f"{explained} moves {bounds}." if named else f"It hardly matters: it moves {bounds}."
+    if rest["further"]:
+        words += f" {plain(rest['further']).capitalize()} is significant beside it and too small to be named."
+    return words
+
+
+def _each(sizes: dict[str, str]) -> str:
+    """Coefficients with the sizes of their changes."""
+    return " and ".join(f"{COEFFICIENTS.get(name, name)} by {size}" for name, size in sizes.items())
+
+
+def closable_words(document: Document) -> str:
+    """What could be closed of what is left, in a few sentences; empty where the document does not say."""
+    found = document["closable"]
+    if found is None:
+        return ""
+    named = document["causes"] != ["unknown"] and document["decided"]
+    left = "what the causes leave" if named else "the gap"
+    ceilings = [ceiling(one) for one in found["ceilings"]]
+    if found["kind"] == "noise":
+        chosen = settings_of(document).remainder
+        most = max((one for one in ceilings if one.determined(chosen)), key=lambda one: one.closed)
+        bound = percent(max(most.closed, 0.0) + chosen.noise_stds * most.std)
+        return (
+            f"No more than {bound} of {left} could be closed by any "
+            "smooth moment or error of the reading: the rest is noise."
+        )
+    return " ".join([*_largest(found, ceilings, left), *_line(found["line"])])
+
+
+def _largest(found: Document, ceilings: list[Ceiling], left: str) -> list[str]:
+    """How much the kind closes, beside the others, where, and by which formula."""
+    kind, where, law = found["kind"], found["events"], found["law"]
+    best = next(one for one in ceilings if one.kind == kind)
+    said = [
+        f"{percent(best.closed, best.std)} of {left} could be closed by {KINDS[kind]}, measured on {best.held_out} "
+        "held out of the fit."
+    ]
+    if found["alike"]:
+        said.append(
+            f"These runs cannot distinguish it from {' or '.join(KINDS[one] for one in found['alike'])}."
+        )
+    elif found["next_most"] is not None:
+        said.append(f"No other kind would close more than {percent(max(found['next_most'], 0.0))}.")
+    if where and kind != "line":
+        run = f"run {where[0]['run']} ({where[0]['from_s']:.2f} to {where[0]['to_s']:.2f} s)"
+        largest = "" if len(where) == 1 else f"{len(where)} runs, the largest part in "
+        said.append(f"Most of it is in {largest}{run}.")
+    if law is not None:
+        formula = law["effect"].get("moment") or law["effect"]["reading"]
+        said.append(f"The formula {formula} closes {percent(law['closed'], law['std'])}.")
+    return said
+
+
+def _line(found: dict[str, Any] | None) -> list[str]:
+    """A steady line, in a sentence; none without one."""
+    if found is None:
+        return []
+    frequency = with_std(found["frequency_hz"], found["frequency_std_hz"])
+    amplitude = with_std(1e3 * found["amplitude"], 1e3 * found["amplitude_std"])
+    return [
+        f"The line is at {frequency} Hz, with an amplitude of {amplitude} m{unit_mark(found['unit'])}, root mean "
+        "square over the runs; chance alone shows one in less than "
+        f"{100.0 * found['false_alarm_rate']:.2g} % of campaigns."
+    ]
+
+
+def ceiling(given: Document) -> Ceiling:
+    """A kind's share, as the document has it."""
+    return Ceiling(given["kind"], given["closed"], given["std"], given["held_out"])
+
+
+def rest_line(document: Document) -> str:
+    """What remains, as the document says it; empty for a document without it."""
+    return str((document["rest"] or {"words": ""})["words"])
+
+
+def closable_line(document: Document) -> str:
+    """What could be closed, in a line; empty where there is no gap, or it was not found."""
+    if found := document.get("closable"):
+        return f"What could be closed: {found['words']}"
+    rest = document.get("rest")
+    if not rest or not document["causes"]:
+        return ""
+    if not rest["significant"]:
+        return f"What could be closed: nothing beyond chance (p = {rest['p_value']:.2g})."
+    if any(kind.random for kind in known_effects() if kind.name in document["causes"]):
+        return "What could be closed is not stated: beside a random moment any law would close something."
+    return ""

@@ -1,0 +1,188 @@
+"""The answer in a few words, and in one paragraph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from diagnosis.settings import settings_of
+from diagnosis.words.names import CHANNELS, MISFITS, Document, plain
+from diagnosis.words.numbers import (
+    misfit_of,
+    of_swing,
+    probability,
+    rms_shown,
+    rounded_up,
+    share,
+    times_noise,
+)
+from identification.printing import COEFFICIENTS, with_std
+from tunnel_sim.effects import effect_class, known_effects
+
+_UNKNOWN = ["unknown"]
+
+
+def headline(document: Document) -> tuple[str, str]:
+    """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
+    causes = document["causes"]
+    if not causes:
+        return "No gap", "none"
+    if not document.get("decided", True):
+        effects, channels = document["common"]["effects"], document["common"]["channels"]
+        known = plain(*effects) if effects else " and ".join(f"the {name}" for name in channels)
+        return f"Undecided: {known}, and more" if known else "Undecided", "open"
+    if causes == _UNKNOWN:
+        return "Unexplained gap", "unknown"
+    names = plain(*causes)
+    if document["ambiguous_with"]:
+        return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
+    if (document.get("rest") or {}).get("material"):
+        return f"{names}, in part", "open"
+    return names, "found"
+
+
+def verdict(document: Document, rest: str) -> str:
+    """The answer in one paragraph.
+
+    Args:
+        rest: what remains, in sentences.
+    """
+    found = document["found"]
+    if cycling := found["limit_cycles"]:
+        said = ". ".join(f"{remark['runs'][0]}: {remark['what']}" for remark in cycling)
+        return f"No run is a free decay, so no cause is named. {said}."
+    parts = [
+        *map(_second_mode, found["second_modes"]),
+        _answer(document, rest),
+        _choices(found["choices"]),
+        _springs_off(found["springs_off"]),
+    ]
+    return " ".join(filter(None, parts))
+
+
+def _answer(document: Document, rest: str) -> str:
+    """The gap, its causes, and how far it closes with them."""
+    causes, gap, found = document["causes"], document["gap"], document["found"]
+    excess = gap["excess_before"]
+    if not causes:
+        return (
+            f"No gap: the nominal model explains the runs down to their noise "
+            f"(mean squared residual over noise variance, minus one: {excess:+.3f})."
+        )
+    size, misfit = times_noise(excess), misfit_of(document)
+    if misfit is not None:
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}, {size}"
+    closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
+    if not document["decided"]:
+        said = f"There is a gap ({size}), and its cause is undecided."
+        with_first = "" if causes == _UNKNOWN else f"With the first of them added, {closes}"
+        return " ".join(filter(None, (said, undecided_words(document), with_first)))
+    if causes == _UNKNOWN:
+        nearly = "" if found["nearly"] is None else _nearly(found["nearly"])
+        said = "no effect is named as its cause" if nearly else "no effect of the vocabulary explains it"
+        return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest)))
+    several, sources = len(causes) > 1, []
+    for name in causes:  # what each acts on and, where the campaign can show it, whether it needs the wind
+        kind = effect_class(name)
+        wind = f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
+        wind = wind if found["both_winds"] else ""
+        sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if several else ''}")
+    return (
+        f"The gap ({size}) comes {'only in part ' if document['rest']['material'] else ''}"
+        f"from {plain(*causes)} (probability {probability(document['credible'][0]['probability'])}): "
+        f"{'; '.join(sources)}. With {'them' if several else 'it'} added, {closes} "
+        f"{' '.join(filter(None, (rest, _immaterial(found['immaterial']))))}"
+    )
+
+
+def undecided_words(document: Document) -> str:
+    """What an undecided diagnosis does say, in sentences."""
+    common, credible = document["common"], document["credible"]
+    most_named = settings_of(document).words.answers_named
+    channels = {kind.name: kind.channel for kind in known_effects()}
+    named = {channels[name] for name in common["effects"]}
+    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in common["effects"].items()]
+    for name, value in common["channels"].items():
+        if name not in named:
+            parts.append(f"act on the {name} ({probability(value)})")
+    said = f"The likely answers {' and '.join(parts or ['have no effect and no channel in common'])}."
+    answers = []
+    for one in credible[:most_named]:
+        effect = one["effect"]
+        words = "no effect of the vocabulary" if effect == "unknown" else plain(*effect.split(" + "))
+        answers.append(f"{words} ({probability(one['probability'])})")
+    if len(credible) > most_named:
+        answers.append(f"{len(credible) - most_named} more")
+    most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
+    together = probability(sum(one["probability"] for one in credible))
+    if document["unpredictive"]:
+        best = plain(*document["unpredictive"].split(" + ")).capitalize()
+        said += f" {best} fits best, but does not predict readings held out of the fit."
+    return f"{said} The answer is one of these, with probability {together} together: {most}."
+
+
+def _nearly(found: Mapping[str, Any]) -> str:
+    """The effects that explain most of a gap without being named, and why they are not."""
+    said = f"{plain(*found['effects']).capitalize()} would explain {share(found['closes'])} of it"
+    if found["noisy"]:
+        return f"{said}, but the noise misbehaves and may be all of a gap as small as this."
+    said = f"{said} (probability {probability(found['probability'])})"
+    if found["rival"]:
+        return f"{said}, and {plain(*found['rival'])} as much ({probability(found['rival_probability'])})."
+    if found["misfit"]:
+        left = " and ".join(MISFITS[name] for name in found["misfit"])
+        return f"{said}, but leaves a significant misfit of {left}."
+    return f"{said}: too little to name it."
+
+
+def _immaterial(changes: Mapping[str, float]) -> str:
+    """That the causes change no coefficient materially; empty where they do."""
+    if not changes:
+        return ""
+    said = (
+        f"{COEFFICIENTS.get(name, name)} by less than {rounded_up(100.0 * change)} %"
+        for name, change in changes.items()
+    )
+    return f"The gap is immaterial: its causes change {' and '.join(said)}."
+
+
+def _second_mode(found: Mapping[str, Any]) -> str:
+    """A second mode in a run."""
+    main, second = (
+        f"{mode['amplitude_rad']:.2g} rad at {mode['frequency_hz']:.3g} Hz, which decays at "
+        f"{mode['decay_per_s']:.2g} 1/s"
+        for mode in (found["main"], found["second"])
+    )
+    return (
+        f"{found['run']} contains a second mode: {second}, beside {main}. With it, what one free decay leaves "
+        f"falls by {100.0 * found['closes']:.0f} %. A rig with one degree of freedom has one "
+        f"mode: look for another motion, such as heave or the mount's."
+    )
+
+
+def _choices(found: list[Mapping[str, Any]]) -> str:
+    """Which of the springs may be off, where the runs cannot tell; empty where they can."""
+    if not found:
+        return ""
+    springs = (f"{_spring_error(one)} ({probability(one['probability'])})" for one in found)
+    return (
+        f"These runs cannot tell which spring is off: {' or '.join(springs)}. The coefficients are averaged over "
+        "these choices: add runs with a third spring, or measure the stiffness of the springs again."
+    )
+
+
+def _springs_off(found: Mapping[str, Any] | None) -> str:
+    """Springs that would explain the gap together; empty where none do."""
+    if found is None:
+        return ""
+    beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
+    return (
+        f"Two springs that are not as stiff as stated would explain the gap{beside}, such as "
+        f"{' and '.join(map(_spring_error, found['springs']))}: measure their stiffness again."
+    )
+
+
+def _spring_error(found: Mapping[str, Any]) -> str:
+    """A spring and its error, such as ``16.12 N m/rad by −1.96 ± 0.01 %``."""
+    error, std = 100.0 * found["error"], 100.0 * found["std"]
+    return f"{found['stiffness']:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, std)} %"

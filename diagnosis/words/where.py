@@ -1,0 +1,144 @@
+"""Where a gap is, in sentences, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import degrees
+from typing import Any
+
+from diagnosis.settings import WordsSettings, settings_of
+from diagnosis.words.names import BANDS, CONDITIONS, PLACES, Document, plain
+from diagnosis.words.numbers import part
+from identification.printing import p_text
+from tunnel_sim.effects import effect_class
+
+_WIND = "whether it needs wind cannot be determined"
+
+
+def _alone(given: Mapping[str, Any]) -> str:
+    """The wind-off runs as a subject with its verb."""
+    one = given["runs"] == 1
+    count = "the wind-off run" if one else f"the {given['runs']} wind-off runs"
+    return f"{count}, fitted alone, show{'s' * one}"
+
+
+REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
+    "wind off": "it is there with the wind off",
+    "wind on in every run": f"{_WIND}, since the wind is on in every run",
+    "no single run": f"{_WIND}, since no single run shows it",
+    "one run": f"{_WIND} from one run alone ({{run}})",
+    "wind-off runs not fitted": f"{_WIND}, since the wind-off runs could not be fitted alone",
+    "wind-off runs show it": lambda given: f"{_alone(given)} it too",
+    "wind-off runs show none": lambda given: f"{_alone(given)} no gap",
+    "blow": "most of the missing moment acts between {from_s:.1f} and {to_s:.1f} s",
+    "spectral line": "it is a spectral line near {frequency_hz:.3g} Hz",
+    "too fast": "most of it is faster than the rig can move",
+    "shifted centre and harmonic": "the centre shifts together with the second harmonic of the motion",
+    "shifted centre with wind": "most of it is a slow shift of the centre that needs wind",
+    "shifted centre": "most of it is a slow shift of the centre",
+    "harmonics": "it contains harmonics of the motion, without a shift of frequency or damping",
+    "every run driven": "every run is driven, so that no decay shows it",
+    "frequency along the decay": "the frequency shifts along the decay more than the damping does",
+    "damping along the decay": "the damping shifts along the decay more than the frequency does",
+    "both along the decay": "the frequency and the damping shift by similar amounts along the decay",
+    "frequency between runs": "each run alone is linear, but the runs' frequencies do not agree with one model: a "
+    "stated value is wrong, or a stiffness is missing",
+    "damping between runs": "each run alone is linear, but the runs' damping does not agree with one model",
+}
+"""Why a gap is said to act on a channel, or to need wind: clauses by the kind of the reason."""
+
+
+def reason(given: Mapping[str, Any]) -> str:
+    """The clause of a reason, a fact of the document."""
+    said = REASONS[given["kind"]]
+    return said.format(**given) if isinstance(said, str) else said(given)
+
+
+def where_words(document: Document) -> str:
+    """Where the gap is, in sentences; empty where the document has no place."""
+    found = document["found"]
+    if found["nowhere"]:
+        return _nowhere(found["nowhere"])
+    if not found["place"]:
+        return ""
+    where, place = document["where"], found["place"]
+    settings = settings_of(document)
+    parts = [f"{_which_runs(where, place, settings.words)}."]
+    if places := _places(where, place):
+        most = part(settings.where.interval_share).capitalize()
+        parts.append(f"{most} of it lie {', '.join(places)}.")
+    if place["bands"]:
+        listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in place["bands"].items())
+        parts.append(f"By frequency: {', '.join(listed)}.")
+    channel, condition = reason(place["channel"]), reason(place["condition"])
+    words = PLACES.get(where["channel"] or "")
+    acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
+    if where["condition"] is None:
+        parts.append(f"{acts}: {channel}; {condition}.")
+    else:
+        parts.append(f"{acts}: {channel}.")
+        if place["wind"]:  # without runs of both winds the condition goes unsaid
+            parts.append(f"It is there {CONDITIONS[where['condition']]}: {condition}.")
+    return " ".join(filter(None, (*parts, _agreement(where, place))))
+
+
+def _nowhere(found: Mapping[str, Any]) -> str:
+    """The sentence for a campaign without a gap."""
+    count = found["runs"]
+    runs = f"Nowhere: in {count} {'run' if count == 1 else 'runs'} the residual is"
+    chance = f"p {p_text(found['p_value'])} for the run that differs most, corrected for their number"
+    if found["within_step"]:
+        return f"{runs} not white noise ({chance}), but within the steps of the readings."
+    return f"{runs} consistent with the noise ({chance})."
+
+
+def _which_runs(where: Mapping[str, Any], place: Mapping[str, Any], chosen: WordsSettings) -> str:
+    """Which runs show the gap, and how much more of it is with the wind on or off."""
+    runs, count = where["runs"], place["runs"]
+    share = f"{100.0 * place['share']:.0f} % of the gap"
+    named = f" ({', '.join(runs)})" if len(runs) <= chosen.runs_listed else ""
+    if not runs:
+        text = (
+            f"No single run is beyond chance (false-alarm rate {100.0 * place['false_alarm_rate']:.0f} % over all "
+            "runs); the gap shows only in all of them together"
+        )
+    elif len(runs) == count:
+        text = f"All {count} runs show the gap" if count > 1 else "The run shows the gap"
+    elif len(runs) == 1:
+        text = f"{share} is in one run of {count}{named}"
+    else:
+        text = f"{share} is in {len(runs)} of {count} runs{named}"
+    wind = place["wind"]
+    if runs and len(wind) == 2:
+        more, less = sorted(("on", "off"), key=lambda state: -wind[state])
+        if wind[less] < chosen.one_wind * wind[more]:
+            text += f"; nearly all of it with the wind {more}"
+        else:
+            ratio = wind[more] / wind[less]
+            text += f"; {ratio:.2g} times as much power with the wind {more} as with it {less}"
+    return text
+
+
+def _places(where: Mapping[str, Any], place: Mapping[str, Any]) -> list[str]:
+    """The intervals that locate the gap."""
+    found = {name: where[name] for name in place["narrow"]}
+    places = []
+    if "time_s" in found:
+        places.append("between {:.1f} and {:.1f} s of the record".format(*found["time_s"]))
+    if "amplitude_rad" in found:
+        places.append("at amplitudes from {:.2g}° to {:.2g}°".format(*map(degrees, found["amplitude_rad"])))
+    if "frequency_hz" in found:
+        places.append("at {:.2f} to {:.2f} Hz".format(*found["frequency_hz"]))
+    return places
+
+
+def _agreement(where: Mapping[str, Any], place: Mapping[str, Any]) -> str:
+    """Whether causes act where the residuals say that the gap is; empty where there is nothing to compare."""
+    if not place["compared"] or where["channel"] is None:
+        return ""
+    names = plain(*place["compared"])
+    if place["agrees"]:
+        return f"That agrees with {names}."
+    kinds = [effect_class(name) for name in place["compared"]]
+    acts = " and ".join(dict.fromkeys(PLACES[kind.channel] for kind in kinds))
+    return f"That does not agree with {names}: {'they act' if len(kinds) > 1 else 'it acts'} on {acts}."
