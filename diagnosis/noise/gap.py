@@ -196,21 +196,17 @@ class _Candidate:
     def believed(self, test: GapTest) -> bool:
         """Whether it is noise rather than a gap.
 
-        Args:
-            test: of the whitened fit.
-
-        Returns:
-            Where whitening does not close the gap, if runs with the wind off have the colour, and if it shows above
-            the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. Nor
-            may there be more noise than is stated. Where it closes the gap, if this is not that of a wandering
-            zero, of an error that every run repeats or of an oscillation that the input excites.
+        Where the whitened fit still has a gap, the colour must be that of runs with the wind off, and show above
+        the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. Nor may
+        there be more noise than is stated. Where no gap is left, it must not be the spectrum of a wandering zero,
+        of an error that every run repeats or of an oscillation that the input excites.
         """
         chosen = self.nominal.settings
         if test.detected:
             still = any(not run.wind_on for run in self.nominal.problem.data.runs)
             excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, chosen.gap)
-            above = chosen.noise.colour_beyond
-            return still and not excessive and noise_colour(self.source, beyond=above) is not None
+            beyond = chosen.noise.colour_beyond
+            return still and not excessive and noise_colour(self.source, beyond=beyond) is not None
         repeats = alike_in_all_runs(self.nominal) or _follows_input(self.fit)
         return not repeats and not zero_wanders(self.nominal, self.noise.spectrum)
 
