@@ -16,6 +16,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import NoiseWithMoment
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin
@@ -104,9 +105,8 @@ def by_moment(fit: Fit) -> Data:
             variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
             cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
             if cost < least:
-                noise = run.noise_variance * variance
-                likeliest = dataclasses.replace(run, innovations=(shape, average), noise_variance=noise)
-                least = cost
+                noise = NoiseWithMoment(run.noise.variance * variance, run.noise, shape, average)
+                likeliest, least = dataclasses.replace(run, noise=noise), cost
         runs.append(likeliest)
     return fit.problem.data.with_runs(tuple(runs))
 
@@ -179,7 +179,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> Line | None
         omega = 2.0 * np.pi * frequency
         forced = data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping)
         forced = complex(forced * (1j * omega) ** run.derivative)  # reading per unit moment coefficient
-        gain = forced / np.sqrt(run.noise_variance) * run.response(frequency)
+        gain = forced / run.noise.scale * run.response(frequency)
         value = complex(spectra[i].at(frequency))
         phases[i] = float(np.angle(value / gain)) + np.pi / 2
         amplitudes.append((abs(value) / abs(gain), abs(gain) ** 2))

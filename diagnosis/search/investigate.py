@@ -21,10 +21,11 @@ from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similar import similar_campaign
-from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
+from diagnosis.noise.gap import GapTest, gap_or_colour
+from diagnosis.noise.kinds import Noise
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
+from diagnosis.noise.rounding import Rounding
 from diagnosis.noise.sensor_noise import (
-    Noise,
     NoiseTrend,
     campaign_noise,
     noise_trend,
@@ -170,7 +171,7 @@ def located(study: Study) -> Place:
     if study.place is not None:
         return study.place
     stated = study.noise.stated_variance if study.coarse else None
-    level = float(np.mean([run.noise_variance * run.block for run in study.nominal.problem.data.runs]))
+    level = float(np.mean([run.noise.variance * run.block for run in study.nominal.problem.data.runs]))
     return locate(
         study.campaign,
         study.nominal,
@@ -461,19 +462,14 @@ def _weighed(found: Study, base: Fit) -> list[Weighed]:
     own = np.zeros(len(CHANNELS))
     if found.hum is not None:
         own += weighing.hum_left * found.hum.excess * base.count * _IN_HARMONICS
-    errors = None
     if found.coarse:
         levels, stated = reading_levels(found.campaign), found.campaign.sensor.noise_std
         white = found.noise.white(typical_step(levels))
         # a coarse step hides the noise, so that what is stated of it is the better guess
         white = dict.fromkeys(white, stated) if stated else white
-        errors = rounding_errors(base, white, found.step, levels)
-    if errors is not None:
-        tries = [
-            misfit(base, [run.scaled(e[k]) for run, e in zip(base.problem.data.runs, errors, strict=True)])
-            for k in range(len(errors[0]))
-        ]
-        own += np.maximum(np.mean([one.excess for one in tries], axis=0), 0.0)
+        rounding = Rounding.of(base, white, found.step, levels)
+        tries = [misfit(base, residuals).excess for residuals in rounding.residuals(base.problem.data)]
+        own += np.maximum(np.mean(tries, axis=0), 0.0) if tries else 0.0
     sets = [h.fitted_set(base) for h in found.hypotheses]
     sets += [h.fitted_set(base, outside=True) for h in found.outside]
     sets += [answer.left for answer in found.random]
