@@ -200,7 +200,7 @@ class SysidFit:
         chain = self.problem.chain(common, own, run)
         angle = chain.angle(predicted.data[:, 0], predicted.times)
         reading = chain.reading(angle + common[self.problem.names.index("zero")])
-        left = (record.data[:, 0] - reading) / np.sqrt(run.noise_variance)
+        left = (record.data[:, 0] - reading) / run.noise.scale
         return left[:, None], predicted, record
 
     def optimise(self) -> tuple[float, float]:

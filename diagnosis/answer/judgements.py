@@ -12,8 +12,8 @@ from diagnosis.facts.checks import Confirmation
 from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError
 from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.residuals import CHANNELS, misfit
-from diagnosis.noise.gap import gap_test, rounding_errors
-from diagnosis.noise.sensor_noise import Noise
+from diagnosis.noise.gap import gap_test
+from diagnosis.noise.kinds import Noise
 from diagnosis.result import Hidden, ParameterEstimate, RunGap
 from diagnosis.search.rivals.two_springs import ONE_SPRING, spring_error
 from diagnosis.search.study import Study
@@ -43,14 +43,7 @@ def cautions(
     found, chosen = [], settings.words
     if len(campaign.runs) > 1 and all(run.spring_stiffness is None for run in campaign.runs):
         found.append(Fact("one spring assumed"))
-    std = noise.estimated**0.5
-    ratio = std / noise.stated_variance**0.5 if noise.stated_variance else 1.0
-    if noise.source == "floor":
-        found.append(Fact("floor", {"records_rad": std, "fits_rad": noise.used**0.5}))
-    elif ratio <= 1.0 / chosen.noise_contradicted:
-        found.append(Fact("less noise than stated", {"ratio": ratio}))
-    elif ratio >= chosen.noise_contradicted:
-        found.append(Fact("more noise than stated", {"ratio": ratio}))
+    found += noise.cautions(chosen.noise_contradicted)
     if confirmation.failure:
         found.append(Fact("not followed", {"failure": confirmation.failure}))
     elif not confirmation.agrees:
@@ -165,12 +158,8 @@ def remainder(
     elif study.chosen is study.nominal:
         p_value = study.gap.test.p_value
     else:  # no cause changes the tests of the noise itself: those of the residuals count
-        errors = rounding_errors(
-            study.chosen, study.prepared.noise.white(study.prepared.step), study.prepared.step
-        )
-        p_value = gap_test(
-            study.chosen, study.prepared.noise, study.prepared.trend, coarse_step=True, errors=errors
-        ).p_value
+        noise = study.prepared.noise.rounded(study.chosen, study.prepared.step)
+        p_value = gap_test(study.chosen, noise, study.prepared.trend, coarse_step=True).p_value
     further = max(hidden, key=lambda one: one.significance, default=None) if study.named else None
     by_effect = 1.0 if further is None else min(1.0, len(hidden) * float(chdtrc(1, further.significance**2)))
     shown = further is not None and by_effect < chosen.remains_rate <= p_value

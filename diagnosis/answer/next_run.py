@@ -90,7 +90,7 @@ def separation(first: Fit, second: Fit, run: RunData, angle: float) -> float | N
     one, other = _predict(first, run, angle), _predict(second, run, angle)
     if one is None or other is None:
         return None
-    return min(_missed(one, other), _missed(other, one)) / float(np.sqrt(run.noise_variance))
+    return min(_missed(one, other), _missed(other, one)) / run.noise.scale
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,7 @@ class PlaceFound:
         false_alarm_rate: at which a run is said to show a gap falsely, all runs together, a fraction.
         wind: excess by state of the wind, ``on`` and ``off``, a ratio; empty without runs of both.
         narrow: the intervals that locate the gap: ``time_s``, ``amplitude_rad``, ``frequency_hz``.
-        bands: share of the gap by band beyond chance, the largest first, fractions.
+        bands: share of the gap by band beyond chance, fractions.
         channel: the reason for the channel.
         condition: the reason for the condition.
         compared: causes whose channels are compared with the place.

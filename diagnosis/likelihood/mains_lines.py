@@ -346,7 +346,7 @@ def _sines(runs: list[_Pieces], spectra: list[ResidualSpectrum], frequency: floa
         value = complex(spectrum.at(abs(shown)))
         value = value if shown >= 0.0 else value.conjugate()
         gain = block_gain(frequency, run) * complex(run.response(frequency))
-        found.append(value * np.sqrt(run.noise_variance) / gain)
+        found.append(value * run.noise.scale / gain)
     return np.array(found)
 
 

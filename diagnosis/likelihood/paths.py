@@ -112,8 +112,8 @@ class Path:
         from scipy.signal import lfilter  # only here: slow to load
 
         run = self.run
-        if run.samples is None and run.taps.size == 1:  # white noise: the rows are filtered
-            rows = self.rows(moment) / np.sqrt(run.noise_variance)
+        if run.plain:  # fewer values to filter
+            rows = self.rows(moment) / run.noise.scale
             return np.asarray(lfilter(*self._filter(self.group * run.interval), rows, axis=0))
         return self.seen(lfilter(*self._filter(run.interval), moment, axis=0))
 
@@ -124,12 +124,7 @@ class Path:
 
     def seen(self, reading: Array) -> Array:
         """A change of the reading, in its unit, shape (n, k), as `rows`."""
-        run = self.run
-        if run.samples is None:
-            return self.rows(run.white(reading) / np.sqrt(run.noise_variance))
-        count = run.samples.count[:, None]
-        white = run.white(np.where(count > 0, reading, 0.0))
-        return self.rows(white * np.sqrt(count / (run.block * run.noise_variance)))
+        return self.rows(self.run.scaled(reading))
 
     def rows(self, white: Array) -> Array:
         """White residuals, shape (n, k) or (n,), averaged in whole groups to rows of the same noise."""

@@ -9,7 +9,6 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.mains_lines import mains_line
 from diagnosis.likelihood.residuals import Line, linear_coefficients, resonance, wind_line
-from diagnosis.likelihood.whitening import correlate
 from tunnel_sim.effects.base import MULTIPLES, NEAR_MOTION, REFERENCE_RELEASE
 from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.vocabulary.record import Array
@@ -92,7 +91,7 @@ def ringing(fit: Fit) -> Sought | None:
             index = np.round(grid * size * run.interval).astype(int)
             power = float(decay @ decay)
             amplitude = 2.0 * np.conj(transform[index]) / power
-            amplitudes.append(amplitude * np.sqrt(run.noise_variance) / run.response(grid))
+            amplitudes.append(amplitude * run.noise.scale / run.response(grid))
             by_run.append(0.5 * np.abs(amplitude) ** 2 * power)
         tried.append((rate, np.array(amplitudes)))
         drops.append(np.where(free, np.sum(np.array(by_run) * beside, axis=0), 0.0))
@@ -127,7 +126,7 @@ def excited(fit: Fit) -> Sought | None:
         # of the mode per rad of its amplitude, as far below its frequency
         static = run.input_means * stated.drive.scale / (REFERENCE_RELEASE * stated.spring_stiffness)
         seen = np.fft.rfft(static, size) * (1j * omega) ** run.derivative
-        seen *= run.response(omega / (2.0 * np.pi)) / np.sqrt(run.noise_variance)
+        seen *= run.response(omega / (2.0 * np.pi)) / run.noise.scale
         parts.append((omega, seen, np.fft.rfft(fit.residuals[number], size), 2.0 / size))
         own.append(2.0 * np.pi * resonance(fit, number))
     if not parts:
@@ -214,8 +213,7 @@ class _Skipping:
         self.run = run
         self.basis = np.linalg.qr(np.column_stack(fit.jacobian[number]))[0]
         rate = np.gradient(run.reading - run.unscaled(residual), run.interval)
-        filled = 1.0 if run.samples is None else np.sqrt(run.samples.count / run.block)
-        scale = filled / np.sqrt(run.noise_variance) * np.ones(rate.size)
+        scale = np.sqrt(run.counts / run.block) / run.noise.scale
         # a at the skip, b after it, z; not whitened
         self.terms: list[tuple[np.ndarray, np.ndarray, complex]] = [(np.ones(rate.size), rate, 1.0)]
         if with_input and run.drive is not None:
@@ -228,7 +226,7 @@ class _Skipping:
             ]
         self.scale = np.asarray(scale, np.float64)
         self.left = self._unabsorbed(residual)
-        power = self._powers() - np.sum(self._seen(correlate(self.basis, run.taps)) ** 2, axis=1)
+        power = self._powers() - np.sum(self._seen(run.noise.transposed(self.basis)) ** 2, axis=1)
         self.weight = np.maximum(power, 1e-9 * float(np.sum((self.scale * rate) ** 2)))
 
     def steps(self, count: int, found: list[_Skip] | None = None, time: float | None = None) -> list[_Skip]:
@@ -245,7 +243,7 @@ class _Skipping:
             for place in range(count):
                 others = found[:place] + found[place + 1 :]
                 change = self._change([(step, step.time if time is None else time) for step in others])
-                seen = self._seen(correlate(self.left - change, self.run.taps))[inside]
+                seen = self._seen(self.run.noise.transposed(self.left - change))[inside]
                 own = seen / weight
                 lost = np.maximum(own, 0.0) if time is None else time
                 best = int(np.argmax(lost * (2.0 * seen - lost * weight)))
@@ -282,12 +280,11 @@ class _Skipping:
         """Powers of what a second lost at every block adds."""
         if len(self.terms) == 1:
             # the sum from any value to the last is the power of the whitened slope from there on
-            slope = self.terms[0][1] * self.scale
-            lags = np.correlate(self.run.taps, self.run.taps, "full")[self.run.taps.size - 1 :]
-            return _after(slope * (2.0 * correlate(slope, lags) - lags[0] * slope)).real
+            return self.run.noise.powers_onward(np.real(self.terms[0][1] * self.scale))
         size = self.left.size
-        free = [z ** np.arange(size) / np.sqrt(self.run.noise_variance) for _, _, z in self.terms]
-        whitened = [self.run.white(one.real) + 1j * self.run.white(one.imag) for one in free]
+        white = self.run.noise.white
+        free = [z ** np.arange(size) / self.run.noise.scale for _, _, z in self.terms]
+        whitened = [white(np.real(one)) + 1j * white(np.imag(one)) for one in free]
         power = np.zeros(size)
         for (a, _, _), one in zip(self.terms, whitened, strict=True):
             for (other_a, _, _), other in zip(self.terms, whitened, strict=True):

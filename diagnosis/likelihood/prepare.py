@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnosis.likelihood.nondimensional import AS_MEASURED, Similarity
 from diagnosis.likelihood.run_data import Data, RunData, Samples
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.settings import Settings
@@ -59,7 +60,7 @@ def prepare(
             reading=reading,
             block=block,
             interval=block * record.sample_interval,
-            noise_variance=noise_variance[run.id] / block,
+            noise=WhiteNoise(noise_variance[run.id] / block),
             spring_stiffness=run.spring_stiffness,
             wind_speed=run.wind_speed,
             air_density=(run.air_density or 0.0) if dense else 1.0,
@@ -131,7 +132,7 @@ def without_long_rest(data: Data) -> tuple[Data, tuple[str, ...]]:
         the ids of these runs.
     """
     chosen = data.settings.selection
-    ends = [_moves_until(run, chosen.rest_stds * float(np.sqrt(run.noise_variance))) for run in data.runs]
+    ends = [_moves_until(run, chosen.rest_stds * run.noise.scale) for run in data.runs]
     least = 1.0 - chosen.long_rest
     rests = [end < least * run.reading.size for run, end in zip(data.runs, ends, strict=True)]
     each = list(zip(data.runs, ends, rests, strict=True))

@@ -144,7 +144,7 @@ def wind_line(fit: Fit, least: float, greatest: float, size: str) -> Line | None
         omega = 2.0 * np.pi * frequency
         forced = data.air_moment(run) / (stiffness - inertia * omega**2 + 1j * omega * damping)
         forced = complex(forced * (1j * omega) ** run.derivative)  # reading per unit moment coefficient
-        gain = forced / np.sqrt(run.noise_variance) * run.response(frequency)
+        gain = forced / run.noise.scale * run.response(frequency)
         value = complex(spectra[i].at(frequency))
         phases[i] = float(np.angle(value / gain)) + np.pi / 2
         amplitudes.append((abs(value) / abs(gain), abs(gain) ** 2))

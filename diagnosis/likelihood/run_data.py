@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
-from diagnosis.likelihood.whitening import WHITE, colour, colouring, response, whiten
+from diagnosis.likelihood.run_noise import RunNoise
 from diagnosis.model.nominal import NominalModel
 from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
@@ -92,13 +92,6 @@ def hermite_basis(u: Array, derivative: int = 0, interval: float = 1.0) -> Array
     return np.array(basis) / interval**derivative
 
 
-def _filtered(fraction: tuple[Array, Array], values: Array) -> Array:
-    """Values, in columns or in one, after a filter of this numerator and denominator."""
-    from scipy.signal import lfilter  # only here: slow to load
-
-    return np.asarray(lfilter(*fraction, values, axis=0), np.float64)
-
-
 @dataclass(frozen=True, eq=False)
 class RunData:
     """One run as the fits see it.
@@ -108,7 +101,7 @@ class RunData:
         reading: block means, rad, shape (n,); interpolated where a block has no sample.
         block: samples per block, on average where they are not evenly spaced.
         interval: between blocks, s.
-        noise_variance: of one block mean of ``block`` samples, rad²; of its innovations where it is coloured.
+        noise: of the mean of ``block`` samples.
         spring_stiffness: stated, N m/rad; None in normalised form.
         wind_speed: stated, m/s.
         air_density: stated, kg/m³; 0 where the wind is off.
@@ -117,9 +110,6 @@ class RunData:
         derivative: which derivative of the angle the reading is: 0, 1 or 2. The units of the reading and its noise
             follow from it.
         samples: where they are, if they are not evenly spaced.
-        whitening: filter that makes the noise of the block means white, its first tap 1, shape (order + 1,).
-        innovations: numerator and denominator of the filter that then makes the response to a random moment white,
-            which begins at rest with the run; None where there is no such moment.
         drive: the moment of a driven run, its times since the start of the record; None of a free decay.
         gain_free: whether the common gain multiplies that moment.
         stretch_of: id of the run that this is a stretch of; None of a whole run.
@@ -129,7 +119,7 @@ class RunData:
     reading: Array
     block: int
     interval: float
-    noise_variance: float
+    noise: RunNoise
     spring_stiffness: float | None
     wind_speed: float
     air_density: float
@@ -137,8 +127,6 @@ class RunData:
     start: float = 0.0
     derivative: int = 0
     samples: Samples | None = None
-    whitening: Array = field(default_factory=lambda: WHITE)
-    innovations: tuple[Array, Array] | None = None
     drive: DriveMoment | None = None
     gain_free: bool = False
     stretch_of: str | None = None
@@ -216,39 +204,24 @@ class RunData:
             np.arange(self.reading.size * self.block) * (self.interval / self.block), np.float64
         )
 
+    @property
+    def plain(self) -> bool:
+        """Whether differences are white residuals after division by one standard deviation."""
+        return self.samples is None and self.noise.plain
+
     def scaled(self, difference: Array) -> Array:
-        """A difference of readings as white residuals, in noise standard deviations.
+        """Differences of readings as white residuals, in noise standard deviations.
 
         Blocks of fewer samples weigh less, and empty ones are 0.
 
         Args:
-            difference: of block means, in the unit of the reading, shape (n,).
+            difference: of block means, in the unit of the reading, shape (n,), or several in columns, shape (n, k).
         """
         if self.samples is None:
-            return np.asarray(self.white(difference) / np.sqrt(self.noise_variance), np.float64)
-        seen = np.where(self.samples.count > 0, difference, 0.0)
-        return self.white(seen) * np.sqrt(self.samples.count / (self.block * self.noise_variance))
-
-    def white(self, values: Array) -> Array:
-        """Block means with white noise, of the values' shape and unit.
-
-        Args:
-            values: of the run, or several in columns, shape (n,) or (n, k), any unit.
-        """
-        found = whiten(values, self.whitening)
-        if self.innovations is None:
-            return found
-        with np.errstate(invalid="ignore"):  # a motion that grew without bound; the caller looks for it
-            return _filtered(self.innovations, found)
-
-    @cached_property
-    def taps(self) -> Array:
-        """Response of `white` to one value well inside the run, dimensionless, shape (m,)."""
-        if self.innovations is None:
-            return self.whitening
-        impulse = np.zeros(self.reading.size)
-        impulse[: self.whitening.size] = self.whitening[: impulse.size]
-        return _filtered(self.innovations, impulse)
+            return np.asarray(self.noise.white(difference) / self.noise.scale, np.float64)
+        count = self.samples.count.reshape(-1, *[1] * (difference.ndim - 1))
+        white = self.noise.white(np.where(count > 0, difference, 0.0))
+        return white * np.sqrt(count / (self.block * self.noise.variance))
 
     def unscaled(self, residual: Array) -> Array:
         """The inverse of `scaled`: differences of block means in the unit of the reading, 0 in empty blocks.
@@ -258,15 +231,17 @@ class RunData:
         """
         if self.samples is not None:
             residual = residual / np.sqrt(np.maximum(self.samples.count, 1) / self.block)
-        innovations = residual * np.sqrt(self.noise_variance)
-        if self.innovations is not None:
-            innovations = _filtered(self.innovations[::-1], innovations)
-        return np.asarray(colour(innovations, self.whitening), np.float64)
+        return np.asarray(self.noise.coloured(residual * self.noise.scale), np.float64)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Samples in each block, shape (n,)."""
+        return np.full(self.reading.size, self.block) if self.samples is None else self.samples.count
 
     @property
     def filled(self) -> int:
         """Number of blocks with samples."""
-        return self.reading.size if self.samples is None else int(np.count_nonzero(self.samples.count))
+        return int(np.count_nonzero(self.counts))
 
     def means(self, values: Array) -> Array:
         """Block means of one value per sample, shape (n,) or (k, n).
@@ -291,12 +266,13 @@ class RunData:
             duration=self.duration - first * self.interval,
             start=self.start + first * self.interval,
             samples=None if self.samples is None else self.samples.part(first, last, self.interval),
+            noise=self.noise.part(first, last),
         )
 
     @property
     def noise_std(self) -> float:
         """Standard deviation of the noise of one block mean, rad."""
-        return float(np.sqrt(self.noise_variance)) * colouring(self.whitening)
+        return self.noise.scale * self.noise.over_white
 
     def noise_at(self, frequency: float | Array) -> Array:
         """Standard deviation of white noise of the same density as the noise at a frequency, rad.
@@ -304,20 +280,15 @@ class RunData:
         Args:
             frequency: Hz, any shape.
         """
-        return np.asarray(np.sqrt(self.noise_variance) / np.abs(self.response(frequency)))
+        return np.asarray(self.noise.scale / np.abs(self.response(frequency)))
 
     def response(self, frequency: float | Array) -> np.ndarray:
-        """The complex factor by which the whitening filters change a sinusoid; 1 where the noise is white.
+        """The complex factor by which whitening changes a sinusoid; 1 where the noise is white.
 
         Args:
             frequency: Hz, any shape.
         """
-        cycles = np.asarray(frequency) * self.interval
-        found = response(self.whitening, cycles)
-        if self.innovations is None:
-            return found
-        numerator, denominator = self.innovations
-        return np.asarray(found * response(numerator, cycles) / response(denominator, cycles))
+        return self.noise.response(np.asarray(frequency) * self.interval)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import AutoregressiveNoise, WhiteNoise
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough
@@ -175,7 +176,7 @@ class _Part:
 
 def _part(values: Array, motion: Array, run: RunData, own: float) -> _Part:
     window = np.hanning(values.size)
-    scale = run.noise_variance * float(window @ window)
+    scale = run.noise.variance * float(window @ window)
     power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 / scale
     frequency = np.fft.rfftfreq(values.size, run.interval)
     order = frequency / own
@@ -218,7 +219,10 @@ def whitened(data: Data, colour: Colour) -> Data:
     runs = []
     for run in data.runs:
         whitening, variance = filters[run.interval]
-        runs.append(replace(run, whitening=whitening, noise_variance=run.noise_variance * variance))
+        variance *= run.noise.variance
+        coloured = whitening.size > 1
+        noise = AutoregressiveNoise(variance, whitening) if coloured else WhiteNoise(variance)
+        runs.append(replace(run, noise=noise))
     return data.with_runs(tuple(runs))
 
 

@@ -1,14 +1,12 @@
-"""Is there a gap? Tests of the residuals by frequency band and of the noise; and the error of rounded readings."""
+"""Is there a gap? Tests of the residuals and of the noise, and the choice between a gap and coloured noise."""
 
 from __future__ import annotations
 
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis.facts.found import Fact, Noted
@@ -16,91 +14,16 @@ from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, starting_points
+from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import alike_in_all_runs, noise_colour, whitened, zero_wanders
-from diagnosis.noise.sensor_noise import Noise, NoiseTrend, trend_statistics
+from diagnosis.noise.kinds import Coloured, Noise
+from diagnosis.noise.rounding import repeated, repetitions, samples
+from diagnosis.noise.sensor_noise import NoiseTrend, trend_statistics
 from diagnosis.settings import GapSettings
 from tunnel_sim.effects import the_effect
-from tunnel_sim.vocabulary.record import Array
 
-#: Noise of this many steps makes the rounding error independent of the motion to within a ten-thousandth: the first
-#: harmonic of the error falls with exp(−4π²σ²/q²) (B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 11).
-_BLURS = 0.5
-_MOST_ROUNDINGS, _FEWEST_ROUNDINGS, _SAMPLES = 16, 4, 2.5e6
-
-
-def samples(fit: Fit) -> int:
-    """Number of samples in all runs of a fit."""
-    return sum(run.reading.size * run.block for run in fit.problem.data.runs)
-
-
-def repeated(
-    fit: Fit, white: Mapping[str, float], step: float, count: int, levels: Array | None = None
-) -> Iterator[tuple[RunData, Array, Array]]:
-    """Read the fitted motion again, with white noise and a lattice of unknown origin.
-
-    Args:
-        white: standard deviation of a sample's noise before rounding, rad, by run id.
-        step: of the lattice, rad; 0 where there is none.
-        count: of the repetitions.
-        levels: readings that occur where steps are of unequal width, increasing, shape (levels,), rad; None: the
-            step is the same everywhere.
-
-    Yields:
-        Every run with the samples of its motion, shape (n,), and of the readings, shape (count, n), rad.
-    """
-    # seeded by the readings, so that one campaign is always compared with the same repetitions
-    rng = np.random.default_rng([zlib.crc32(run.reading.tobytes()) for run in fit.problem.data.runs])
-    for run, residual in zip(fit.problem.data.runs, fit.residuals, strict=True):
-        motion = run.reading - run.unscaled(residual)
-        if run.block > 1 or run.samples is not None:  # samples from block means
-            seen = slice(None) if run.samples is None else run.samples.count > 0
-            motion = np.asarray(CubicSpline(run.times[seen], motion[seen])(run.sample_times), np.float64)
-        reading = motion + white[run.stretch_of or run.id] * rng.standard_normal((count, motion.size))
-        if step > 0.0 and levels is None:
-            shift = step * rng.uniform(size=(count, 1))
-            # back to the angle: the origin belongs to the lattice, not to the motion
-            reading = step * np.round((reading + shift) / step) - shift
-        elif step > 0.0 and levels is not None:
-            reading = levels[np.searchsorted(0.5 * (levels[1:] + levels[:-1]), reading)]
-        yield run, motion, reading
-
-
-def rounding_errors(
-    fit: Fit, white: Mapping[str, float], step: float, levels: Array | None = None
-) -> list[Array] | None:
-    """What noise and rounding alone leave in the block means, arguments as in `repeated`.
-
-    Returns:
-        By run, repetitions of it, shape (repetitions, blocks), rad; None where the noise is large enough to make
-        the rounding error white.
-    """
-    if min(white.values()) > _BLURS * step:
-        return None
-    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST_ROUNDINGS, _MOST_ROUNDINGS))
-    return [run.means(reading - motion) for run, motion, reading in repeated(fit, white, step, count, levels)]
-
-
-def with_rounding(data: Data, errors: Sequence[Array]) -> Data | None:
-    """Data prepared for white noise, with noise of block means that is not below errors of `rounding_errors`.
-
-    It is raised where averaging does not reduce the errors as it reduces white noise, at most to that of one
-    sample. None where none is raised.
-    """
-    raised = [
-        float(np.clip(np.mean(error**2), run.noise_variance, run.noise_variance * run.block))
-        for run, error in zip(data.runs, errors, strict=True)
-    ]
-    if all(run.noise_variance == value for run, value in zip(data.runs, raised, strict=True)):
-        return None
-    runs = [replace(run, noise_variance=value) for run, value in zip(data.runs, raised, strict=True)]
-    return data.with_runs(tuple(runs))
-
-
-#: Repetitions of the campaign, fewer where it is long, never below the least.
-_REPETITIONS, _FEWEST = 32, 16
+_MOST, _FEWEST = 32, 16  # repetitions of the campaign
 #: A step this many times the noise hides its level, since crossed edges look like noise; several are tried.
 _COARSE = 3.0
 _FACTORS = (0.0, 0.5, 1.0, 1.5)
@@ -121,12 +44,12 @@ def trend_p_values(trend: NoiseTrend, fit: Fit, noise: Noise) -> Mapping[str, fl
     factors = _FACTORS if trend.step > _COARSE * min(white.values()) else (1.0,)
     tails = np.log(fit.settings.gap.noise_tails)
     observed = np.array([trend.amplitude_z, trend.rate_z, trend.spread - tails])
-    count = int(np.clip(_SAMPLES / samples(fit), _FEWEST, _REPETITIONS))
+    count = repetitions(fit, _FEWEST, _MOST)
     found = np.zeros(3)
     for factor in factors:
         level = {run: factor * std for run, std in white.items()}
-        repetitions = repeated(fit, level, trend.step, count)
-        seen = trend_statistics((reading, run.sample_times) for run, _, reading in repetitions)
+        again = repeated(fit, level, trend.step, count)
+        seen = trend_statistics((reading, run.sample_times) for run, _, reading in again)
         assert seen is not None  # the campaign was judged
         mean, scatter = seen.mean(axis=0), np.maximum(seen.std(axis=0, ddof=1), 1e-9)
         score = (observed - mean) / (scatter * np.sqrt(1.0 + 1.0 / count))
@@ -150,10 +73,6 @@ def level_p_value(fit: Fit, noise: Noise) -> float:
 _ABOVE = 0.48  # share of the ordinates that the estimate uses, where sampling is slowest
 
 
-Spread = Callable[[Array], float]
-BANDS = ("below", "f0", "2f0", "3f0", "above")
-
-
 @dataclass(frozen=True)
 class GapTest:
     """The tests of a gap.
@@ -174,47 +93,25 @@ class GapTest:
     within_step: bool = False
 
 
-def gap_test(
-    fit: Fit,
-    noise: Noise,
-    trend: NoiseTrend,
-    *,
-    coarse_step: bool,
-    errors: Sequence[Array] | None,
-) -> GapTest:
+def gap_test(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) -> GapTest:
     """Test whether a fit's residuals and the noise are consistent with white noise.
 
     Args:
         coarse_step: whether the reading's step is known to be coarser than stated; the level and trend of the
             noise are then not tested.
-        errors: what noise and rounding leave in the block means, by run, repetitions of it, shape (repetitions,
-            blocks), rad; None where they are white.
 
     Returns:
         The verdict at one rate of false alarms, shared equally among the tests (Bonferroni).
     """
-    level, scatter, chosen = np.ones(6), np.zeros(6), fit.settings.gap
-    if errors is not None:
-        # statistics under noise and rounding, and their scatter beyond that of white noise, as shares of what white
-        # noise of the fit's variance gives: the bands, then the offset
-        found, count = [], np.ones(len(BANDS) + 1)
-        for number in range(len(errors[0])):
-            residuals = [run.scaled(e[number]) for run, e in zip(fit.problem.data.runs, errors, strict=True)]
-            bands = _by_band(fit, residuals)
-            count = np.array([*(max(place.size, 1) for _, place in bands), 0.5 * len(residuals)])
-            found.append([*(float(power.sum()) for power, _ in bands), 0.5 * _offsets(residuals)] / count)
-        level = np.mean(found, axis=0)
-        beyond = np.var(found, axis=0, ddof=1) / np.maximum(level, 1e-100) ** 2 - 1.0 / count
-        level, scatter = np.maximum(level, 1.0), np.sqrt(np.maximum(beyond, 0.0))
+    chosen = fit.settings.gap
+    level, scatter = noise.rounding.expected(fit)
     floor = (1.0 + chosen.noise_tolerance) * noise.margin * level
-    tests = dict(zip(BANDS, band_p_values(fit, floor[:-1], noise.spread, scatter[:-1]), strict=True))
-    tests["offset"] = offset_p_value(fit, floor[-1], noise.spread, scatter[-1])
     noisy: dict[str, float] = {}
-    if not coarse_step and noise.source != "floor":
+    if noise.shown and not coarse_step:
         noisy |= trend_p_values(trend, fit, noise)
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
-    everything = tests | noisy
+    everything = p_values(fit, floor, noise.spread, scatter) | noisy
     limit = chosen.detection_rate / len(everything)
     smallest = min(everything.values())
     return GapTest(
@@ -241,56 +138,101 @@ def gap_or_colour(
         coarse_step: as `gap_test` takes it.
 
     Returns:
-        The fit, the noise and the verdict. The noise of the fit allows for rounding, whose error is not white where
-        the motion is slow and the noise small, and fit and noise are whitened where the noise is coloured. Where
-        whitening does not close the gap, colour is believed only if runs with the wind off have it, and if it shows
-        above the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion.
-        Nor is it believed where there would be more noise than is stated, or where it alone would close the gap of
-        a wandering zero, of an error that every run repeats or of an oscillation that the input excites. Such an
-        oscillation is a narrow line, and colour is sought beside it. Turbulence may hide the colour, which is then
-        sought in the runs with the wind off alone.
-
-        A gap within the error of the readings' lattice is not detected: the levels of a camera or an encoder may be
-        off by half a step, which follows the motion as long as no noise of half a step blurs it (Widrow and
-        Kollár, Quantization Noise, 2008).
+        The fit, the noise and the verdict, with the first colour that is believed, else with the noise as it was
+        found. The noise of the fit allows for rounding, whose error is not white where the motion is slow and the
+        noise small.
     """
-    errors = rounding_errors(nominal, noise.white(step), step)
-    allowed = None if errors is None else with_rounding(nominal.problem.data, errors)
-    if allowed is not None:
+    noise = noise.rounded(nominal, step)
+    allowed = noise.rounding.allowed_in(nominal.problem.data)
+    if allowed is not nominal.problem.data:
         nominal = refit(Problem(allowed), nominal.point)
-    plain = gap_test(nominal, noise, trend, coarse_step=coarse_step, errors=errors)
-    for source in () if misses_motion(nominal) else _colour_sources(nominal):
-        found = noise_colour(source, throughout=source is not nominal)
-        if found is None:
-            continue
-        white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
-        if source is nominal and _follows_input(white):  # what the input excites is in the colour
-            beside = _beside_mode(nominal)
-            found = None if beside is None else noise_colour(beside)
-            if beside is None or found is None:
-                continue
-            source = beside
-            white = refit(Problem(whitened(nominal.problem.data, found)), nominal.point)
-        coloured = noise.coloured(found, nominal.problem.data)
-        test = gap_test(white, coloured, trend, coarse_step=coarse_step, errors=errors)
-        still = any(not run.wind_on for run in nominal.problem.data.runs)
-        excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, nominal.settings.gap)
-        beyond = nominal.settings.noise.colour_beyond
-        believed = still and not excessive and noise_colour(source, beyond=beyond) is not None
-        repeats = alike_in_all_runs(nominal) or _follows_input(white)
-        noise_alone = not zero_wanders(nominal, found) and not repeats
-        if believed if test.detected else noise_alone:
-            return white, coloured, test
+    for candidate in _candidates(nominal, noise):
+        test = gap_test(candidate.fit, candidate.noise, trend, coarse_step=coarse_step)
+        if candidate.believed(test):
+            return candidate.fit, candidate.noise, test
+    test = gap_test(nominal, noise, trend, coarse_step=coarse_step)
+    if test.detected and not coarse_step and _within_step(nominal, noise, step):
+        test = replace(test, detected=False, p_value=1.0, within_step=True)
+    return nominal, noise, test
+
+
+def _within_step(nominal: Fit, noise: Noise, step: float) -> bool:
+    """Whether a gap is no larger than the error of the readings' lattice.
+
+    The levels of a camera or an encoder may be off by half a step, which follows the motion as long as no noise of
+    half a step blurs it (Widrow and Kollár, Quantization Noise, 2008).
+    """
     blurred = max(noise.white(step).values()) >= 0.5 * step
-    power = nominal.excess * max(run.noise_variance for run in nominal.problem.data.runs)
-    if plain.detected and not coarse_step and not blurred and power < step**2 / 12.0:
-        plain = replace(plain, detected=False, p_value=1.0, within_step=True)
-    return nominal, noise, plain
+    power = nominal.excess * max(run.noise.variance for run in nominal.problem.data.runs)
+    return not blurred and power < step**2 / 12.0
 
 
-def _colour_sources(nominal: Fit) -> Iterator[Fit]:
-    """The fits that may show the noise's colour: the nominal one, and that of the runs with the wind off alone."""
-    yield nominal
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A colour of the noise that may be all of a gap.
+
+    Args:
+        nominal: the fit in white noise.
+        source: the fit whose residuals show the colour.
+        fit: the nominal one in noise of that colour.
+        noise: of that colour.
+    """
+
+    nominal: Fit
+    source: Fit
+    fit: Fit
+    noise: Coloured
+
+    @classmethod
+    def of(cls, nominal: Fit, source: Fit, noise: Noise, *, throughout: bool = False) -> _Candidate | None:
+        """The colour in the residuals of a source; None where they are white. Arguments as in `noise_colour`."""
+        found = noise_colour(source, throughout=throughout)
+        if found is None:
+            return None
+        data = nominal.problem.data
+        white = refit(Problem(whitened(data, found)), nominal.point)
+        return cls(nominal, source, white, noise.coloured(found, data))
+
+    def believed(self, test: GapTest) -> bool:
+        """Whether it is noise rather than a gap.
+
+        Where the whitened fit still has a gap, the colour must be that of runs with the wind off, and show above
+        the motion's harmonics: turbulence needs the wind, and a gap raises the spectrum beside the motion. Nor may
+        there be more noise than is stated. Where no gap is left, it must not be the spectrum of a wandering zero,
+        of an error that every run repeats or of an oscillation that the input excites.
+        """
+        chosen = self.nominal.settings
+        if test.detected:
+            still = any(not run.wind_on for run in self.nominal.problem.data.runs)
+            excessive = test.tests.get("noise level", 1.0) < _misbehaves(test.tests, chosen.gap)
+            beyond = chosen.noise.colour_beyond
+            return still and not excessive and noise_colour(self.source, beyond=beyond) is not None
+        repeats = alike_in_all_runs(self.nominal) or _follows_input(self.fit)
+        return not repeats and not zero_wanders(self.nominal, self.noise.spectrum)
+
+
+def _candidates(nominal: Fit, noise: Noise) -> Iterator[_Candidate]:
+    """The colours that the noise may have, none where the nominal model misses the motion.
+
+    The first is that of all runs. What the input excites is a narrow line, and colour is sought beside it.
+    Turbulence may hide the colour, which is then sought in the runs with the wind off alone.
+    """
+    if misses_motion(nominal):
+        return
+    found = _Candidate.of(nominal, nominal, noise)
+    if found is not None and _follows_input(found.fit):
+        beside = _beside_mode(nominal)
+        found = None if beside is None else _Candidate.of(nominal, beside, noise)
+    if found is not None:
+        yield found
+    for still in _in_still_air(nominal):
+        found = _Candidate.of(nominal, still, noise, throughout=True)
+        if found is not None:
+            yield found
+
+
+def _in_still_air(nominal: Fit) -> Iterator[Fit]:
+    """The fit of the runs with the wind off alone, where there are others."""
     data = nominal.problem.data
     still = tuple(run for run in data.runs if not run.wind_on)
     if 0 < len(still) < len(data.runs):
@@ -316,80 +258,6 @@ def _beside_mode(nominal: Fit) -> Fit | None:
     return try_fit(driven[0].problem, driven[0].point) if driven else None
 
 
-def chance(total: float, freedom: float, relative: float) -> float:
-    """Probability that white noise reaches a sum of squares.
-
-    Args:
-        total: sum of squares, in units of the noise variance.
-        freedom: degrees of freedom, a number of coefficients.
-        relative: standard deviation of the noise variance, as a share of it.
-
-    Returns:
-        The upper tail of a χ² variable, widened for the uncertainty of the noise level.
-    """
-    if freedom <= 0.0:
-        return 1.0
-    stretch = 1.0 + 0.5 * freedom * relative**2
-    return float(chdtrc(freedom / stretch, total / stretch))
-
-
-def _known(_frequency: Array) -> float:
-    return 0.0
-
-
-def offset_p_value(fit: Fit, floor: float = 1.0, spread: Spread = _known, scatter: float = 0.0) -> float:
-    """Probability that white noise alone moves the runs' means so far from the common zero.
-
-    It takes arguments as in `band_p_values`, and is 1 where the runs have zeros of their own or nothing holds the
-    body.
-    """
-    if not fit.problem.data.model.shares_zero:
-        return 1.0
-    lowest = np.array([1.0 / max(run.duration for run in fit.problem.data.runs)])
-    relative = float(np.hypot(spread(lowest), scatter))
-    return chance(_offsets(fit.residuals) / floor, len(fit.residuals) - 1.0, relative)
-
-
-def _offsets(residuals: Sequence[Array]) -> float:
-    """Sum of the squared means of the runs' residuals, in their variances under white noise."""
-    return sum(float(np.sum(residual)) ** 2 / residual.size for residual in residuals)
-
-
-def band_p_values(
-    fit: Fit, floor: float | Array = 1.0, spread: Spread = _known, scatter: float | Array = 0.0
-) -> tuple[float, ...]:
-    """Probability that white noise alone gives as much power in each band, summed over the runs, by `BANDS`.
-
-    Args:
-        floor: power assumed for white noise, a factor on the noise variance; one for all bands, or shape (bands,).
-        spread: gives the standard deviation of the noise's mean power over some frequencies (Hz), a share of it.
-        scatter: standard deviation of the floor, a share of it, of its shape.
-    """
-    values = []
-    each = np.broadcast_to(floor, len(BANDS)), np.broadcast_to(scatter, len(BANDS))
-    for (power, place), level, share in zip(_by_band(fit, fit.residuals), *each, strict=True):
-        relative = float(np.hypot(spread(place), share)) if place.size else 0.0
-        # each ordinate is half a χ² of two degrees of freedom
-        values.append(chance(2.0 * float(power.sum()) / level, 2.0 * place.size, relative))
-    return tuple(values)
-
-
-def _by_band(fit: Fit, residuals: Sequence[Array]) -> list[tuple[Array, Array]]:
-    """Power and frequency (Hz) of the periodograms' ordinates, all runs together, by band."""
-    bands, powers, frequencies = [], [], []
-    for index, (run, residual) in enumerate(zip(fit.problem.data.runs, residuals, strict=True)):
-        spectrum = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
-        frequency = np.fft.rfftfreq(residual.size, run.interval)
-        multiple = frequency[1:-1] / max(resonance(fit, index), 1e-9)
-        band = np.clip(np.floor(multiple + 0.5), 0, len(BANDS) - 1).astype(int)
-        bands.append(band)
-        powers.append(spectrum[1:-1])
-        frequencies.append(frequency[1:-1])
-    where, power, place = (np.concatenate(column) for column in (bands, powers, frequencies))
-    # each ordinate is half a χ² of two degrees of freedom
-    return [(power[where == index], place[where == index]) for index in range(len(BANDS))]
-
-
 def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Noted, ...]:
     """What the user should know of the noise.
 
@@ -400,14 +268,6 @@ def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Noted, 
         Where the readings' steps may be all of the gap, where the noise is coloured, and where the sampling is too
         slow to compare it with the motion.
     """
-    found = []
-    if test.within_step:
-        found.append(Fact("within step"))
-    if noise.colour is not None:
-        span = noise.colour.frequency[-1] / noise.colour.frequency[0]
-        ratio = np.exp(np.ptp(noise.colour.level))
-        figures = {"std_rad": noise.std, "power_ratio": float(ratio), "frequency_ratio": float(span)}
-        found.append(Fact("coloured", figures))
-    if not trend.judged:
-        found.append(Fact("not judged"))
-    return tuple(Noted(tuple(noise.variance), one) for one in found)
+    within = (Fact("within step"),) if test.within_step else ()
+    slow = () if trend.judged else (Fact("not judged"),)
+    return tuple(Noted(tuple(noise.variance), one) for one in (*within, *noise.noted(), *slow))

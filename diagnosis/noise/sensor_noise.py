@@ -6,8 +6,8 @@ evenly spaced, since an irregular clock spreads the motion over all frequencies,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import make_lsq_spline
@@ -16,11 +16,10 @@ from scipy.special import gammaincinv, ndtri
 from diagnosis.facts.found import Fact
 from diagnosis.likelihood.nondimensional import frequency
 from diagnosis.likelihood.prepare import BLOCK_INTERVAL
-from diagnosis.likelihood.run_data import Data
-from diagnosis.noise.colour import Colour
+from diagnosis.noise.kinds import Estimated, Floor, Noise, Stated
 from diagnosis.settings import NoiseSettings
 from identification.signal.decay_fit import mean_of_blocks
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array, Record, evenly_spaced
 
 _FLOOR_FROM = 60.0  # Hz: above the motion, the rod's ringing and the mains
@@ -28,86 +27,6 @@ _LN2 = float(np.log(2.0))  # median of a unit exponential: the periodogram of wh
 #: Error, as a share of the swing, that block means and steps leave in a fit of the closed form of the nominal
 #: model, while its bands still pass as white.
 _ACCURACY = 4e-5
-_LEAST_WHITE = 1e-3  # of the variance: some of it is white, however coarse the step
-
-
-@dataclass(frozen=True)
-class Noise:
-    """A campaign's noise.
-
-    Args:
-        variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
-        stated_variance: of one sample as the campaign states it, rad²; None where it does not.
-        source: of the variance used: ``stated``, ``estimated`` or ``floor``. The floor is the accuracy of the
-            fits, where the records contain less noise than that.
-        reason: for that source.
-        estimate: the records' own variance, mean over the runs, rad²; None: the one used.
-        relative: standard deviation of that estimate, a share of it.
-        colour: of the noise of block means, relative to white noise of the variance used; None where it is white.
-        measured: variance of one sample as the spectrum above the motion shows it, rad², by run id.
-    """
-
-    variance: dict[str, float]
-    stated_variance: float | None
-    source: str
-    reason: Fact
-    estimate: float | None = None
-    relative: float = 0.0
-    colour: Colour | None = None
-    measured: Mapping[str, float] = field(default_factory=dict)
-
-    def white(self, step: float) -> dict[str, float]:
-        """The white noise before rounding.
-
-        Args:
-            step: of the lattice of the readings, rad; 0 where there is none.
-
-        Returns:
-            Standard deviation of one sample, rad, by run id. Where the motion crosses a step in many samples, the
-            spectrum above it does not show the rounding error's q²/12 but how often noise takes a reading across
-            the next edge: qσ/√π for noise of a third of a step or less. The edges that the motion itself crosses
-            add to that, so noise of less than a tenth of a step is overestimated.
-        """
-        found = {}
-        for run, variance in self.variance.items():
-            seen, rounded = self.measured.get(run, variance), step**2 / 12.0
-            before = max(variance - rounded, _LEAST_WHITE * variance)
-            found[run] = float(np.sqrt(np.pi) * seen / step if seen < rounded else np.sqrt(before))
-        return found
-
-    @property
-    def used(self) -> float:
-        """The variance used, mean over the runs, rad²."""
-        return float(np.mean(list(self.variance.values())))
-
-    @property
-    def estimated(self) -> float:
-        """The records' own variance, mean over the runs, rad²."""
-        return self.used if self.estimate is None else self.estimate
-
-    @property
-    def margin(self) -> float:
-        """Factor by which the noise may exceed the one used: stated noise may be a little low and still agree."""
-        return 1.0 if self.colour else max(self.estimated / self.used, 1.0)
-
-    def coloured(self, colour: Colour, data: Data) -> Noise:
-        """The same noise, found to have a colour, and with an estimate of all power that the records resolve."""
-        extra = [
-            self.variance[run.id] / run.block * (colour.mean(run.reading.size, run.interval) - 1.0)
-            for run in data.runs
-        ]
-        whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
-        reason = Fact("coloured", {"std_rad": float(np.sqrt(whole))})
-        return replace(self, source="estimated", reason=reason, estimate=whole, colour=colour)
-
-    @property
-    def std(self) -> float:
-        """Standard deviation of one sample, rad."""
-        return float(np.sqrt(self.used if self.colour is None else self.estimated))
-
-    def spread(self, frequency: Array) -> float:
-        """Standard deviation of the mean power over some frequencies, Hz, shape (n,), a share of it."""
-        return self.relative if self.colour is None else self.colour.spread(frequency)
 
 
 def estimate_variance(record: Record, fastest: float | None = None) -> tuple[float, float]:
@@ -251,52 +170,59 @@ def campaign_noise(campaign: Campaign, chosen: NoiseSettings) -> Noise:
     """The noise of every run: as stated where the records agree with it, else as estimated from them.
 
     It is as stated where the runs agree with one another and their mean agrees with it,
-    both within chance; else the estimate, pooled over runs where they agree with one another. A
-    data sheet may give the noise before or after rounding: the closer one counts. Where a run contains less noise
-    than the accuracy of the fits, that stands in for it.
+    both within chance; else the estimate, pooled over runs where they agree with one another. Where a run contains
+    less noise than the accuracy of the fits, that stands in for it.
     """
-    fastest = max((_fastest(run) for run in campaign.runs if not run.record.uniform), default=None)
-    measured: dict[str, float] = {}
-    stds = []
-    for run in campaign.runs:
-        if run.drive is None or not run.record.uniform:
-            measured[run.id], std = estimate_variance(run.record, fastest)
-        else:
-            low = _FLOOR_FROM / run.record.sample_rate
-            measured[run.id], std = driven_variance(run.record.yaw_rad, run.drive.values, low)
-        stds.append(std)
+    measured, relative = _measured(campaign)
     # however slow the motion, the error of a rounded reading is that large
     rounded = lattice_step(campaign) ** 2 / 12.0
     estimates = {run: max(value, rounded) for run, value in measured.items()}
-    variances, relative = np.array(list(estimates.values())), np.array(stds)
+    variances = np.array(list(estimates.values()))
     pooled, uncertainty = float(np.mean(variances)), float(np.sqrt(np.sum(relative**2)) / relative.size)
-    stated, sensor = None, campaign.sensor
-    if sensor.noise_std:  # no record has a noise of zero
-        before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
-        stated = min((before, sensor.noise_std**2), key=lambda variance: abs(variance - pooled))
+    stated = _stated_variance(campaign.sensor, pooled)
     floors = {run.id: accuracy(run.record, swings=not run.unrestrained) ** 2 for run in campaign.runs}
     fewer = sum(floors[run] > value for run, value in estimates.items())
     if fewer:
         used = {run: max(value, floors[run]) for run, value in estimates.items()}
         reason = Fact("floor", {"std_rad": float(np.sqrt(pooled)), "fewer": fewer, "runs": len(used)})
-        return Noise(used, stated, "floor", reason, pooled, measured=measured)
+        return Floor(used, stated, reason, pooled, 0.0, measured)
     apart = -float(ndtri(0.5 * chosen.own_rate / variances.size))
     agrees = -float(ndtri(0.5 * chosen.stated_rate))
     uniform = bool(np.all(np.abs(variances / pooled - 1.0) < apart * relative))
     used = dict.fromkeys(estimates, pooled) if uniform else estimates
     std = float(np.sqrt(pooled))
     level = {"std_rad": std, "uncertainty_rad": 0.5 * uncertainty * std}
-    source = "estimated"
     if stated is None:
         reason = Fact("not stated")
     elif uniform and abs(pooled / stated - 1.0) < agrees * uncertainty:
-        used, source = dict.fromkeys(estimates, stated), "stated"
-        reason = Fact("agrees", level)
+        used = dict.fromkeys(estimates, stated)
+        return Stated(used, stated, Fact("agrees", level), pooled, uncertainty, measured)
     else:
         span = {"least_rad": float(np.sqrt(variances.min())), "most_rad": float(np.sqrt(variances.max()))}
         beside = {"stated_rad": float(np.sqrt(stated))}
         reason = Fact("contradicts", beside | level) if uniform else Fact("differs by run", beside | span)
-    return Noise(used, stated, source, reason, pooled, uncertainty, measured=measured)
+    return Estimated(used, stated, reason, pooled, uncertainty, measured)
+
+
+def _measured(campaign: Campaign) -> tuple[dict[str, float], Array]:
+    """Variance of one sample by run id, rad², and its relative standard deviations, shape (runs,)."""
+    fastest = max((_fastest(run) for run in campaign.runs if not run.record.uniform), default=None)
+    found = {}
+    for run in campaign.runs:
+        if run.drive is None or not run.record.uniform:
+            found[run.id] = estimate_variance(run.record, fastest)
+        else:
+            low = _FLOOR_FROM / run.record.sample_rate
+            found[run.id] = driven_variance(run.record.yaw_rad, run.drive.values, low)
+    return {run: value for run, (value, _) in found.items()}, np.array([std for _, std in found.values()])
+
+
+def _stated_variance(sensor: SensorProperties, seen: float) -> float | None:
+    """The variance that a data sheet states, before rounding or after, rad²: the one closer to that seen, rad²."""
+    if not sensor.noise_std:  # no record has a noise of zero
+        return None
+    before = sensor.noise_std**2 + (sensor.resolution or 0.0) ** 2 / 12.0
+    return min((before, sensor.noise_std**2), key=lambda variance: abs(variance - seen))
 
 
 def _fastest(run: Run) -> float:

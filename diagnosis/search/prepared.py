@@ -19,10 +19,11 @@ from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similar import similar_campaign
-from diagnosis.noise.gap import GapTest, gap_or_colour, rounding_errors
+from diagnosis.noise.gap import GapTest, gap_or_colour
+from diagnosis.noise.kinds import Noise
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
+from diagnosis.noise.rounding import Rounding
 from diagnosis.noise.sensor_noise import (
-    Noise,
     NoiseTrend,
     campaign_noise,
     noise_trend,
@@ -105,21 +106,16 @@ class Prepared:
         Args:
             base: fit of the nominal model to the runs on which sets are compared.
         """
-        left, runs = self.hum_power(base, self.settings.weighing.hum_left), base.problem.data.runs
+        left = self.hum_power(base, self.settings.weighing.hum_left)
         if not self.coarse:
             return left
         levels, stated = reading_levels(self.campaign), self.campaign.sensor.noise_std
         white = self.noise.white(typical_step(levels))
         # a coarse step hides the noise, so that what is stated of it is the better guess
         white = dict.fromkeys(white, stated) if stated else white
-        errors = rounding_errors(base, white, self.step, levels)
-        if errors is None:
-            return left
-        tries = [
-            misfit(base, [run.scaled(e[k]) for run, e in zip(runs, errors, strict=True)]).excess
-            for k in range(len(errors[0]))
-        ]
-        return np.asarray(left + np.maximum(np.mean(tries, axis=0), 0.0), np.float64)
+        rounding = Rounding.of(base, white, self.step, levels)
+        tries = [misfit(base, residuals).excess for residuals in rounding.residuals(base.problem.data)]
+        return np.asarray(left + np.maximum(np.mean(tries, axis=0), 0.0), np.float64) if tries else left
 
     def hum_power(self, base: Fit, share: float = 1.0) -> Array:
         """χ² by channel of a share of the hum that was removed, in the readings of a fit, shape (6,)."""
@@ -129,7 +125,7 @@ class Prepared:
     def place(self) -> Place:
         """Where the gap is, from the residuals of the nominal model alone."""
         stated = self.noise.stated_variance if self.coarse else None
-        level = float(np.mean([run.noise_variance * run.block for run in self.nominal.problem.data.runs]))
+        level = float(np.mean([run.noise.variance * run.block for run in self.nominal.problem.data.runs]))
         ratio = level / stated if stated else 1.0
         return locate(self.campaign, self.nominal, hum_removed=self.hum is not None, noise_ratio=ratio)
 

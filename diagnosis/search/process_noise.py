@@ -18,6 +18,7 @@ from scipy.special import chdtri
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.run_noise import NoiseWithMoment
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array
@@ -286,8 +287,9 @@ def with_response(fit: Fit, spectrum: Spectrum) -> Data | None:
     for (i, channel), (numerator, denominator, spread) in zip(channels.items(), filters, strict=True):
         if not (np.isfinite(spread) and spread > 0.0):
             return None
-        variance = runs[i].noise_variance * spread / channel.variance
-        runs[i] = replace(runs[i], innovations=(numerator, denominator), noise_variance=variance)
+        before = runs[i].noise
+        noise = NoiseWithMoment(before.variance * spread / channel.variance, before, numerator, denominator)
+        runs[i] = replace(runs[i], noise=noise)
     return fit.problem.data.with_runs(tuple(runs)) if channels else None
 
 
@@ -304,7 +306,7 @@ def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Ch
         return None
     group = max(1, round(least_interval / run.interval))
     count = run.reading.size // group
-    scale = np.sqrt(run.noise_variance)
+    scale = run.noise.scale
     residual = (fit.residuals[run_index][: count * group] * scale).reshape(count, group).mean(axis=1)
     # residuals are white: the rig's response, a narrow band, has passed through the same filter
     passed = scale / float(run.noise_at(resonance(fit, run_index)))
@@ -313,7 +315,7 @@ def _channel(fit: Fit, run_index: int, least_interval: float = _INTERVAL) -> _Ch
     oscillator = np.array([[0.0, 1.0], [-stiffness / inertia, -damping / inertia]])
     reduced = run.wind_speed / data.width if data.width > 0.0 else 0.0
     interval = group * run.interval
-    return _Channel(residual, run.noise_variance / group, interval, oscillator, passed * moment, reduced)
+    return _Channel(residual, run.noise.variance / group, interval, oscillator, passed * moment, reduced)
 
 
 def _skip(channel: _Channel) -> int:

@@ -38,7 +38,6 @@ def described(where: Where, place: Place, compared: Sequence[type[Effect]], sett
     beyond = bands_beyond_chance(maps.bands, settings.where)
     whole = sum(max(band.excess, 0.0) for band in maps.bands)
     shown = [b for b in maps.bands if b.band in beyond and b.excess > chosen.band_listed * whole]
-    shown.sort(key=lambda band: -band.excess)
     return PlaceFound(
         runs=len(maps.runs),
         share=sum(run.share for run in maps.runs if run.id in where.runs),

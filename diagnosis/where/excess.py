@@ -17,7 +17,7 @@ from scipy.fft import dct, idct
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.run_data import RunData
-from diagnosis.noise.gap import chance
+from diagnosis.noise.bands import chance
 from diagnosis.noise.sensor_noise import estimate_variance
 from diagnosis.settings import WhereSettings
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -89,7 +89,7 @@ def run_excesses(campaign: Campaign, fit: Fit) -> list[RunExcess]:
     records = {run.id: run.record for run in campaign.runs}
     relative = [estimate_variance(records[run.id])[1] for run in data.runs]
     # by sample, not by block: where all runs share one level it was pooled over them
-    levels = [run.noise_variance * run.block for run in data.runs]
+    levels = [run.noise.variance * run.block for run in data.runs]
     if np.allclose(levels, levels[0], rtol=1e-9):
         relative = [float(np.mean(relative)) / np.sqrt(len(relative))] * len(relative)
     relative = [float(np.hypot(value, fit.settings.where.run_noise_std)) for value in relative]

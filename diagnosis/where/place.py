@@ -57,7 +57,7 @@ def locate(campaign: Campaign, nominal: Fit, *, hum_removed: bool = False, noise
     """
     data, residuals = nominal.problem.data, nominal.residuals
     if hum_removed:
-        variance = {run.id: run.noise_variance for run in data.runs}
+        variance = {run.id: run.noise.variance for run in data.runs}
         given = prepare(campaign, variance, data.similarity, model=data.model, settings=data.settings)
         readings = {run.id: run.reading for run in given.runs}
         # the fit may leave a record's start out; both end together

@@ -272,11 +272,8 @@ def _traces(nominal: Fit, best: Fit | None, excesses: list[RunExcess]) -> tuple[
         seen = [_times(nominal, index), run.reading, run.unscaled(nominal.residuals[index])]
         if best is not None:
             seen.append(run.unscaled(best.residuals[index]))
-        if run.samples is None:
-            time, reading, before, *after = (_means(values, group) for values in seen)
-        else:
-            filled = _means(run.samples.count.astype(np.float64), group) > 0.0
-            time, reading, before, *after = (_means(values, group)[filled] for values in seen)
+        filled = _means(run.counts.astype(np.float64), group) > 0.0
+        time, reading, before, *after = (_means(values, group)[filled] for values in seen)
         # the few cycles that hold the most of the difference's energy; the whole where that is shorter
         first, last, length = float(time[0]), float(time[-1]), _SHOWN_CYCLES / frequency
         if last - first > length:

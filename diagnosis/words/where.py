@@ -68,7 +68,8 @@ def where_words(document: Document) -> str:
         most = part(settings.where.interval_share).capitalize()
         parts.append(f"{most} of it lie {', '.join(places)}.")
     if place["bands"]:
-        listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in place["bands"].items())
+        largest_first = sorted(place["bands"].items(), key=lambda item: -item[1])
+        listed = (f"{100.0 * share:.0f} % {BANDS[band]}" for band, share in largest_first)
         parts.append(f"By frequency: {', '.join(listed)}.")
     channel, condition = reason(place["channel"]), reason(place["condition"])
     words = PLACES.get(where["channel"] or "")

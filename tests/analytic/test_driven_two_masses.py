@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
 from tunnel_sim.effects import effect_class
@@ -21,6 +22,7 @@ from tunnel_sim.vocabulary.record import Array
 
 RATE, RIG, DENSITY = 100.0, load_rig(), 1.2
 SPRING, INERTIA, DAMPING = 16.0, 0.1, 0.05
+NOISE = WhiteNoise(1e-8)
 COMPLIANCE, SHARE = 0.005, 0.2
 TIME = np.arange(150) / RATE
 MOMENT = np.convolve(np.random.default_rng(4).standard_normal(TIME.size), np.ones(6) / 6.0, "same")
@@ -90,7 +92,7 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool) -> None:
     expected = two_masses(hold, 20.0, on_body=True, start=(start[0] * (1.0 + SPRING * COMPLIANCE), start[1]))
     drive = DriveMoment(TIME, MOMENT, held=hold == "zero")
     data = RunData(
-        "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, 1e-8, SPRING, 20.0, DENSITY, TIME[-1], drive=drive
+        "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, NOISE, SPRING, 20.0, DENSITY, TIME[-1], drive=drive
     )
     body = RIG.body
     problem = Problem(
@@ -106,7 +108,9 @@ def test_the_fits_predict_two_masses(hold: str, followed: bool) -> None:
 def test_a_rod_too_stiff_to_ring_acts_by_its_first_order() -> None:
     """Steps of a fit would not follow its ringing; the rigid rod of the same first order moves alike."""
     kind, drive = effect_class("rod_flexibility"), DriveMoment(TIME, MOMENT)
-    data = RunData("r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, 1e-8, SPRING, 0.0, 0.0, TIME[-1], drive=drive)
+    data = RunData(
+        "r", np.zeros(TIME.size - 1), 1, 1.0 / RATE, NOISE, SPRING, 0.0, 0.0, TIME[-1], drive=drive
+    )
     problem = Problem(Data((data,), 1.0, 1.0, 1.0, Rig()), (kind,))
     release = np.array([[0.1, 0.3]])
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +10,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from diagnosis import diagnose
 from docs.studies import layout
 from identification.datasets import measured_campaign
-from tests.unit.gap_campaigns import campaign
 from tunnel_sim.effects import effect_class, registry
 
 TEXT = (layout.ROOT / "docs/explanation/how-the-code-is-laid-out.md").read_text(encoding="utf-8")
 EXAMPLES = dict(
     zip(
-        ("effect", "estimator", "reader", "command", "rival"),
+        ("effect", "estimator", "reader", "command"),
         re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL),
         strict=True,
     )
@@ -78,12 +75,3 @@ def test_the_command_counts() -> None:
     app.command()(run("command")["count"])  # type: ignore[type-var]
     done = CliRunner().invoke(app, [str(layout.ROOT / "identification/data/measured/rotary-pendulum")])
     assert (done.exit_code, done.output) == (0, f"{len(measured_campaign('rotary-pendulum').runs)} runs\n")
-
-
-def test_the_rival_explains_the_gap() -> None:
-    first, *others = campaign(duration=5.0).runs
-    assert first.spring_stiffness is not None
-    softer = replace(first, spring_stiffness=first.spring_stiffness / 1.01)  # than the one it had
-    data = replace(campaign(duration=5.0), runs=(softer, *others))
-    found = diagnose(data, kinds=(), rivals=(run("rival")["FirstRunOff"](),))  # type: ignore[operator]
-    assert found.verdict.endswith("A stiffer spring in the first run would explain the gap.")

@@ -41,7 +41,7 @@ def judged(data):
     """All tests of a campaign."""
     noise = campaign_noise(data, Settings().noise)
     nominal = fit_nominal(prepare(data, noise.variance))
-    return gap.gap_test(nominal, noise, noise_trend(data), coarse_step=False, errors=None)
+    return gap.gap_test(nominal, noise, noise_trend(data), coarse_step=False)
 
 
 @pytest.mark.slow

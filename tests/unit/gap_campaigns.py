@@ -13,6 +13,7 @@ from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
@@ -56,7 +57,7 @@ def campaign(
             np.zeros(count),
             1,
             INTERVAL,
-            NOISE**2,
+            WhiteNoise(NOISE**2),
             spring,
             speed,
             1.2 * (speed > 0),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
@@ -13,6 +12,7 @@ from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.run_data import Data
+from diagnosis.likelihood.run_noise import NoiseWithMoment
 from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
@@ -100,8 +100,7 @@ def by_moment(fit: Fit) -> Data:
             variance = shape[2] / average[2]  # of the innovations: the products' last coefficients are equal
             cost = float(np.mean(lfilter([1.0], average, left) ** 2) / variance + np.log(variance))
             if cost < least:
-                noise = run.noise_variance * variance
-                likeliest = dataclasses.replace(run, innovations=(shape, average), noise_variance=noise)
-                least = cost
+                noise = NoiseWithMoment(run.noise.variance * variance, run.noise, shape, average)
+                likeliest, least = replace(run, noise=noise), cost
         runs.append(likeliest)
     return fit.problem.data.with_runs(tuple(runs))

@@ -185,7 +185,7 @@ def test_what_does_not_keep_its_phase_is_not_a_line(detent):
         lines.append(steady_line(Unexplained(replace(fit, residuals=residuals))))
     assert lines[:2] == [None, None]
     assert lines[2].frequency == pytest.approx(7.0, abs=4.0 * lines[2].frequency_std)
-    noise = np.sqrt(np.mean([run.noise_variance for run in fit.problem.data.runs]))
+    noise = np.sqrt(np.mean([run.noise.variance for run in fit.problem.data.runs]))
     assert lines[2].amplitude == pytest.approx(0.4 * noise, abs=4.0 * lines[2].amplitude_std)
 
 
@@ -260,7 +260,7 @@ def test_a_steady_moment_turns_the_rig_as_the_closed_form_says(detent):
     wave = np.cos(omega * time) + sigma / omega * np.sin(omega * time)
     turned = (1.0 - np.exp(-sigma * time) * wave) / stiffness
     whole = path.response(np.ones((path.angle.size, 1)))[:, 0]
-    released = turned * np.sqrt(path.group / path.run.noise_variance)
+    released = turned * np.sqrt(path.group / path.run.noise.variance)
     # it may set in within the first row: the free motion after that is the release's
     found, expected = (one - path.release @ (path.release.T @ one) for one in (whole, released))
     assert found == pytest.approx(expected, abs=2e-3 * np.max(np.abs(expected)))

@@ -155,7 +155,7 @@ def checked(answer):
 
 def answered(found):
     """The document of a study."""
-    return checked(assemble(found, *localise(found)))
+    return checked(assemble(found, *localise(found)).in_words())
 
 
 def hum(amplitude):

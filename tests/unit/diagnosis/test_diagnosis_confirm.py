@@ -14,6 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.run_data import Data, RunData
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
@@ -31,7 +32,9 @@ def problem(*names, block=4, duration=4.0, **held):
     """Two runs of four samples to a block, of the nominal model with effects."""
     count = round(duration / 4e-3)
     runs = tuple(
-        RunData(f"r{i}", np.zeros(count), block, 4e-3, NOISE**2 / block, spring, speed, 1.2, duration)
+        RunData(
+            f"r{i}", np.zeros(count), block, 4e-3, WhiteNoise(NOISE**2 / block), spring, speed, 1.2, duration
+        )
         for i, (spring, speed) in enumerate(((16.12, 0.0), (21.02, 20.0)), 1)
     )
     kinds = tuple(effect_class(name) for name in names)

@@ -31,13 +31,13 @@ def test_blocks_are_means_of_the_samples():
         assert (run.block, run.interval) == (4, pytest.approx(4e-3))
         assert run.reading.size == 1250  # the last sample alone makes no block
         assert run.reading[7] == pytest.approx(given.record.yaw_rad[28:32].mean(), abs=1e-15)
-        assert run.noise_variance == pytest.approx(0.25e-6)
+        assert run.noise.variance == pytest.approx(0.25e-6)
 
 
 def test_slow_records_are_taken_sample_by_sample():
     data = free_decays.campaign(SETTINGS, duration=6.0, rate=100.0)
     run = prepare(data, {run.id: 1e-6 for run in data.runs}).runs[0]
-    assert (run.block, run.noise_variance) == (1, 1e-6)
+    assert (run.block, run.noise.variance) == (1, 1e-6)
     assert run.interval == pytest.approx(0.01)
 
 
@@ -83,5 +83,5 @@ def test_the_mean_block_turns_an_excess_of_block_means_into_one_of_samples():
     data = prepare(replace(fast, runs=(fast.runs[0], *slow.runs[1:])), {run.id: 1e-6 for run in fast.runs})
     assert {run.block for run in data.runs} == {4, 1}
     power = 3e-6
-    in_blocks = [np.full(run.reading.size, power / run.noise_variance) for run in data.runs]
+    in_blocks = [np.full(run.reading.size, power / run.noise.variance) for run in data.runs]
     assert np.mean(np.concatenate(in_blocks)) / data.mean_block == pytest.approx(power / 1e-6)

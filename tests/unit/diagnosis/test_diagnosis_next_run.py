@@ -33,7 +33,7 @@ def apart(first, second, run, angle):
     for one in (first, second):
         problem = Problem(one.problem.data.with_runs((run,)), one.problem.effects)
         point = Point(one.point.common, np.array([[angle, 0.0]]))
-        predictions.append(problem.predict([point])[0][0] / np.sqrt(run.noise_variance))
+        predictions.append(problem.predict([point])[0][0] / run.noise.scale)
         slopes.append(sensitivities(problem, point)[0][1])
     change = predictions[1] - predictions[0]
     return np.sqrt(normal_equations([(change[:, None], slopes[0])], [change])[0][0, 0])
@@ -113,7 +113,7 @@ def test_the_separation_is_the_least_over_the_rival_s_phases(shedding):
     def reading(one, phase, angle=0.35, rate=0.0):
         problem = Problem(one.problem.data.with_runs((run,)), one.problem.effects)
         point = Point(one.point.common, np.array([[angle, rate, phase]]))
-        return problem.predict([point])[0][0] / np.sqrt(run.noise_variance)
+        return problem.predict([point])[0][0] / run.noise.scale
 
     release = [reading(second, 0.0, 0.3501), reading(second, 0.0, rate=1e-3)]
     slopes = np.stack([moved - reading(second, 0.0) for moved in release], axis=1)

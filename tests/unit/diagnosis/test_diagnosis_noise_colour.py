@@ -11,6 +11,7 @@ from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.noise import gap
+from diagnosis.noise.bands import p_values
 from diagnosis.noise.colour import _steady, alike_in_all_runs, noise_colour, zero_wanders
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step
@@ -71,7 +72,7 @@ def test_coloured_noise_alone_is_not_a_gap(name):
     assert noise.std == pytest.approx(NOISE * np.sqrt(5.0), rel=0.25 if name == "pink" else 0.1)
     assert abs(fit.excess) < 0.06
     # were it taken for white noise, it would be one
-    assert min(gap.band_p_values(nominal(coloured(campaign(), name)))) < 1e-6
+    assert min(p_values(nominal(coloured(campaign(), name))).values()) < 1e-6
 
 
 def random_walk(count, rng):
@@ -133,7 +134,7 @@ def test_an_effect_beneath_coloured_noise_is_still_a_gap(name, effect):
     fit, noise, found = judged(coloured(campaign(effect), name))
     assert found.detected
     assert noise.colour is not None
-    assert fit.problem.data.runs[0].whitening.size > 1
+    assert not fit.problem.data.runs[0].noise.plain
     assert min(found.tests, key=found.tests.__getitem__) in ("below", "f0", "offset")
 
 
@@ -147,7 +148,7 @@ def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
     fit, noise, found = judged(data)
     assert found.detected
     assert noise.colour is not None
-    assert all(run.whitening.size > 1 for run in fit.problem.data.runs)
+    assert not any(run.noise.plain for run in fit.problem.data.runs)
     still = [r for run, r in zip(fit.problem.data.runs, fit.residuals, strict=True) if not run.wind_on]
     assert np.mean(np.concatenate(still) ** 2) == pytest.approx(1.0, abs=0.3)
 
@@ -156,7 +157,7 @@ def test_a_colour_that_the_wind_hides_is_sought_in_still_air(monkeypatch):
 @pytest.mark.parametrize("damping", [0.02, slow(0.04)])
 def test_a_gap_of_still_air_is_no_colour(effect, size, damping):
     data = campaign(effect_class(effect)(size), damping=damping)
-    _, still = gap._colour_sources(nominal(data))
+    (still,) = gap._in_still_air(nominal(data))
     assert still.excess > 0.5
     _, noise, found = judged(data)
     assert found.detected
@@ -183,7 +184,7 @@ def test_white_noise_is_left_alone(seed):
     )
     assert fit is before
     assert noise.colour is None
-    assert all(run.whitening.size == 1 for run in fit.problem.data.runs)
+    assert all(run.noise.plain for run in fit.problem.data.runs)
 
 
 @pytest.mark.parametrize("keep", [(0.0, 15.0, 25.0), (15.0, 25.0), (25.0,)])
@@ -194,7 +195,7 @@ def test_turbulence_is_not_taken_for_coloured_noise(keep):
     fit, noise, found = judged(data)
     assert found.detected
     assert noise.colour is None
-    assert fit.problem.data.runs[0].whitening.size == 1
+    assert fit.problem.data.runs[0].noise.plain
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from scipy.signal import lfilter, lsim
 from scipy.stats import binom
 
 from diagnosis.likelihood.least_squares import fit
+from diagnosis.likelihood.run_noise import NoiseWithMoment
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
@@ -257,7 +258,7 @@ def test_turbulence_as_noise_leaves_white_residuals_of_the_stated_variance(windy
     again = fit(replace(windy.problem, data=data), windy.point)
     for run, residual in zip(data.runs, again.residuals, strict=True):
         assert np.mean(residual**2) == pytest.approx(1.0, abs=0.2)
-        assert (run.innovations is not None) == run.wind_on
+        assert isinstance(run.noise, NoiseWithMoment) == run.wind_on
         neighbours = float(residual[1:] @ residual[:-1]) / float(residual @ residual)
         assert abs(neighbours) < 4.0 / np.sqrt(residual.size)
         start = residual[: residual.size // 20]  # the rig is at rest there: its response begins with the run
@@ -398,7 +399,7 @@ def test_the_covariance_of_two_parts_is_that_of_independent_moments():
     one, two = SpectrumPart(0.01 * np.sqrt(2.0), 4.0), SpectrumPart(0.01, 4.0)
     whole, halves = with_response(fit, (one,)), with_response(fit, (two, two))
     for run, other in zip(whole.runs, halves.runs, strict=True):
-        assert other.noise_variance == pytest.approx(run.noise_variance, rel=1e-9)
+        assert other.noise.variance == pytest.approx(run.noise.variance, rel=1e-9)
 
 
 def test_vortices_beside_a_slow_error_of_one_run_have_one_part(monkeypatch):

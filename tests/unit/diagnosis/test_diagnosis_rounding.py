@@ -6,7 +6,7 @@ import pytest
 from diagnosis import vocabulary
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.residuals import misfit
-from diagnosis.noise.gap import rounding_errors, with_rounding
+from diagnosis.noise.rounding import Rounded
 from diagnosis.noise.sensor_noise import (
     campaign_noise,
     lattice_step,
@@ -70,8 +70,8 @@ def test_noise_that_blurs_the_steps_needs_no_allowance():
     data = decays(500.0, 4e-4, noise=4e-4)
     noise = campaign_noise(data, Settings().noise)
     fit = fit_nominal(prepare(data, noise.variance))
-    assert rounding_errors(fit, noise.white(reading_step(data)), reading_step(data)) is None
-    assert judged(data)[0].problem.data.runs[0].noise_variance == noise.variance["r01"] / 2
+    assert not isinstance(noise.rounded(fit, reading_step(data)).rounding, Rounded)
+    assert judged(data)[0].problem.data.runs[0].noise.variance == noise.variance["r01"] / 2
 
 
 @pytest.mark.parametrize("share", [0.1, 0.2])
@@ -91,12 +91,12 @@ def test_averaging_hardly_reduces_the_error_of_a_motion_slower_than_the_steps():
     )  # fmt: skip
     noise = campaign_noise(data, Settings().noise)
     fit = fit_nominal(prepare(data, noise.variance))
-    errors = rounding_errors(fit, noise.white(reading_step(data)), reading_step(data))
-    allowed = with_rounding(fit.problem.data, errors)
-    for run, error in zip(allowed.runs, errors, strict=True):
+    rounded = noise.rounded(fit, reading_step(data)).rounding
+    allowed = rounded.allowed_in(fit.problem.data)
+    for run, error in zip(allowed.runs, rounded.errors, strict=True):
         assert run.block == 4
         assert np.mean(error**2) == pytest.approx(DEGREE**2 / 12.0, rel=0.3)
-        assert run.noise_variance > 0.7 * noise.variance[run.id]
+        assert run.noise.variance > 0.7 * noise.variance[run.id]
 
 
 def test_the_errors_of_stretches_are_those_of_their_runs():
@@ -106,7 +106,7 @@ def test_the_errors_of_stretches_are_those_of_their_runs():
     whole = prepare(data, noise.variance)
     powers = []
     for part in (whole, in_stretches(whole).data):
-        errors = rounding_errors(fit_nominal(part), noise.white(DEGREE), DEGREE)
+        errors = noise.rounded(fit_nominal(part), DEGREE).rounding.errors
         powers.append(np.mean(np.concatenate(errors, axis=1) ** 2))
     assert powers[1] == pytest.approx(powers[0], rel=0.1)
 

@@ -9,6 +9,7 @@ from diagnosis.likelihood.least_squares import fit, fit_at
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import residual_spectra, resonance, wind_line
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, project_out, starting_points
 from diagnosis.model.joint import Joint
 from diagnosis.model.parameters import Point
@@ -176,7 +177,7 @@ def readings_of(data, effect, common, own, noise=0.0):
         replace(
             run,
             reading=y + rng.normal(0.0, noise, y.size) / np.sqrt(run.block),
-            noise_variance=NOISE**2 / run.block,
+            noise=WhiteNoise(NOISE**2 / run.block),
         )
         for run, y in zip(data.runs, readings, strict=True)
     )

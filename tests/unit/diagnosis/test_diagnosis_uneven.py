@@ -72,7 +72,7 @@ def test_even_samples_are_taken_as_ever():
         assert run.samples is None
         assert run.weights.shape == (4,)
         difference = np.linspace(-1.0, 1.0, run.reading.size)
-        assert run.scaled(difference).tobytes() == (difference / np.sqrt(run.noise_variance)).tobytes()
+        assert run.scaled(difference).tobytes() == (difference / run.noise.scale).tobytes()
 
 
 def test_uneven_samples_lose_nothing_of_the_model():

@@ -195,7 +195,7 @@ def test_the_apparent_moment_gives_a_moment_back():
         omega = ratio * np.sqrt(stiffness / inertia)
         time = run.interval * np.arange(run.reading.size)
         gain = 1.0 / (stiffness - inertia * omega**2 + 1j * omega * damping)
-        response = amplitude * (gain * np.exp(1j * omega * time)).real / np.sqrt(run.noise_variance)
+        response = amplitude * (gain * np.exp(1j * omega * time)).real / run.noise.scale
         planted = dataclasses.replace(
             found, residuals=[response if i == index else r for i, r in enumerate(found.residuals)]
         )

@@ -13,6 +13,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.parameters import Parameter, Point, Prior
 from diagnosis.model.rig import Rig
@@ -100,7 +101,7 @@ def test_a_run_that_is_not_seen_returns_to_its_prior() -> None:
     """Refitted to readings of no weight, a run's own deviation is the prior's mean."""
     found, _ = fitted(ClampedAgain(), SCATTER, 5)
     data = found.problem.data
-    blind = replace(data, runs=tuple(replace(run, noise_variance=1e12) for run in data.runs))
+    blind = replace(data, runs=tuple(replace(run, noise=WhiteNoise(1e12)) for run in data.runs))
     problem = replace(found.problem, data=blind)
     place = problem.parameters.own_names.index("spring_deviation")
     moved = found.point.release.copy()

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.run_data import Data, RunData, folds
+from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.rig import Rig
 from diagnosis.patch.patched_model import native_closure
@@ -24,7 +25,7 @@ CAUSE = "quadratic_damping"
 
 
 def one_run(name, spring, speed):
-    return RunData(name, np.zeros(4), 1, 4e-3, 1e-7, spring, speed, 1.2, 1.0)
+    return RunData(name, np.zeros(4), 1, 4e-3, WhiteNoise(1e-7), spring, speed, 1.2, 1.0)
 
 
 RUNS = st.lists(st.tuples(st.sampled_from([16.0, 21.0, 45.0]), st.sampled_from([0.0, 15.0, 25.0])), min_size=1,

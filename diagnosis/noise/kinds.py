@@ -1,0 +1,178 @@
+"""The noise of a campaign, one type for each way in which it was found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar
+
+import numpy as np
+
+from diagnosis.facts.found import Fact
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.run_data import Data
+from diagnosis.noise.colour import Colour
+from diagnosis.noise.rounding import Rounding
+from tunnel_sim.vocabulary.record import Array
+
+_LEAST_WHITE = 1e-3  # of the variance: some of it is white, however coarse the step
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """A campaign's noise, white unless a kind says otherwise.
+
+    Args:
+        variance: of one sample, quantisation included, rad², by run id: what the diagnosis uses.
+        stated_variance: of one sample as the campaign states it, rad²; None where it does not.
+        reason: why it is of this kind.
+        estimated: the records' own variance, mean over the runs, rad².
+        relative: standard deviation of that estimate, a share of it.
+        measured: variance of one sample as the spectrum above the motion shows it, rad², by run id.
+        rounding: what rounding leaves beside white noise.
+    """
+
+    variance: dict[str, float]
+    stated_variance: float | None
+    reason: Fact
+    estimated: float
+    relative: float
+    measured: Mapping[str, float]
+    rounding: Rounding = field(default_factory=Rounding)
+
+    #: Of the variance used: ``stated``, ``estimated`` or ``floor``.
+    source: ClassVar[str]
+    #: Whether the records show it, so that its level and its trend with the motion are tested.
+    shown: ClassVar[bool] = True
+
+    @property
+    def used(self) -> float:
+        """The variance used, mean over the runs, rad²."""
+        return float(np.mean(list(self.variance.values())))
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one sample, rad."""
+        return float(np.sqrt(self.used))
+
+    @property
+    def margin(self) -> float:
+        """Factor by which the noise may exceed the one used: stated noise may be a little low and still agree."""
+        return max(self.estimated / self.used, 1.0)
+
+    @property
+    def colour(self) -> Colour | None:
+        """Its spectrum relative to white noise of the variance used; None where it is white."""
+        return None
+
+    def spread(self, frequency: Array) -> float:
+        """Standard deviation of the mean power over some frequencies, Hz, shape (n,), a share of it."""
+        del frequency
+        return self.relative
+
+    def noted(self) -> tuple[Fact, ...]:
+        """What is remarkable of its spectrum."""
+        return ()
+
+    def cautions(self, contradicted: float) -> tuple[Fact, ...]:
+        """The caveat of an answer that is based on it.
+
+        Args:
+            contradicted: factor between standard deviations as stated and as seen, from which on they disagree.
+        """
+        ratio = self.estimated**0.5 / self.stated_variance**0.5 if self.stated_variance else 1.0
+        if 1.0 / contradicted < ratio < contradicted:
+            return ()
+        return (Fact(f"{'more' if ratio > 1.0 else 'less'} noise than stated", {"ratio": ratio}),)
+
+    def white(self, step: float) -> dict[str, float]:
+        """The white noise before rounding.
+
+        Args:
+            step: of the lattice of the readings, rad; 0 where there is none.
+
+        Returns:
+            Standard deviation of one sample, rad, by run id. Where the motion crosses a step in many samples, the
+            spectrum above it does not show the rounding error's q²/12 but how often noise takes a reading across
+            the next edge: qσ/√π for noise of a third of a step or less. The edges that the motion itself crosses
+            add to that, so noise of less than a tenth of a step is overestimated.
+        """
+        found = {}
+        for run, variance in self.variance.items():
+            seen, rounded = self.measured.get(run, variance), step**2 / 12.0
+            before = max(variance - rounded, _LEAST_WHITE * variance)
+            found[run] = float(np.sqrt(np.pi) * seen / step if seen < rounded else np.sqrt(before))
+        return found
+
+    def rounded(self, fit: Fit, step: float) -> Noise:
+        """The noise with what rounding to a lattice of some step, rad, leaves in the residuals of a fit."""
+        return replace(self, rounding=Rounding.of(fit, self.white(step), step))
+
+    def coloured(self, colour: Colour, data: Data) -> Coloured:
+        """The same noise, found to have a colour, and with an estimate of all power that the records resolve."""
+        extra = [
+            self.variance[run.id] / run.block * (colour.mean(run.reading.size, run.interval) - 1.0)
+            for run in data.runs
+        ]
+        whole = float(np.mean(list(self.variance.values())) + np.mean(extra))
+        known = {one.name: getattr(self, one.name) for one in fields(self)}
+        known |= {"estimated": whole, "reason": Fact("coloured", {"std_rad": float(np.sqrt(whole))})}
+        return Coloured(**known, spectrum=colour)
+
+
+class Stated(Noise):
+    """White noise as the campaign states it, with which the records agree."""
+
+    source = "stated"
+
+
+class Estimated(Noise):
+    """White noise as the records show it."""
+
+    source = "estimated"
+
+
+class Floor(Noise):
+    """The accuracy of the fits, as white noise, where the records contain less noise than that."""
+
+    source, shown = "floor", False
+
+    def cautions(self, contradicted: float) -> tuple[Fact, ...]:
+        """That it stands in for the records' own noise."""
+        del contradicted
+        return (Fact("floor", {"records_rad": self.estimated**0.5, "fits_rad": self.used**0.5}),)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Coloured(Estimated):
+    """Noise whose spectrum the records show; its variance used is that of the white noise assumed before.
+
+    Args:
+        spectrum: its power relative to that.
+    """
+
+    spectrum: Colour
+
+    #: The spectrum is that of the records.
+    margin: ClassVar[float] = 1.0
+
+    @property
+    def colour(self) -> Colour:
+        """Its spectrum."""
+        return self.spectrum
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one sample, all power that the records resolve, rad."""
+        return float(np.sqrt(self.estimated))
+
+    def noted(self) -> tuple[Fact, ...]:
+        """That the noise is coloured, and how much."""
+        span = self.spectrum.frequency[-1] / self.spectrum.frequency[0]
+        ratio = np.exp(np.ptp(self.spectrum.level))
+        figures = {"std_rad": self.std, "power_ratio": float(ratio), "frequency_ratio": float(span)}
+        return (Fact("coloured", figures),)
+
+    def spread(self, frequency: Array) -> float:
+        """That of the spectrum."""
+        return self.spectrum.spread(frequency)
