@@ -69,8 +69,10 @@ def test_a_hum_of_every_form_is_found_and_removed(names, form):
     draw = CampaignDraw("single", c, (effect,), 3)
     campaign = as_campaign(read_and_fit(draw, simulate_motions([draw], fine=False)[0]), "c")
     found = nominal_study(campaign, ALL_EFFECTS)
-    assert found.hum is not None
+    assert found.prepared.hum is not None
     wander = 0.03 if shape.name == "wandering" else 3e-3  # Hz
-    assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(extra["frequency"], abs=wander)
-    assert found.hum.amplitude == pytest.approx(1e-3, rel=0.3 if shape.name == "wandering" else 0.03)
+    assert found.similarity.own(found.prepared.hum.frequency, "Hz") == pytest.approx(
+        extra["frequency"], abs=wander
+    )
+    assert found.prepared.hum.amplitude == pytest.approx(1e-3, rel=0.3 if shape.name == "wandering" else 0.03)
     assert not found.gap.test.detected

@@ -66,16 +66,16 @@ def test_a_hum_is_found_and_taken_out_whole(frequency):
 @pytest.mark.parametrize("frequency", [49.1, 50.4, 59.2, 60.0, 60.9])
 def test_a_hum_is_found_wherever_grids_wander(frequency):
     found = nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS)
-    assert found.hum is not None
-    assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(frequency, abs=3e-3)
-    assert found.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.hum.std)
-    assert found.hum.harmonic == 1
+    assert found.prepared.hum is not None
+    assert found.similarity.own(found.prepared.hum.frequency, "Hz") == pytest.approx(frequency, abs=3e-3)
+    assert found.prepared.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.prepared.hum.std)
+    assert found.prepared.hum.harmonic == 1
     assert not found.gap.test.detected
 
 
 @pytest.mark.parametrize("frequency", [44.0, 55.0, 65.0, 72.0])
 def test_a_line_elsewhere_is_not_a_hum(frequency):
-    assert nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS).hum is None
+    assert nominal_study(humming(decays(), 1e-3, frequency), ALL_EFFECTS).prepared.hum is None
 
 
 #: Sample rate and mains, Hz, the multiple that hums, and where it then appears, Hz.
@@ -102,18 +102,18 @@ def test_a_hum_is_found_where_the_sample_rate_folds_it(rate, mains, multiple, pl
     assert folded == pytest.approx(place, abs=1e-9)
     found = nominal_study(data, ALL_EFFECTS)
     if place < 3.0 * 2.1:  # within the harmonics of a motion of 2 Hz
-        assert found.hum is None
+        assert found.prepared.hum is None
         return
-    assert found.hum is not None
-    assert found.similarity.own(found.hum.frequency, "Hz") == pytest.approx(mains, abs=3e-3)
-    assert found.hum.harmonic == multiple
-    assert found.hum.amplitude == pytest.approx(2e-3, abs=4.0 * found.hum.std)
+    assert found.prepared.hum is not None
+    assert found.similarity.own(found.prepared.hum.frequency, "Hz") == pytest.approx(mains, abs=3e-3)
+    assert found.prepared.hum.harmonic == multiple
+    assert found.prepared.hum.amplitude == pytest.approx(2e-3, abs=4.0 * found.prepared.hum.std)
     assert not found.gap.test.detected
-    noted = hum_noted(found.campaign, found.hum, found.similarity)
+    noted = hum_noted(found.campaign, found.prepared.hum, found.similarity)
     said = [remark(as_json(one)).what for one in noted]
     assert any(f"appears at {place:.5g} Hz" in one for one in said) == (place != multiple * mains)
     assert any("times the mains' frequency" in one for one in said) == (multiple > 1)
-    assert nominal_study(clean, ALL_EFFECTS).hum is None
+    assert nominal_study(clean, ALL_EFFECTS).prepared.hum is None
 
 
 @pytest.mark.parametrize(("rate", "multiple"), [(110.0, 1), (220.0, 2)])
@@ -121,9 +121,9 @@ def test_what_the_sample_rate_cannot_tell_apart_is_said(rate, multiple):
     """At 110 Hz all multiples of 50 and of 60 Hz appear at the same places, and at 220 Hz the even ones do."""
     data = humming(decays(rate=rate, duration=10.0), 2e-3, multiple * 60.0)
     found = nominal_study(data, ALL_EFFECTS)
-    assert found.hum is not None
-    own = found.similarity.own(found.hum.frequency, "Hz")
-    noted = hum_noted(found.campaign, found.hum, found.similarity)
+    assert found.prepared.hum is not None
+    own = found.similarity.own(found.prepared.hum.frequency, "Hz")
+    noted = hum_noted(found.campaign, found.prepared.hum, found.similarity)
     said = [remark(as_json(one)).what for one in noted]
     assert own == pytest.approx(50.0, abs=3e-3)
     assert any(one.startswith(f"mains of {110.0 - own:.5g} Hz would show the same line") for one in said)
@@ -134,8 +134,8 @@ def test_a_mode_that_decays_is_not_a_hum():
     def ring(rate):
         return lambda t, y: y + 3e-3 * np.exp(-rate * t) * np.sin(2.0 * np.pi * 60.0 * t)
 
-    assert nominal_study(with_records(decays(), ring(0.5)), ALL_EFFECTS).hum is None
-    assert nominal_study(with_records(decays(), ring(0.0)), ALL_EFFECTS).hum is not None
+    assert nominal_study(with_records(decays(), ring(0.5)), ALL_EFFECTS).prepared.hum is None
+    assert nominal_study(with_records(decays(), ring(0.0)), ALL_EFFECTS).prepared.hum is not None
 
 
 @pytest.mark.parametrize(("orders", "hums"), [((13, 19), False), ((25,), True)])
@@ -149,7 +149,7 @@ def test_a_line_at_a_multiple_of_the_motion_is_a_hum_only_where_the_motion_has_n
     def add(t, y):
         return y + sum(1e-3 * np.sin(4.0 * np.pi * k * t + k) for k in {25, *orders})
 
-    assert (nominal_study(with_records(data, add), ALL_EFFECTS).hum is not None) == hums
+    assert (nominal_study(with_records(data, add), ALL_EFFECTS).prepared.hum is not None) == hums
 
 
 def test_a_hum_that_only_some_sample_rates_show_is_found_and_removed():
@@ -157,8 +157,8 @@ def test_a_hum_that_only_some_sample_rates_show_is_found_and_removed():
     slow = decays(rate=50.0, duration=8.0)  # 50 Hz would be at rest
     data = humming(replace(fast, runs=(*fast.runs[:4], *slow.runs[4:])), 1e-3)
     found = nominal_study(data, ALL_EFFECTS)
-    assert found.hum is not None
-    assert found.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.hum.std)
+    assert found.prepared.hum is not None
+    assert found.prepared.hum.amplitude == pytest.approx(1e-3, abs=4.0 * found.prepared.hum.std)
 
 
 def noise_only(base, rng):
@@ -207,13 +207,13 @@ def test_the_hum_of_a_slow_rig_is_found():
     slow = [replace(run, record=Record(run.record.time_s * 4.0, run.record.yaw_rad)) for run in decays().runs]
     clean = replace(decays(), runs=tuple(slow), sensor=SensorProperties(rate, 1e-5))
     found = nominal_study(humming(clean, 1e-3), ALL_EFFECTS)
-    assert found.hum is not None
+    assert found.prepared.hum is not None
     own = found.similarity.own
-    assert own(found.hum.frequency, "Hz") == pytest.approx(50.0, abs=3e-3)
-    assert found.hum.amplitude == pytest.approx(1e-3, rel=0.02)
-    assert found.hum.excess == pytest.approx(0.5 * 1e-3**2 / NOISE**2, rel=0.1)
+    assert own(found.prepared.hum.frequency, "Hz") == pytest.approx(50.0, abs=3e-3)
+    assert found.prepared.hum.amplitude == pytest.approx(1e-3, rel=0.02)
+    assert found.prepared.hum.excess == pytest.approx(0.5 * 1e-3**2 / NOISE**2, rel=0.1)
     assert not found.gap.test.detected
-    assert nominal_study(clean, ALL_EFFECTS).hum is None
+    assert nominal_study(clean, ALL_EFFECTS).prepared.hum is None
 
 
 def test_white_noise_has_no_hum():
