@@ -246,7 +246,7 @@ def _decay(interval: float, curve: Array, frequency: float) -> tuple[float, floa
         return None
     reading = Reading(interval * np.arange(curve.size, dtype=np.float64), curve)
     found = fit_run(reading, Decay(0.0, (2.0 * np.pi * frequency) ** 2), tolerance=_CLOSE)
-    if not found.runs or found.runs[0].decay.stiffness <= 0.0:
+    if not found.runs or found.runs[0].decay.omega_d == 0.0:  # without the cause the body does not swing
         return None
     decay = found.runs[0].decay
     return decay.omega_n, decay.zeta, found.zero

@@ -57,7 +57,7 @@ def planned_run(
         air_density: ρ, kg/m³; not used where the wind is off.
         duration: s.
     """
-    template = fit.problem.data.runs[0]
+    template = fit.problem.data.runs[0].undriven()
     return dataclasses.replace(
         template,
         id="next",
@@ -68,8 +68,6 @@ def planned_run(
         duration=duration,
         start=0.0,
         samples=None,
-        drive=None,
-        gain_free=False,
     )
 
 

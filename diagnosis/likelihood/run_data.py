@@ -158,6 +158,10 @@ class RunData:
             delay=self.drive.delay - self.start,
         )
 
+    def undriven(self) -> RunData:
+        """The run as a free decay."""
+        return dataclasses.replace(self, drive=None, gain_free=False)
+
     @property
     def input_means(self) -> Array:
         """Block means of the input of a driven run, shape (n,), in its own unit."""
@@ -358,7 +362,7 @@ class Data:
         """The same runs as free decays, whose model has the same parameters."""
         if not self.driven:
             return self
-        return self.with_runs(tuple(dataclasses.replace(r, drive=None, gain_free=False) for r in self.runs))
+        return self.with_runs(tuple(run.undriven() for run in self.runs))
 
     def subset(self, keep: tuple[str, ...]) -> Data:
         """The runs of the given ids."""

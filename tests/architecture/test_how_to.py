@@ -88,6 +88,12 @@ def test_a_kind_of_rig_is_added_in_one_class(tmp_path: Path) -> None:
     assert [bool(text) for _, text in shown] == [False, False, True, True]
 
 
+def test_a_rival_is_added_in_one_class(tmp_path: Path) -> None:
+    shown = steps(PAGES / "add-a-rival.md")
+    assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
+    assert len(shown) == 3
+
+
 @pytest.mark.slow
 def test_the_class_of_ones_own_is_found(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-an-effect.md")
