@@ -100,6 +100,7 @@ class AutoregressiveNoise(RunNoise):
     """Coloured noise, whose filter is exact from the first value of a record on.
 
     Args:
+        variance: of the errors, rad².
         whitening: filter of the errors by which each value differs from its prediction from those before it: 1 and
             the negative autoregressive coefficients, shape (order + 1,), of order 1 or more.
     """
@@ -143,6 +144,7 @@ class NoiseWithMoment(RunNoise):
     """Noise beside the response to a random moment, which begins at rest with the run.
 
     Args:
+        variance: of what both filters leave, rad².
         sensor: the noise beside the response, whose own variance does not matter.
         numerator: of the filter that makes both white after the sensor's noise alone is white, shape (m,).
         denominator: of that filter, shape (k,).

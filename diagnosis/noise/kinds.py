@@ -81,9 +81,9 @@ class Noise:
             contradicted: factor between standard deviations as stated and as seen, from which on they disagree.
         """
         ratio = self.estimated**0.5 / self.stated_variance**0.5 if self.stated_variance else 1.0
-        if 1.0 / contradicted < ratio < contradicted:
-            return ()
-        return (Fact(f"{'more' if ratio > 1.0 else 'less'} noise than stated", {"ratio": ratio}),)
+        if ratio >= contradicted:
+            return (Fact("more noise than stated", {"ratio": ratio}),)
+        return (Fact("less noise than stated", {"ratio": ratio}),) if ratio <= 1.0 / contradicted else ()
 
     def white(self, step: float) -> dict[str, float]:
         """The white noise before rounding.
@@ -105,7 +105,11 @@ class Noise:
         return found
 
     def rounded(self, fit: Fit, step: float) -> Noise:
-        """The noise with what rounding to a lattice of some step, rad, leaves in the residuals of a fit."""
+        """The noise with what rounding leaves in the residuals of a fit.
+
+        Args:
+            step: of the lattice of the readings, rad; 0 where there is none.
+        """
         return replace(self, rounding=Rounding.of(fit, self.white(step), step))
 
     def coloured(self, colour: Colour, data: Data) -> Coloured:
@@ -121,19 +125,19 @@ class Noise:
 
 
 class Stated(Noise):
-    """White noise as the campaign states it, with which the records agree."""
+    """White noise as the campaign states it, with which the records agree; arguments as in `Noise`."""
 
     source = "stated"
 
 
 class Estimated(Noise):
-    """White noise as the records show it."""
+    """White noise as the records show it; arguments as in `Noise`."""
 
     source = "estimated"
 
 
 class Floor(Noise):
-    """The accuracy of the fits, as white noise, where the records contain less noise than that."""
+    """The accuracy of the fits, where the records contain less noise than that; arguments as in `Noise`."""
 
     source, shown = "floor", False
 
@@ -148,7 +152,7 @@ class Coloured(Estimated):
     """Noise whose spectrum the records show; its variance used is that of the white noise assumed before.
 
     Args:
-        spectrum: its power relative to that.
+        spectrum: its power relative to that; the other arguments as in `Noise`.
     """
 
     spectrum: Colour
