@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.starting_points import unabsorbed
+from diagnosis.model.blocks import prepare
 from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import Effect, known_effects
 from tunnel_sim.effects.registry import answering_with

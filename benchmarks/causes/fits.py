@@ -11,7 +11,7 @@ from typing import Any
 
 from diagnosis.answer.held_out import one_more
 from diagnosis.diagnosable import comparable_runs, diagnosable
-from diagnosis.likelihood.run_data import Data
+from diagnosis.model.run_data import Data
 from diagnosis.search.investigate import investigate, nominal_study
 from diagnosis.search.prepared import fit_nominal
 from diagnosis.settings import Settings

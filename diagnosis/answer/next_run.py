@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, project_release
-from diagnosis.likelihood.run_data import RunData
 from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
 
 _ANGLES = (0.35, 0.14)  # rad

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similarity import Similarity
 from diagnosis.result import Diagnosis, Hidden, ParameterEstimate
 from tunnel_sim.effects import effect_class
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from diagnosis.facts.remainder import Ceiling
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, paths, ranges
-from diagnosis.likelihood.run_data import folds
+from diagnosis.model.run_data import folds
 from tunnel_sim.vocabulary.record import Array
 
 _WIDTHS = np.geomspace(1e-5, 1e3, 33)  # prior standard deviations tried, in that of a column of unit response

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.residuals import Line, ResidualSpectrum, block_gain, resonance, smooth_spectra
-from diagnosis.likelihood.run_data import RunData
+from diagnosis.model.run_data import RunData
+from diagnosis.model.similarity import Similarity
 from tunnel_sim.vocabulary.record import Array
 
 #: Nominal frequencies of the mains, Hz.

@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.likelihood.run_data import RunData
+from diagnosis.model.run_data import RunData
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.record import Array
 

@@ -11,8 +11,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from diagnosis.likelihood.run_data import Data, RunData
 from diagnosis.model.parameters import Parameter, ParameterSet, Point
+from diagnosis.model.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_run, integrate, slow_motion

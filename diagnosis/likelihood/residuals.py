@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.run_data import RunData
+from diagnosis.model.run_data import RunData
 from tunnel_sim.vocabulary.record import Array
 
 _PADDING = 8  # zero padding: lines are found to a small part of a bin

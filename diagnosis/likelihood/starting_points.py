@@ -12,8 +12,8 @@ from diagnosis.likelihood.least_squares import Fit, clip, damped_step, normal_eq
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
-from diagnosis.likelihood.run_data import Data
 from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo
 from tunnel_sim.vocabulary.record import Array

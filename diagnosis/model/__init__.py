@@ -1,1 +1,1 @@
-"""The nominal models, one type for each kind of rig, and the parameters that fits have."""
+"""The runs as fits see them, and the nominal models: one type for each kind of rig, chosen once."""

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import Similarity, frequency
 from diagnosis.model.loose import LooseBody
 from diagnosis.model.nominal import NominalModel, Start
 from diagnosis.model.parameters import Parameter
 from diagnosis.model.rig import Rig
+from diagnosis.model.similarity import Similarity, frequency
 from diagnosis.model.starts import Shown, responses
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, one_line
 from tunnel_sim.vocabulary.rig import JointLaw
 
 if TYPE_CHECKING:
-    from diagnosis.likelihood.run_data import Data, RunData
+    from diagnosis.model.run_data import Data, RunData
     from tunnel_sim.engine.joint_model import Recorded
 
 _SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's

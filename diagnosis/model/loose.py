@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import (
+from diagnosis.model.nominal import NominalModel, Start
+from diagnosis.model.parameters import Parameter
+from diagnosis.model.similarity import (
     REFERENCE_FREQUENCY,
     REFERENCE_INERTIA,
     REFERENCE_STIFFNESS,
     response_to_input,
 )
-from diagnosis.model.nominal import NominalModel, Start
-from diagnosis.model.parameters import Parameter
 from diagnosis.model.starts import responses
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import SWING, ParameterInfo
@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
-    from diagnosis.likelihood.run_data import Data
+    from diagnosis.model.run_data import Data
 
 _SLOW = 0.1  # 1/s: a small decay rate of the similar rig
 _NO_MOMENT = (

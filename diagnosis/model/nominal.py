@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import REFERENCE_STIFFNESS, Similarity
 from diagnosis.model.parameters import Parameter, released
+from diagnosis.model.similarity import REFERENCE_STIFFNESS, Similarity
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.expression import Expression, parse
@@ -26,7 +26,7 @@ from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
-    from diagnosis.likelihood.run_data import Data, RunData
+    from diagnosis.model.run_data import Data, RunData
 
 #: Moments of the air in the strongest wind, by which a coefficient's size is judged whatever the air.
 _AIR_STIFFNESS, _AIR_DAMPING = 4.0, 0.02  # N m/rad and N m s/rad
@@ -50,7 +50,7 @@ class NominalModel:
     """The model of a kind of rig, without any effect.
 
     A kind overrides what is different for it. All values are those of the similar campaign
-    (`diagnosis.likelihood.nondimensional`), whose inertia is 1 where it is not known.
+    (`diagnosis.model.similarity`), whose inertia is 1 where it is not known.
 
     Args:
         windy: whether the wind is on in any run of the campaign.

@@ -19,7 +19,7 @@ from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.units import dimension, in_si, product
 
 if TYPE_CHECKING:
-    from diagnosis.likelihood.run_data import Data, RunData
+    from diagnosis.model.run_data import Data, RunData
 
 _LOSS = 0.01  # of a start, in angular frequencies: a small damping
 

@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity, free_frequency
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity, free_frequency
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Record

@@ -13,7 +13,7 @@ from identification.signal.frequency import peak_of_swing, starting_decay
 from tunnel_sim.vocabulary.record import Array, Record
 
 if TYPE_CHECKING:
-    from diagnosis.likelihood.run_data import Data, RunData
+    from diagnosis.model.run_data import Data, RunData
 
 _STILL = 0.02  # of the largest swing, below which a run counts as at rest
 _PADDING = 16  # zero padding of the spectrum that gives the first frequency

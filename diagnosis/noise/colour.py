@@ -19,8 +19,8 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.run_data import Data, RunData
-from diagnosis.likelihood.run_noise import AutoregressiveNoise, WhiteNoise
+from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_noise import AutoregressiveNoise, WhiteNoise
 from tunnel_sim.vocabulary.record import Array
 
 _PARTS = 8  # parts of records to compare, where they are long enough

@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.run_data import Data
+from diagnosis.model.run_data import Data
 from diagnosis.noise.colour import Colour
 from diagnosis.noise.rounding import Rounding
 from tunnel_sim.vocabulary.record import Array

@@ -20,8 +20,8 @@ from diagnosis.likelihood.mains_lines import (
     mains_lines,
     shown_multiples,
 )
-from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY, Similarity
-from diagnosis.likelihood.nondimensional import frequency as motion_frequency
+from diagnosis.model.similarity import REFERENCE_FREQUENCY, Similarity
+from diagnosis.model.similarity import frequency as motion_frequency
 from diagnosis.noise.sensor_noise import SmoothCurve
 from diagnosis.settings import ReadOffSettings
 from tunnel_sim.vocabulary.campaign import Campaign

@@ -14,8 +14,8 @@ from scipy.interpolate import make_lsq_spline
 from scipy.special import gammaincinv, ndtri
 
 from diagnosis.facts.found import Fact
-from diagnosis.likelihood.nondimensional import frequency
-from diagnosis.likelihood.prepare import BLOCK_INTERVAL
+from diagnosis.model.blocks import BLOCK_INTERVAL
+from diagnosis.model.similarity import frequency
 from diagnosis.noise.kinds import Estimated, Floor, Noise, Stated
 from diagnosis.settings import NoiseSettings
 from identification.signal.decay_fit import mean_of_blocks

@@ -14,9 +14,9 @@ from scipy.special import chdtrc
 from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.facts.remainder import Ceiling, Closable, Curve, Law, Line
 from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
+from diagnosis.model.similarity import Similarity
 from diagnosis.remainder.formula import choose, propose
 from diagnosis.search.study import Study
 from diagnosis.settings import RemainderSettings

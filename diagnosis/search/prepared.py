@@ -11,14 +11,14 @@ import numpy as np
 from diagnosis.diagnosable import refuse_indefinite
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.likelihood.mains_lines import fastest, mains_interval
-from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.likelihood.prepare import prepare, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
-from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import misses_motion, nominal_starts
+from diagnosis.model.blocks import prepare, without_rest, without_start
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
+from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.kinds import Noise
 from diagnosis.noise.mains import Hum, find_hum, refine_frequency, remove_hum
@@ -50,7 +50,7 @@ class Prepared:
     """What is known of a campaign before any effect is fitted, in the units of the similar campaign.
 
     Args:
-        campaign: the similar campaign (`diagnosis.likelihood.nondimensional`).
+        campaign: the similar campaign (`diagnosis.model.similarity`).
         similarity: how it was made from the measured one.
         kinds: the effects that may be named.
         noise: of the records without the hum.

@@ -17,8 +17,8 @@ from scipy.special import chdtri
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import linear_coefficients, resonance
-from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.run_noise import NoiseWithMoment
+from diagnosis.model.run_data import Data
+from diagnosis.model.run_noise import NoiseWithMoment
 from diagnosis.settings import RandomMomentSettings
 from identification.signal.filter import discretised, steady_filters
 from tunnel_sim.vocabulary.record import Array

@@ -20,9 +20,9 @@ from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
-from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import Data
 from diagnosis.search.grow import grow, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, of_more_weight, restricted
 from diagnosis.search.process_noise import (

@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
 from diagnosis.search.clock import Clock

@@ -16,7 +16,7 @@ from scipy.fft import dct, idct
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.run_data import RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.noise.bands import chance
 from diagnosis.noise.sensor_noise import estimate_variance
 from diagnosis.settings import WhereSettings

@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import resonance
-from diagnosis.likelihood.run_data import RunData
+from diagnosis.model.run_data import RunData
 from diagnosis.where.along_motion import apparent_moment, backbones, motion, phase_plane
 from diagnosis.where.excess import (
     Profile,

@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.run_data import Data, RunData
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
+from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.effects import effect_class
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion

@@ -11,14 +11,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.likelihood.prepare import prepare
-from diagnosis.likelihood.run_data import Data
+from diagnosis.model.blocks import prepare
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.joint import Joint, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.rig import Rig
+from diagnosis.model.run_data import Data
 from diagnosis.model.similar import similar_campaign
+from diagnosis.model.similarity import Similarity
 from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnosis.likelihood.prepare import prepare
+from diagnosis.model.blocks import prepare
 from diagnosis.noise import gap
 from diagnosis.noise.gap import level_p_value, trend_p_values
 from diagnosis.noise.sensor_noise import campaign_noise, noise_trend

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.nondimensional import Similarity
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.run_data import Data, RunData
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
+from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_noise import WhiteNoise
+from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest, gap_or_colour
 from diagnosis.noise.mains import Hum
 from diagnosis.noise.sensor_noise import NoiseTrend, campaign_noise, noise_trend, reading_step

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.model.similarity import Similarity
 from diagnosis.search.hypothesis import Hypothesis
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from diagnosis.facts.found import Fact, SpringError
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.model.similarity import Similarity
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted
 from diagnosis.search.rivals.rival import Rival

@@ -11,8 +11,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
-from diagnosis.likelihood.run_data import Data
-from diagnosis.likelihood.run_noise import NoiseWithMoment
+from diagnosis.model.run_data import Data
+from diagnosis.model.run_noise import NoiseWithMoment
 from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared

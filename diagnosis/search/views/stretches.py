@@ -17,10 +17,10 @@ from typing import Self
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit
-from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
-from diagnosis.likelihood.run_data import Data
 from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import Data
+from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, with_forms

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.prepare import without_long_rest
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.blocks import without_long_rest
 from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis, polish
 from diagnosis.search.prepared import Prepared

@@ -8,7 +8,7 @@ import pytest
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import comparable_runs
 from diagnosis.facts.found import Fact
-from diagnosis.likelihood.nondimensional import frequency
+from diagnosis.model.similarity import frequency
 from diagnosis.settings import Settings
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of

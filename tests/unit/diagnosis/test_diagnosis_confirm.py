@@ -13,11 +13,11 @@ from diagnosis.facts.found import Fact
 from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.run_data import Data, RunData
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig
+from diagnosis.model.run_data import Data, RunData
+from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.noise.sensor_noise import campaign_noise
 from diagnosis.settings import Settings
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.likelihood.prepare import prepare, without_start
-from diagnosis.likelihood.run_data import hermite_basis
+from diagnosis.model.blocks import prepare, without_start
+from diagnosis.model.run_data import hermite_basis
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, angle_of, with_records
 

@@ -17,9 +17,9 @@ from diagnosis.likelihood.least_squares import (
     scaled_residuals,
     sensitivities,
 )
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem, condensed
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from tests.marks import slow
 from tests.reference import free_decays

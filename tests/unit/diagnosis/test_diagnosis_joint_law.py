@@ -9,8 +9,8 @@ import pytest
 
 from diagnosis import read_model
 from diagnosis.likelihood.least_squares import scaled_residuals
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import with_law
 from diagnosis.model.parameters import Point
 from diagnosis.model.similar import similar_campaign

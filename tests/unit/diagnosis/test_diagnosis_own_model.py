@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose, read_model, vocabulary
 from diagnosis.facts.patch import NativeClosure
-from diagnosis.likelihood.prepare import prepare
+from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import reach, with_law
 from diagnosis.model.similar import similar_campaign
 from diagnosis.search.investigate import investigate

@@ -11,10 +11,10 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import fit_at
 from diagnosis.likelihood.paths import COMMON, SINGLE, paths, ranges
-from diagnosis.likelihood.prepare import prepare, without_long_rest, without_rest, without_start
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import resonance
 from diagnosis.likelihood.starting_points import misses_motion, starting_points
+from diagnosis.model.blocks import prepare, without_long_rest, without_rest, without_start
 from diagnosis.model.parameters import Point
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, is_plausible

@@ -9,8 +9,8 @@ from scipy.signal import lfilter, lsim
 from scipy.stats import binom
 
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.run_noise import NoiseWithMoment
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.run_noise import NoiseWithMoment
 from diagnosis.search import process_noise as pn
 from diagnosis.search import random_moments
 from diagnosis.search.grow import grow

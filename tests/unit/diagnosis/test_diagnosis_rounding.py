@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from diagnosis import vocabulary
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.residuals import misfit
+from diagnosis.model.blocks import prepare
 from diagnosis.noise.rounding import Rounded
 from diagnosis.noise.sensor_noise import (
     campaign_noise,

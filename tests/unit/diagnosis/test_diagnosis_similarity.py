@@ -7,13 +7,13 @@ import pytest
 
 from diagnosis import diagnose, vocabulary
 from diagnosis.answer.units import own_next_run
-from diagnosis.likelihood.nondimensional import (
+from diagnosis.model.similar import similar_campaign
+from diagnosis.model.similarity import (
     REFERENCE_FREQUENCY,
     REFERENCE_STIFFNESS,
     Similarity,
     frequency,
 )
-from diagnosis.model.similar import similar_campaign
 from diagnosis.search.investigate import investigate
 from tests.marks import slow
 from tests.reference import free_decays

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from diagnosis.likelihood.least_squares import fit, fit_at
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import residual_spectra, resonance, wind_line
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import misses_motion, nominal_start, project_out, starting_points
+from diagnosis.model.blocks import prepare
 from diagnosis.model.joint import Joint
 from diagnosis.model.parameters import Point
+from diagnosis.model.run_noise import WhiteNoise
 from tests.reference import free_decays
 from tests.reference.free_decays import Setting, Truth
 from tests.unit.gap_campaigns import CN_BETA, INERTIA, campaign, nominal

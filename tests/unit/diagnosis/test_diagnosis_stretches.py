@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.likelihood.least_squares import FitError, fit
-from diagnosis.likelihood.nondimensional import REFERENCE_FREQUENCY
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
+from diagnosis.model.similarity import REFERENCE_FREQUENCY
 from diagnosis.search.grow import grow
 from diagnosis.search.prepared import fit_nominal
 from diagnosis.search.views.stretches import InStretches, fit_longer, in_stretches, long_stretch, spread_out

@@ -9,11 +9,11 @@ import pytest
 
 from diagnosis.answer.reported import compare
 from diagnosis.likelihood.least_squares import fit, scaled_residuals
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.run_data import hermite_basis
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import hermite_basis
 from diagnosis.noise.mains import refine_frequency, remove_hum
 from diagnosis.noise.sensor_noise import campaign_noise, scattered_variance
 from diagnosis.settings import Settings

@@ -12,10 +12,10 @@ from scipy.stats import binom
 from diagnosis.answer.assemble import localise
 from diagnosis.facts.found import Fact, Nowhere
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.prepare import without_start
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.likelihood.starting_points import nominal_start, starting_points
+from diagnosis.model.blocks import without_start
 from diagnosis.settings import Settings
 from diagnosis.where.along_motion import apparent_moment, backbones, drift
 from diagnosis.where.excess import RunExcess, run_excesses, shortest_interval

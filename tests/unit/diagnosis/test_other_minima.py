@@ -10,9 +10,9 @@ import pytest
 
 from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.other_minima import deepest
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from tests.reference.rigs import rig
 from tunnel_reference.conditions import Conditions, Input, Rod

@@ -11,19 +11,19 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.partial import refit_releases
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Parameter, Point, Prior
 from diagnosis.model.rig import Rig
+from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from diagnosis.likelihood.run_data import Data, RunData
+    from diagnosis.model.run_data import Data, RunData
 
 INERTIA, DAMPING, NOISE, RATE = 0.1, 0.05, 2e-4, 200.0
 SPRINGS = (16.0, 16.0, 30.0, 30.0, 44.0, 44.0)

@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point
 from diagnosis.model.similar import similar_campaign
 from diagnosis.noise.sensor_noise import LEAST_SAMPLES, driven_variance

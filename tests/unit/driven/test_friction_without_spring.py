@@ -10,11 +10,11 @@ import pytest
 
 from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.nondimensional import REFERENCE_INERTIA
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.model.similar import similar_campaign
+from diagnosis.model.similarity import REFERENCE_INERTIA
 from diagnosis.result import Diagnosis
 from diagnosis.search.views.by_moment import by_moment
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.likelihood.nondimensional import Similarity
+from diagnosis.model.similarity import Similarity
 from diagnosis.result import Diagnosis, ParameterEstimate
 from tests.unit.gap_campaigns import campaign
 from tests.unit.own_effects import CUBIC, DETENT, EFFECTS_FILE, OwnCubic

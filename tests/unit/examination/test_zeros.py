@@ -9,9 +9,9 @@ import pytest
 from decays import CN_BETA, INERTIA, campaign, reading, run
 
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.prepare import prepare
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
+from diagnosis.model.blocks import prepare
 from diagnosis.noise.sensor_noise import campaign_noise
 from diagnosis.settings import Settings
 from identification import identify

@@ -22,8 +22,8 @@ from diagnosis.answer.coefficients import (
 from diagnosis.answer.linear_theory import beside, starts_beside
 from diagnosis.answer.units import own_estimate
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.nondimensional import Similarity
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.similarity import Similarity
 from diagnosis.result import ParameterEstimate
 from diagnosis.settings import Settings
 from identification.printing import estimated

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from diagnosis.answer.held_out import HeldOut, predict_held_out
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.likelihood.run_data import Data, RunData, folds
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.rig import Rig
+from diagnosis.model.run_data import Data, RunData, folds
+from diagnosis.model.run_noise import WhiteNoise
 from diagnosis.patch.patched_model import native_closure
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import effect_class

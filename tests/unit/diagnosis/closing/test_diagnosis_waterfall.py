@@ -20,8 +20,8 @@ from diagnosis.answer.held_out import (
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.partial import fit_seen
 from diagnosis.likelihood.problem import Problem
-from diagnosis.likelihood.run_data import FOLDS
 from diagnosis.likelihood.starting_points import starting_points
+from diagnosis.model.run_data import FOLDS
 from diagnosis.result import Candidate
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.process_noise import ProcessNoise, SpectrumPart

@@ -6,11 +6,11 @@ import dataclasses
 
 import numpy as np
 
-from diagnosis.likelihood.nondimensional import AS_MEASURED, Similarity
-from diagnosis.likelihood.run_data import Data, RunData, Samples
-from diagnosis.likelihood.run_noise import WhiteNoise
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.run_data import Data, RunData, Samples
+from diagnosis.model.run_noise import WhiteNoise
+from diagnosis.model.similarity import AS_MEASURED, Similarity
 from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment
 from tunnel_sim.vocabulary.campaign import Campaign, Run

@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.likelihood.nondimensional import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
-from diagnosis.likelihood.run_noise import RunNoise
 from diagnosis.model.nominal import NominalModel
+from diagnosis.model.run_noise import RunNoise
+from diagnosis.model.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
