@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 
 import numpy as np
 
 from diagnosis.answer.candidates import candidates, inclusion
-from diagnosis.answer.coefficients import before_the_causes, coefficients, possible_answers
+from diagnosis.answer.coefficients import Answers, before_the_causes, coefficients, possible_answers
 from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
-from diagnosis.facts.checks import NoiseSummary
-from diagnosis.facts.closure import PATCHED
+from diagnosis.facts.checks import Confirmation, NoiseSummary
+from diagnosis.facts.closure import PATCHED, Waterfall
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
-from diagnosis.result import Coefficients, Diagnosis, Where
-from diagnosis.search.study import Study
+from diagnosis.facts.remainder import Remainder
+from diagnosis.result import Coefficients, Diagnosis, GapSummary, Where
+from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN, main_effect
 from diagnosis.where.described import described, nowhere
 from diagnosis.where.maps import Maps
@@ -78,55 +79,27 @@ def assemble(
         patched: the model given with the causes written into it; the share closed is then its own.
         kinds: the effects that may act unnamed beside those of an answer.
     """
-    base, settings = excess_base(study), study.settings
-    chosen = study.chosen
-    nominal_out = predict_held_out(study.nominal)
-    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
-    begun = time.perf_counter()
-    shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
-    seconds = {**study.seconds, "confirmation": time.perf_counter() - begun}
-    gap = gap_summary(study, base, shown)
-    weighed = candidates(study, base)
-    data = study.nominal.problem.data
-    begun = time.perf_counter()
-    steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
-    gap = held_out_totals(gap, steps)
-    if patched is not None and study.named:
-        on = f"{patched.closure.on}, {PATCHED}"
-        gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
-    seconds["waterfall"] = time.perf_counter() - begun
+    chosen, settings, similarity = study.chosen, study.settings, study.similarity
+    weighed = candidates(study, excess_base(study))
+    closes = _closes(study, patched)
     begun = time.perf_counter()
     rig = study.campaign.rig
     answers = possible_answers(study, kinds)
     after = coefficients(answers, study.campaign)
     before = before_the_causes(study.nominal, after) if study.causes else after
     found = Coefficients(sized_coefficients(before, rig), sized_coefficients(after, rig))
-    seconds["coefficients"] = time.perf_counter() - begun
-    similarity, names = study.similarity, coefficients_of(chosen)
-    stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
-    moved = {
-        name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
-        for (name, given), coefficient in zip(found.after.items(), names, strict=False)
-    }
-    left = remainder(study, stated, moved, steps.steps[-1].excess, answers.hidden)
-    rivals = [
-        answer
-        for answer in study.answers[1:]
-        if study.named
-        and answer.probability >= settings.answer.rivals_from
-        and answer.effects != UNKNOWN
-        and not set(study.fitted) <= set(answer.effects)
-    ]
+    seconds = {**study.seconds, **closes.seconds, "coefficients": time.perf_counter() - begun}
+    rivals = _rivals(study)
     fitted = [answer.hypothesis.fit for answer in rivals if answer.hypothesis is not None]
     noise = study.prepared.noise
     of_answer = cautions(
-        study.campaign, noise, gap.runs, shown.confirmation, named=study.named, settings=settings
+        study.campaign, noise, closes.gap.runs, closes.confirmation, named=study.named, settings=settings
     )
     caveats = (*left_out, *of_answer, *outside_the_fits(study))
     return Diagnosis(
         campaign=study.campaign.name,
         causes=study.causes,
-        gap=gap,
+        gap=closes.gap,
         where=where,
         maps=maps.to_json_dict(),
         candidates=weighed,
@@ -135,22 +108,72 @@ def assemble(
         ),
         next_run=separating_run(chosen, fitted[0]) if fitted and chosen is not study.nominal else None,
         coefficients=found,
-        confirmation=shown.confirmation,
+        confirmation=closes.confirmation,
         noise=NoiseSummary(
             noise.std,
             None if noise.stated_variance is None else float(np.sqrt(noise.stated_variance)),
             noise.source,
         ),
         hidden=own_hidden(answers.hidden, after, study.campaign, similarity, study.model),
-        blind_spots=study.model.blind_spots(data),
+        blind_spots=study.model.blind_spots(study.nominal.problem.data),
         seconds=seconds,
         provenance={
             "versions": {name: version(name) for name in _PACKAGES},
             "settings": settings.differences(),
         },
         inclusion=inclusion(weighed, study.read_off, settings.gap),
-        waterfall=steps,
-        rest=left,
+        waterfall=closes.steps,
+        rest=_remains(study, found, answers, closes.steps),
         model=patched,
         found=beside_the_numbers(study, said, before, after, caveats),
     )
+
+
+@dataclass(frozen=True)
+class _Closes:
+    """How far the gap closes on what is held out of the fits."""
+
+    gap: GapSummary
+    steps: Waterfall
+    confirmation: Confirmation
+    seconds: Mapping[str, float]  # by step
+
+
+def _closes(study: Study, patched: PatchedModel | None) -> _Closes:
+    """The gap before and after by MuJoCo, and as the causes are added."""
+    base, chosen = excess_base(study), study.chosen
+    nominal_out = predict_held_out(study.nominal)
+    chosen_out = nominal_out if chosen is study.nominal else predict_held_out(chosen)
+    begun = time.perf_counter()
+    shown = report_fits(study.nominal, chosen, nominal_out, chosen_out)
+    reported = time.perf_counter()
+    steps = waterfall(study, base, {study.nominal: nominal_out, chosen: chosen_out})
+    gap = held_out_totals(gap_summary(study, base, shown), steps)
+    if patched is not None and study.named:
+        on = f"{patched.closure.on}, {PATCHED}"
+        gap = replace(gap, closed=patched.closure.native_closed, closed_on=on)
+    seconds = {"confirmation": reported - begun, "waterfall": time.perf_counter() - reported}
+    return _Closes(gap, steps, shown.confirmation, seconds)
+
+
+def _remains(study: Study, found: Coefficients, answers: Answers, steps: Waterfall) -> Remainder:
+    """What the answer leaves of the gap, and how far that may move the coefficients."""
+    similarity, chosen = study.similarity, study.chosen
+    stated = {name: own_estimate(given, similarity) for name, given in found.after.items()}
+    moved = {
+        name: similarity.own(coefficient_move(chosen, coefficient), given.unit)
+        for (name, given), coefficient in zip(found.after.items(), coefficients_of(chosen), strict=False)
+    }
+    return remainder(study, stated, moved, steps.steps[-1].excess, answers.hidden)
+
+
+def _rivals(study: Study) -> list[Answer]:
+    """The probable answers beside the first that are not it with more causes; none where nothing is named."""
+    return [
+        answer
+        for answer in study.answers[1:]
+        if study.named
+        and answer.probability >= study.settings.answer.rivals_from
+        and answer.effects != UNKNOWN
+        and not set(study.fitted) <= set(answer.effects)
+    ]

@@ -15,7 +15,8 @@ from diagnosis.likelihood.residuals import CHANNELS, misfit
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
-from tunnel_sim.effects.parameters import Circumstances, ParameterInfo
+from tunnel_sim.effects.evidence import Sought
+from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
 _NEARER = 0.02  # of the size that linear theory gives an effect
@@ -73,69 +74,81 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     data = base.problem.data
     if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
         return []
-    found: list[StartingPoint] = []
     if kind.own_numbers(1):
-        for one in filter(None, kind.sought(ResidualsOf(base))):
-            of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
-            fixed = (*base.problem.fixed, *(of_input if data.driven else ()))
-            instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
-            effects = (*base.problem.effects, kind)
-            problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, instants=instants)
-            infos = zip(one.values, _own_parameters(problem, kind), strict=True)
-            values = [np.clip(value, info.lower, info.upper) for value, info in infos]
-            release = np.column_stack([base.point.release, one.numbers])
-            point = Point(np.concatenate([base.point.common, values]), release)
-            predicted = misfit(base).excess
-            predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= one.drop
-            found.append(StartingPoint(problem, point, one.drop, predicted, base.point.common.size))
-        return sorted(found, key=lambda start: -start.predicted_drop)
-    for trial in kind.trials(_circumstances(data)):
-        spring = kind.chosen_spring()
-        held = {} if spring is None else {spring: trial.values[spring]}
-        fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
-        freed = any(info.form and info.name in trial.values for info in kind.parameters())
-        free_forms = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
-        effects = (*base.problem.effects, kind)
-        problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=free_forms)
-        own = _own_parameters(problem, kind)
-        scaled = None if trial.scaled is None else [info.name for info in own].index(trial.scaled)
-        sizes = np.array([trial.values.get(info.name, info.default) for info in own])
-        names = base.problem.names
-        replaced = names.index(trial.replaces) if trial.replaces in names else None
-        change = _moderate_change(base, problem, sizes, scaled, replaced)
-        if change is None:
-            continue
-        moved = None
-        if trial.second_order:
-            moved = absorbed(base, change)
-            change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
-        left = project_out(base, change)
-        power = sum(float(c @ c) for c in left)
-        if not 0.0 < power < np.inf:
-            continue
-        slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
-        if moved is not None and slope <= 0.0:
-            continue
-        start, drop = sizes.copy(), slope * slope * power
-        if scaled is not None:
-            by = slope if moved is None else np.sqrt(slope)
-            moderate = np.clip(by * sizes[scaled], -trial.at_most, trial.at_most)
-            start[scaled] = np.clip(moderate, own[scaled].lower, own[scaled].upper)
-            if start[scaled] == 0.0:
-                start[scaled], drop = 0.01 * sizes[scaled], 0.0
-            if replaced is not None:
-                start[scaled] = min(start[scaled], base.point.common[replaced])
-        point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
-        if moved is not None and scaled is not None:
-            part = start[scaled] / sizes[scaled]
-            point.common[: moved.common.size] += part * (moved.common - base.point.common)
-            release = point.release + part * (moved.release - base.point.release)
-            point = clip(problem, Point(point.common, release))
-        place = None if scaled is None else base.point.common.size + scaled
-        after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
-        predicted = misfit(base, after).excess
-        found.append(StartingPoint(problem, point, drop, predicted, place, trial.second_order))
+        found = [_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one]
+    else:
+        tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(data)))
+        found = [start for start in tried if start is not None]
     return sorted(found, key=lambda start: -start.predicted_drop)
+
+
+def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint:
+    """An effect with a phase or instants in every run, as it was found in the residuals."""
+    of_input = tuple((f"{kind.name}.{i.name}", one.of_input) for i in kind.parameters() if i.of_input)
+    fixed = (*base.problem.fixed, *(of_input if base.problem.data.driven else ()))
+    instants = one.numbers.shape[-1] if kind.skips else base.problem.instants
+    effects = (*base.problem.effects, kind)
+    problem = dataclasses.replace(base.problem, effects=effects, fixed=fixed, instants=instants)
+    infos = zip(one.values, _own_parameters(problem, kind), strict=True)
+    values = [np.clip(value, info.lower, info.upper) for value, info in infos]
+    release = np.column_stack([base.point.release, one.numbers])
+    point = Point(np.concatenate([base.point.common, values]), release)
+    predicted = misfit(base).excess
+    predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= one.drop
+    return StartingPoint(problem, point, one.drop, predicted, base.point.common.size)
+
+
+def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
+    """An effect of the size that closes most by linear theory; None where it changes nothing that counts."""
+    problem = _tried(base, kind, trial)
+    own = _own_parameters(problem, kind)
+    scaled = None if trial.scaled is None else [info.name for info in own].index(trial.scaled)
+    sizes = np.array([trial.values.get(info.name, info.default) for info in own])
+    names = base.problem.names
+    replaced = names.index(trial.replaces) if trial.replaces in names else None
+    change = _moderate_change(base, problem, sizes, scaled, replaced)
+    if change is None:
+        return None
+    moved = None
+    if trial.second_order:
+        moved = absorbed(base, change)
+        change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
+    left = project_out(base, change)
+    power = sum(float(c @ c) for c in left)
+    if not 0.0 < power < np.inf:
+        return None
+    slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
+    if moved is not None and slope <= 0.0:
+        return None
+    start, drop = sizes.copy(), slope * slope * power
+    if scaled is not None:
+        by = slope if moved is None else np.sqrt(slope)
+        moderate = np.clip(by * sizes[scaled], -trial.at_most, trial.at_most)
+        start[scaled] = np.clip(moderate, own[scaled].lower, own[scaled].upper)
+        if start[scaled] == 0.0:
+            start[scaled], drop = 0.01 * sizes[scaled], 0.0
+        if replaced is not None:
+            start[scaled] = min(start[scaled], base.point.common[replaced])
+    point = Point(_with_effect(base, start, scaled, replaced), base.point.release)
+    if moved is not None and scaled is not None:
+        part = start[scaled] / sizes[scaled]
+        point.common[: moved.common.size] += part * (moved.common - base.point.common)
+        release = point.release + part * (moved.release - base.point.release)
+        point = clip(problem, Point(point.common, release))
+    place = None if scaled is None else base.point.common.size + scaled
+    after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
+    return StartingPoint(problem, point, drop, misfit(base, after).excess, place, trial.second_order)
+
+
+def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
+    """A problem with one more effect, with what a trial holds and frees."""
+    spring = kind.chosen_spring()
+    held = {} if spring is None else {spring: trial.values[spring]}
+    fixed = (*base.problem.fixed, *((f"{kind.name}.{name}", value) for name, value in held.items()))
+    freed = any(info.form and info.name in trial.values for info in kind.parameters())
+    free_forms = (*base.problem.free_forms, kind.name) if freed else base.problem.free_forms
+    effects = (*base.problem.effects, kind)
+    return dataclasses.replace(base.problem, effects=effects, fixed=fixed, free_forms=free_forms)
 
 
 def second_order_starts(base: Fit, kind: type[Effect]) -> list[StartingPoint]:

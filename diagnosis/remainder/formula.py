@@ -185,20 +185,10 @@ def choose(unexplained: Unexplained, kind: str, closable: float) -> Formula | No
 
 
 def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | None:
-    of_reading = kind == "reading"
-    if of_reading and unexplained.paths[0].run.derivative:
-        return None  # an effect's reading is an angle
-    candidates = terms(kind, unexplained.ranges)
-    if kind == "wind":
-        fast = [Term("V*" + term.text, term.inner) for term in candidates if "r" in term.formula.names]
-        candidates = [Term("V^2*" + term.text, term.inner) for term in candidates] + fast
-    elif not of_reading and len({path.stiffness for path in unexplained.paths}) > 1:
-        candidates += [
-            Term("Kr*" + term.text, term.inner) for term in candidates if "b" in term.formula.names
-        ]
+    candidates = _candidates(unexplained, kind)
     if not candidates:
         return None
-    columns = []
+    of_reading, columns = kind == "reading", []
     for path in unexplained.paths:
         places: dict[str, float | Array] = {
             "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
@@ -210,12 +200,48 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         columns.append(path.seen(values) if of_reading else path.response(values))
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = unexplained.normals([c / size for c in columns])
-    # terms are added as long as each pays on held-out runs
+    chosen, gained = _paying(unexplained, parts, closable)
+    while sum(1 + len(candidates[i].inner) for i in chosen) > limits.OWN_PARAMETERS:
+        chosen.pop()
+    if not chosen:
+        return None
+    solution = Ridge(_of(total(parts), chosen), 0.0).solution
+    common = unexplained.size.size
+    return Formula(
+        tuple(candidates[i] for i in chosen),
+        tuple(float(v) for v in solution[common:] / size[chosen]),
+        of_reading,
+        solution[:common] / unexplained.size,
+        gained,
+    )
+
+
+def _candidates(unexplained: Unexplained, kind: str) -> list[Term]:
+    """The terms that a formula of a kind may have; none where its runs can have none."""
+    of_reading = kind == "reading"
+    if of_reading and unexplained.paths[0].run.derivative:
+        return []  # an effect's reading is an angle
+    found = terms(kind, unexplained.ranges)
+    if kind == "wind":
+        fast = [Term("V*" + term.text, term.inner) for term in found if "r" in term.formula.names]
+        return [Term("V^2*" + term.text, term.inner) for term in found] + fast
+    if not of_reading and len({path.stiffness for path in unexplained.paths}) > 1:
+        found += [Term("Kr*" + term.text, term.inner) for term in found if "b" in term.formula.names]
+    return found
+
+
+def _paying(unexplained: Unexplained, parts: Sequence[Normal], closable: float) -> tuple[list[int], float]:
+    """The terms that are added as long as each pays on held-out runs, and the fall of χ² there.
+
+    Args:
+        parts: normal equations of all terms, by unit.
+        closable: χ² that could be closed.
+    """
     whole = total(parts)
     c = whole.free
     own = np.diag(whole.matrix)[c:]
     settings = unexplained.fit.settings.remainder
-    threshold = float(chdtri(1, settings.term_rate / len(candidates)))
+    threshold = float(chdtri(1, settings.term_rate / own.size))
     before = float(unexplained.before[unexplained.seen].sum())
     chosen: list[int] = []
     gained = 0.0
@@ -240,19 +266,7 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
             break
         gained, best = max(tried)
         chosen.append(best)
-    while sum(1 + len(candidates[i].inner) for i in chosen) > limits.OWN_PARAMETERS:
-        chosen.pop()
-    if not chosen:
-        return None
-    solution = Ridge(_of(whole, chosen), 0.0).solution
-    common = unexplained.size.size
-    return Formula(
-        tuple(candidates[i] for i in chosen),
-        tuple(float(v) for v in solution[common:] / size[chosen]),
-        of_reading,
-        solution[:common] / unexplained.size,
-        gained,
-    )
+    return chosen, gained
 
 
 def _of(whole: Normal, chosen: Sequence[int]) -> Normal:

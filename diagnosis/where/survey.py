@@ -67,6 +67,20 @@ class _Samples:
     expected: list[float]  # of the power under noise
     variance: list[float]  # likewise
 
+    @classmethod
+    def of(cls, nominal: Fit, scaled: Fit, excesses: list[RunExcess], beyond: tuple[str, ...]) -> _Samples:
+        """The residuals of a fit in the bands that show the gap."""
+        runs = nominal.problem.data.runs
+        inside = [within_bands(r, run, beyond) for r, run in zip(scaled.residuals, excesses, strict=True)]
+        return cls(
+            [_times(nominal, i) for i in range(len(runs))],
+            [np.hypot(*motion(scaled, i)) for i in range(len(runs))],
+            [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
+            [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
+            # squares of filtered noise are correlated: as many are independent as coefficients pass
+            [2.0 * share / run.block**2 for (_, share), run in zip(inside, runs, strict=True)],
+        )
+
     def over(self, edges: Array, place: list[Array]) -> Profile:
         return profile(edges, place, self.power, self.expected, self.variance)
 
@@ -86,30 +100,11 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
     bands = band_excesses(excesses)
     settings = nominal.settings.where
     beyond = bands_beyond_chance(bands, settings)
-    inside = [within_bands(r, run, beyond) for r, run in zip(scaled.residuals, excesses, strict=True)]
-    samples = _Samples(
-        [_times(nominal, i) for i in range(len(runs))],
-        [np.hypot(*motion(scaled, i)) for i in range(len(runs))],
-        [r**2 / run.block for (r, _), run in zip(inside, runs, strict=True)],
-        [share / run.block for (_, share), run in zip(inside, runs, strict=True)],
-        # squares of filtered noise are correlated: as many are independent as coefficients pass
-        [2.0 * share / run.block**2 for (_, share), run in zip(inside, runs, strict=True)],
-    )
+    samples = _Samples.of(nominal, scaled, excesses, beyond)
     longest = max(float(time[-1] + 0.5 * (time[1] - time[0])) for time in samples.time)
     instants = np.linspace(0.0, longest, _TIME_BINS + 1)
     widest = 1.0001 * max(float(a.max()) for a in samples.amplitude)
-    # energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance
-    energy, variance = np.zeros(instants.size - 1), 0.0
-    for index, whole in enumerate(samples.time):
-        apparent = apparent_moment(nominal, index)
-        if apparent is None:
-            continue
-        spread = float(apparent.kernel @ apparent.kernel) * apparent.noise_std**2
-        time = whole[apparent.start : apparent.start + apparent.moment.size]
-        energy += np.histogram(time, instants, weights=apparent.moment**2 / spread - 1.0)[0]
-        # neighbours within the kernel are correlated
-        variance += 2.0 * apparent.moment.size * apparent.kernel.size
-    z = float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
+    energy, z = _moment_energy(nominal, samples.time, instants)
     edges = _log_edges(excesses)
     resonances = [run.resonance for run in excesses]
     by_run = [
@@ -141,16 +136,41 @@ def survey(nominal: Fit, scaled: Fit, excesses: list[RunExcess], chosen: tuple[s
         grid=_grid(samples, runs, np.linspace(0.0, widest, _GRID_ROWS + 1), seconds),
         unit=similarity.reading,
     )
-    # the shortest interval that holds most of the excess of the bands that show the gap
+    return Survey(maps, excesses, _frequency_interval(nominal, excesses, beyond), energy, z)
+
+
+def _moment_energy(nominal: Fit, times: Sequence[Array], instants: Array) -> tuple[Array, float]:
+    """Energy of the apparent moment by time, in variances of its noise, and how far its sum is beyond chance.
+
+    Args:
+        times: of the residuals, by run, shape (n,), s.
+        instants: edges of the bins, shape (m + 1,), s.
+    """
+    energy, variance = np.zeros(instants.size - 1), 0.0
+    for index, whole in enumerate(times):
+        apparent = apparent_moment(nominal, index)
+        if apparent is None:
+            continue
+        spread = float(apparent.kernel @ apparent.kernel) * apparent.noise_std**2
+        time = whole[apparent.start : apparent.start + apparent.moment.size]
+        energy += np.histogram(time, instants, weights=apparent.moment**2 / spread - 1.0)[0]
+        # neighbours within the kernel are correlated
+        variance += 2.0 * apparent.moment.size * apparent.kernel.size
+    return energy, float(energy.sum()) / float(np.sqrt(max(variance, 1.0)))
+
+
+def _frequency_interval(
+    nominal: Fit, excesses: list[RunExcess], beyond: tuple[str, ...]
+) -> tuple[float, float] | None:
+    """The shortest interval of frequency that holds most of the excess of the bands that show the gap, Hz."""
     kept = [replace(run, power=np.where(run.inside(beyond), run.power, 1.0)) for run in excesses]
     high = max(float(run.frequency[-1]) for run in excesses)
     # no bin is narrower than the shortest record resolves
     resolved = max(float(run.frequency[1]) for run in excesses)
     fine = np.linspace(0.0, high * 1.0001, max(2, min(_FINE_BINS, int(high / resolved))) + 1)
-    interval = _spectrum(kept, fine).interval(settings.interval_share)
-    if interval is not None:
-        interval = similarity.own(interval[0], "Hz"), similarity.own(interval[1], "Hz")
-    return Survey(maps, excesses, interval, energy, z)
+    interval = _spectrum(kept, fine).interval(nominal.settings.where.interval_share)
+    own = nominal.problem.data.similarity.own
+    return None if interval is None else (own(interval[0], "Hz"), own(interval[1], "Hz"))
 
 
 def with_answer(found: Survey, campaign: Campaign, nominal: Fit, answer: Fit) -> Maps:
