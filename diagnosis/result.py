@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from diagnosis.facts.checks import Confirmation, NoiseSummary
-from diagnosis.facts.closure import Misfit, Waterfall
+from diagnosis.facts.closure import Confirmation, Misfit, NoiseSummary, Waterfall
 from diagnosis.facts.decision import Decision, decision
 from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Closable, Remainder
 from diagnosis.settings import settings_of
-from diagnosis.words.lines import diagnosis_brief, diagnosis_parts
+from diagnosis.words.tables import diagnosis_brief, diagnosis_parts
 from diagnosis.words.written import sentences
 from identification.estimate import as_pandas, wide_frame
 from identification.printing import as_html, as_text

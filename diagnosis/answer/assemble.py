@@ -17,8 +17,7 @@ from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
-from diagnosis.facts.checks import Confirmation, NoiseSummary
-from diagnosis.facts.closure import PATCHED, Waterfall
+from diagnosis.facts.closure import PATCHED, Confirmation, NoiseSummary, Waterfall
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Remainder

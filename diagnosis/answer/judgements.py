@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
-from diagnosis.facts.checks import Confirmation
+from diagnosis.facts.closure import Confirmation
 from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError
 from diagnosis.facts.remainder import Move, Remainder
 from diagnosis.likelihood.residuals import CHANNELS, misfit

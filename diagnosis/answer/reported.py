@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from diagnosis.answer.held_out import Base, HeldOut
-from diagnosis.facts.checks import Confirmation
-from diagnosis.facts.closure import FITTED, ON_RUNS, Misfit, Waterfall, share_closed
+from diagnosis.facts.closure import FITTED, ON_RUNS, Confirmation, Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.problem import Problem, blocks_beyond, campaign_rig, condensed, sample_means
 from diagnosis.model.parameters import Point

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,7 +33,6 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
-from diagnosis.search.clock import Clock
 from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.settings import Settings
@@ -212,3 +213,29 @@ def fit_nominal(data: Data) -> Fit:
         ) from error
     refuse_indefinite(found)
     return found
+
+
+Progress = Callable[[str], None]
+
+
+class Clock:
+    """Wall time by step, and the progress call.
+
+    Args:
+        progress: called with the name of each step as it begins; None: nothing is called.
+    """
+
+    def __init__(self, progress: Progress | None = None) -> None:
+        #: By name of the step, s.
+        self.seconds: dict[str, float] = {}
+        self.progress = progress
+        self._last = ""
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        """Time a step, which is announced unless it goes on."""
+        if self.progress is not None and name != self._last:
+            self.progress(name)
+        self._last, begun = name, time.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun

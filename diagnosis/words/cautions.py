@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from diagnosis.words.names import Document, plain
-from diagnosis.words.numbers import part
+from diagnosis.words.numbers import Document, part, plain
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 

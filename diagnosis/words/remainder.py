@@ -6,8 +6,7 @@ from typing import Any
 
 from diagnosis.facts.remainder import Ceiling
 from diagnosis.settings import settings_of
-from diagnosis.words.names import KINDS, Document, plain
-from diagnosis.words.numbers import change_up_to, noise_powers, percent
+from diagnosis.words.numbers import KINDS, Document, change_up_to, noise_powers, percent, plain
 from identification.printing import COEFFICIENTS, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 

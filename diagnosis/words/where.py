@@ -7,8 +7,7 @@ from math import degrees
 from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
-from diagnosis.words.names import BANDS, CONDITIONS, PLACES, Document, plain
-from diagnosis.words.numbers import part
+from diagnosis.words.numbers import BANDS, CONDITIONS, PLACES, Document, part, plain
 from identification.printing import p_text
 from tunnel_sim.effects import effect_class
 

@@ -9,8 +9,7 @@ import polars as pl
 import pytest
 
 from diagnosis import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, RunGap, Where
-from diagnosis.facts.checks import Confirmation, NoiseSummary
-from diagnosis.facts.closure import ON_RUNS
+from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary
 from identification import Estimate, Quantity, Remark, RunEstimate, Status, WindowEstimate
 from identification.printing import TextTable, as_html, as_text
 from identification.status import Outcome

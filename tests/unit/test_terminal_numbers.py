@@ -15,15 +15,16 @@ import pytest
 from rich.table import Table
 
 from diagnosis.words import tables
-from diagnosis.words.lines import closing_lines, inclusion_line
-from diagnosis.words.next_steps import rival_lines, run_words
 from diagnosis.words.numbers import probability, share
 from diagnosis.words.tables import (
     candidates_table,
+    closing_lines,
     gap_table,
+    inclusion_line,
     parameters_table,
     waterfall_table,
 )
+from diagnosis.words.verdict import rival_lines, run_words
 from identification.estimate import Estimate, Quantity, RunEstimate, WindowEstimate
 from identification.printing import TextTable, coefficients_table, status_lines
 from identification.status import Status

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import tomli_w
 from nicegui import ui
 
-from diagnosis.words.names import plain
+from diagnosis.words.numbers import plain
 from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import (
     Fault,
@@ -176,7 +176,7 @@ class Answer:
     """The answer: in words, in figures, and by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from diagnosis.words import lines, next_steps, remainder, tables
+        from diagnosis.words import remainder, tables, verdict
         from diagnosis.words.verdict import headline
         from tunnel_lab.report.view import facts
 
@@ -193,13 +193,13 @@ class Answer:
             )
         self._figures = ui.element("div").classes("figures")
         ui.timer(0.0, lambda: self._draw(document), once=True)
-        show_parts([lines.where_line(document), *next_steps.rival_lines(document)])
+        show_parts([tables.where_line(document), *verdict.rival_lines(document)])
         show_parts([tables.candidates_table(document), tables.parameters_table(document)])
         show_parts([tables.waterfall_table(document), tables.coefficients_table(document)])
         with ui.expansion("What remains, the runs, and caveats"):
             rest, closable = remainder.rest_line(document), remainder.closable_line(document)
             show_parts([rest, closable, tables.closable_table(document)])
-            show_parts([tables.gap_table(document), *lines.closing_lines(document)])
+            show_parts([tables.gap_table(document), *tables.closing_lines(document)])
         if document["gap"]["detected"]:
             ByHandPart(session, document)
 
@@ -304,7 +304,7 @@ def show_closure(closure: Closure, document: dict[str, Any]) -> None:
 
 def build_next_run(session: Session, frame: Frame) -> None:
     """Build the page."""
-    from diagnosis.words.next_steps import next_steps, rival_lines, run_to_make, unplannable
+    from diagnosis.words.verdict import next_steps, rival_lines, run_to_make, unplannable
 
     document = read_diagnosis(session)
     assert document is not None  # else the stage is closed
@@ -326,7 +326,7 @@ class _Rivals:
     """Two answers to choose, and the run that would distinguish them."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from diagnosis.words.names import windy
+        from diagnosis.words.numbers import windy
         from tunnel_sim.effects import known_effects
 
         self._session = session
@@ -356,7 +356,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from diagnosis.words.next_steps import LEAST_SEPARATION, too_close
+        from diagnosis.words.verdict import LEAST_SEPARATION, too_close
 
         self._place.clear()
         with self._fault.around():

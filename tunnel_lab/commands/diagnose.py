@@ -226,16 +226,16 @@ def write_patch(answer: Diagnosis, path: Path) -> None:
 
 def show(document: dict[str, Any]) -> None:
     """Print an answer: the verdict in words, then the figures behind it."""
-    from diagnosis.words import lines, next_steps, remainder, tables
+    from diagnosis.words import remainder, tables, verdict
 
     say(document["verdict"])
-    for line in (lines.where_line(document), *next_steps.rival_lines(document)):
+    for line in (tables.where_line(document), *verdict.rival_lines(document)):
         if line:
             say(line)
     say("")
     answers = (tables.candidates_table, tables.parameters_table)
     show_tables(*(rich_table(table(document)) for table in answers))
-    if line := lines.inclusion_line(document):
+    if line := tables.inclusion_line(document):
         say(f"{line}\n")
     if line := remainder.closable_line(document):
         say(f"{line}\n")
@@ -244,7 +244,7 @@ def show(document: dict[str, Any]) -> None:
         tables.patch_table,
     )  # fmt: skip
     show_tables(*(rich_table(table(document)) for table in behind))
-    for line in (*lines.patch_lines(document), *lines.closing_lines(document)):
+    for line in (*tables.patch_lines(document), *tables.closing_lines(document)):
         say(line)
 
 

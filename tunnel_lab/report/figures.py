@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.settings import settings_of
-from diagnosis.words.names import plain
-from diagnosis.words.numbers import excess_std, probability
+from diagnosis.words.numbers import excess_std, plain, probability
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,

@@ -15,12 +15,17 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from diagnosis.words.lines import inclusion_line, other_answers, patch_lines
-from diagnosis.words.names import Document, plain
-from diagnosis.words.next_steps import next_steps
+from diagnosis.words.numbers import Document, plain
 from diagnosis.words.remainder import closable_line
-from diagnosis.words.tables import closable_table, hidden_table, patch_table
-from diagnosis.words.verdict import headline
+from diagnosis.words.tables import (
+    closable_table,
+    hidden_table,
+    inclusion_line,
+    other_answers,
+    patch_lines,
+    patch_table,
+)
+from diagnosis.words.verdict import headline, next_steps
 from identification.printing import COEFFICIENTS, p_text, significant, unit_mark
 from tunnel_lab.report import view
 from tunnel_lab.report.drawing import inline_svg, shown_text

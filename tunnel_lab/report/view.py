@@ -7,21 +7,25 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from diagnosis.words.causes import size_words
-from diagnosis.words.lines import listed_answers
-from diagnosis.words.names import ACTS_WHEN, Document, acts_on, plain, windy
 from diagnosis.words.numbers import (
+    ACTS_WHEN,
+    Document,
+    acts_on,
     misfit_of,
     misfit_shown,
     misfit_text,
     noise_powers,
     of_swing,
+    plain,
     probability,
     rms_shown,
     share,
     times_noise,
     unit_shown,
+    windy,
 )
+from diagnosis.words.tables import listed_answers
+from diagnosis.words.verdict import size_words
 from identification.printing import (
     UNDETERMINED,
     at_bound,

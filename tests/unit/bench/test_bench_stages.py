@@ -15,7 +15,7 @@ import pytest
 from nicegui import Client, ui
 from starlette.requests import Request
 
-from diagnosis.words.next_steps import next_steps, run_to_make
+from diagnosis.words.verdict import next_steps, run_to_make
 from identification.printing import TextTable
 from tests.unit.diagnosis_document import document
 from tests.unit.importing.import_files import decay

@@ -23,7 +23,7 @@ from diagnosis.remainder.formula import Formula, Term, choose, effect_of, effect
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.investigate import investigate
 from diagnosis.settings import Settings
-from diagnosis.words.names import KINDS
+from diagnosis.words.numbers import KINDS
 from diagnosis.words.remainder import closable_line, closable_words
 from diagnosis.words.tables import closable_table
 from tests.marks import slow

@@ -12,9 +12,9 @@ from diagnosis.likelihood.residuals import ChannelMisfit, misfit, resonance
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.search import grow as growth
-from diagnosis.search.compare import exchange, prune
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, with_forms
+from diagnosis.search.sets import exchange, prune
 from diagnosis.search.weigh import weigh
 from diagnosis.settings import Settings
 from tests.marks import slow

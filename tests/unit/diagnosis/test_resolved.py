@@ -63,7 +63,7 @@ def test_an_effect_that_only_joins_the_halves_is_not_resolved():
 
 
 def test_an_answer_with_an_effect_that_is_not_resolved_is_refused(monkeypatch):
-    monkeypatch.setattr("diagnosis.search.compare.unresolved", lambda fit: (fit.problem.effects[0].name,))
+    monkeypatch.setattr("diagnosis.search.sets.unresolved", lambda fit: (fit.problem.effects[0].name,))
     found = study("cubic_stiffness", integrated(lambda angle, _: 10.0 * angle**3))
     assert dict(found.refused) == {("cubic_stiffness",): ("cubic_stiffness",)}
     assert found.fitted == ("unknown",)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from diagnosis.facts.checks import Confirmation, NoiseSummary
+from diagnosis.facts.closure import Confirmation, NoiseSummary
 from diagnosis.facts.found import Fact, Found, Noted, Nowhere
 from diagnosis.result import Candidate, Coefficients, Diagnosis, GapSummary, ParameterEstimate, Where
 from diagnosis.settings import settings_of

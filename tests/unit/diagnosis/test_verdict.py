@@ -16,9 +16,8 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import GapSummary, ParameterEstimate, RunGap
 from diagnosis.settings import Settings
-from diagnosis.words.next_steps import next_steps
 from diagnosis.words.tables import gap_table, parameters_table
-from diagnosis.words.verdict import headline, undecided_words, verdict
+from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
 from tests.unit.diagnosis_document import campaign, document
 from tests.unit.gap_campaigns import answer, nominal, studied
 from tests.unit.gap_campaigns import campaign as campaign_with

@@ -8,8 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from diagnosis.answer.assemble import localise
-from diagnosis.facts.checks import Confirmation, NoiseSummary
-from diagnosis.facts.closure import ON_RUNS, Step, Waterfall
+from diagnosis.facts.closure import ON_RUNS, Confirmation, NoiseSummary, Step, Waterfall
 from diagnosis.facts.remainder import Ceiling, Closable, Curve
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points

@@ -16,12 +16,9 @@ import pytest
 
 from diagnosis.facts.decision import decision
 from diagnosis.settings import Settings
-from diagnosis.words.causes import size_words
-from diagnosis.words.lines import other_answers
-from diagnosis.words.next_steps import next_steps, run_words
 from diagnosis.words.numbers import noise_powers, probability
-from diagnosis.words.tables import candidates_table
-from diagnosis.words.verdict import headline, undecided_words
+from diagnosis.words.tables import candidates_table, other_answers
+from diagnosis.words.verdict import headline, next_steps, run_words, size_words, undecided_words
 from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import page as report_page

@@ -12,8 +12,7 @@ from diagnosis.answer.linear_theory import starts_beside
 from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from diagnosis.words.lines import diagnosis_parts, hidden_line
-from diagnosis.words.tables import hidden_table
+from diagnosis.words.tables import diagnosis_parts, hidden_line, hidden_table
 from tests.unit.diagnosis.test_diagnosis_noise_colour import colour, with_zero
 from tests.unit.diagnosis_document import document
 from tests.unit.gap_campaigns import CN_R, NOISE, campaign, nominal, precise, studied
