@@ -22,8 +22,8 @@ from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.mains import hum_noted
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
+from diagnosis.search.clock import Progress
 from diagnosis.search.investigate import investigate
-from diagnosis.search.prepared import Progress
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.study import Study

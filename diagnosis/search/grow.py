@@ -10,8 +10,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
+from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, of_more_weight, own_gain, turned_back
-from diagnosis.search.prepared import Progress
 from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
 from tunnel_sim.effects import Effect
 

@@ -11,7 +11,8 @@ from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
-from diagnosis.search.prepared import Clock, Progress, prepared_and_tested
+from diagnosis.search.clock import Clock, Progress
+from diagnosis.search.prepared import prepared_and_tested
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.sets import Sets, compared

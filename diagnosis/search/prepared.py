@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,6 +31,7 @@ from diagnosis.noise.sensor_noise import (
     reading_step,
     typical_step,
 )
+from diagnosis.search.clock import Clock
 from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.settings import Settings
@@ -213,29 +212,3 @@ def fit_nominal(data: Data) -> Fit:
         ) from error
     refuse_indefinite(found)
     return found
-
-
-Progress = Callable[[str], None]
-
-
-class Clock:
-    """Wall time by step, and the progress call.
-
-    Args:
-        progress: called with the name of each step as it begins; None: nothing is called.
-    """
-
-    def __init__(self, progress: Progress | None = None) -> None:
-        #: By name of the step, s.
-        self.seconds: dict[str, float] = {}
-        self.progress = progress
-        self._last = ""
-
-    @contextmanager
-    def step(self, name: str) -> Iterator[None]:
-        """Time a step, which is announced unless it goes on."""
-        if self.progress is not None and name != self._last:
-            self.progress(name)
-        self._last, begun = name, time.perf_counter()
-        yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
+from diagnosis.search.clock import Clock
 from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
-from diagnosis.search.prepared import Clock
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival

@@ -11,8 +11,9 @@ from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.noise.gap import GapTest
 from diagnosis.search.choices import Choice, choices
+from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.prepared import Clock, Prepared
+from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
 from diagnosis.search.sets import Names, Sets

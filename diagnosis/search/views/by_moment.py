@@ -13,8 +13,9 @@ from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.model.run_data import Data
 from diagnosis.model.run_noise import NoiseWithMoment
+from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.prepared import Clock, Prepared
+from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from diagnosis.search.weigh import UNKNOWN

@@ -21,9 +21,10 @@ from diagnosis.likelihood.starting_points import misses_motion
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.model.similarity import REFERENCE_FREQUENCY
+from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.grow import sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, with_forms
-from diagnosis.search.prepared import Clock, Prepared, Progress, fit_nominal
+from diagnosis.search.prepared import Prepared, fit_nominal
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 from tunnel_sim.effects import Effect

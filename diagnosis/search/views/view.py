@@ -9,9 +9,10 @@ from typing import ClassVar, Self
 
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
+from diagnosis.search.clock import Clock, Progress
 from diagnosis.search.grow import grow, same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
-from diagnosis.search.prepared import Clock, Prepared, Progress
+from diagnosis.search.prepared import Prepared
 from diagnosis.search.sets import Sets
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array

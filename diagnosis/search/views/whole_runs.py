@@ -8,8 +8,9 @@ from typing import ClassVar, Self
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import without_long_rest
+from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis, polish
-from diagnosis.search.prepared import Clock, Prepared
+from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View

@@ -12,8 +12,8 @@ import pytest
 from diagnosis.answer.held_out import excess_base
 from diagnosis.noise.gap import GapTest
 from diagnosis.noise.mains import Hum
+from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis
-from diagnosis.search.prepared import Clock
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.sets import Sets, resolved
 from diagnosis.search.study import Study, noise_explains

@@ -1,0 +1,32 @@
+"""Wall time of the steps of a diagnosis, and the call that says which step it is at."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Progress = Callable[[str], None]
+
+
+class Clock:
+    """Wall time by step, and the progress call.
+
+    Args:
+        progress: called with the name of each step as it begins; None: nothing is called.
+    """
+
+    def __init__(self, progress: Progress | None = None) -> None:
+        #: By name of the step, s.
+        self.seconds: dict[str, float] = {}
+        self.progress = progress
+        self._last = ""
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        """Time a step, which is announced unless it goes on."""
+        if self.progress is not None and name != self._last:
+            self.progress(name)
+        self._last, begun = name, time.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begun
