@@ -118,7 +118,11 @@ class Prepared:
         return np.asarray(left + np.maximum(np.mean(tries, axis=0), 0.0), np.float64) if tries else left
 
     def hum_power(self, base: Fit, share: float = 1.0) -> Array:
-        """χ² by channel of a share of the hum that was removed, in the readings of a fit, shape (6,)."""
+        """χ² by channel of the hum that was removed, in the readings of a fit, shape (6,), dimensionless.
+
+        Args:
+            share: of its power, a fraction.
+        """
         size = 0.0 if self.hum is None else share * self.hum.excess * base.count
         return np.array([size * (name == "harmonics") for name in CHANNELS])
 

@@ -41,6 +41,8 @@ class Answer(Weighed):
     """An answer, its probability and its fits.
 
     Args:
+        share: share of the gap it leaves open, at least 0.
+        probability: among all answers weighed, a fraction.
         hypothesis: its effects without a random moment; fitted to whole runs if it is the answer of the study or a
             part of it, else in the view in which it was weighed. None where it is no set of effects, or its fit to
             whole runs fails.
