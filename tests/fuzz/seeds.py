@@ -210,7 +210,7 @@ def checkpoint() -> tuple[Any, bytes]:
 def answer_document() -> dict[str, Any]:
     """A diagnosis of one cause, as JSON's types."""
     from diagnosis import result
-    from diagnosis.facts import checks
+    from diagnosis.facts import closure
     from diagnosis.facts.closure import ON_RUNS
 
     values = {
@@ -226,8 +226,8 @@ def answer_document() -> dict[str, Any]:
         result.Where("damping", "always", ("r1",), (0.0, 1.0), (0.0, 0.1)),
         (result.Candidate("coulomb_friction", 0.9, 0.1, 0.99, friction), result.Candidate("none", 0.1, 2.0, 0.0)),
         ("quadratic_damping",), None, result.Coefficients(values, values),
-        checks.Confirmation(True, 0.0, "r1", 0.0, 1e-5),
-        checks.NoiseSummary(5e-4, None, "estimated", ""),
+        closure.Confirmation(True, 0.0, "r1", 0.0, 1e-5),
+        closure.NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict() | {"wall_s": 3.0}  # fmt: skip
 
 

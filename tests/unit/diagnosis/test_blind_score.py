@@ -11,7 +11,7 @@ import pytest
 from diagnosis import result
 from diagnosis.blind.cases import case
 from diagnosis.blind.score import Score, calibration
-from diagnosis.facts import checks
+from diagnosis.facts import closure
 from diagnosis.facts.closure import ON_RUNS
 from identification.statistics import Proportion
 from tunnel_lab.report import blind
@@ -28,8 +28,8 @@ def document(causes, *, probability=0.9, closed=0.99, rivals=(), cn=(0.45, -0.12
         "c", tuple(causes),
         result.GapSummary(bool(causes), 2.0, 0.1, closed, ON_RUNS, (), 0.001, 0.5),
         result.Where(None, None), (result.Candidate(name, probability, 0.1, closed),), tuple(rivals), None,
-        result.Coefficients(values, values), checks.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
-        checks.NoiseSummary(5e-4, None, "estimated", ""),
+        result.Coefficients(values, values), closure.Confirmation(True, 0.0, "r01", 0.0, 1e-5),
+        closure.NoiseSummary(5e-4, None, "estimated", ""),
     ).to_json_dict()  # fmt: skip
 
 

@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from diagnosis.likelihood.least_squares import fit
-from diagnosis.model.blocks import in_stretches
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import RunData
 from diagnosis.model.run_noise import AutoregressiveNoise, NoiseWithMoment, RunNoise, WhiteNoise
+from diagnosis.search.views.stretches import in_stretches
 from tests.unit.gap_campaigns import CN_BETA, CN_R, DAMPING, INERTIA, NOISE, campaign, nominal
 from tunnel_sim.vocabulary.record import Array
 
