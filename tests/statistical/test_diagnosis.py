@@ -45,7 +45,7 @@ def gap_free(seed, stated=NOISE, **changes):
 
 @pytest.mark.parametrize("stated", [NOISE, None])
 def test_a_gap_free_campaign_is_given_no_cause(stated, record_property):
-    alarms = [seed for seed in range(CAMPAIGNS) if investigate(gap_free(seed, stated), ()).test.detected]
+    alarms = [seed for seed in range(CAMPAIGNS) if investigate(gap_free(seed, stated), ()).gap.test.detected]
     record_property("alarms", f"{len(alarms)} of {CAMPAIGNS}: {alarms}")
     assert len(alarms) <= binom.isf(1e-3, CAMPAIGNS, Settings().gap.detection_rate)
 
@@ -60,11 +60,11 @@ def test_planted_drift_of_the_noises_own_size_is_detected_every_time():
     """The case that must fail the test above: power half that of the noise."""
     for seed in range(20):
         drifting = with_records(gap_free(seed), lambda t, y: y + NOISE * 2.4 * t / t[-1])
-        assert investigate(drifting, ()).test.detected
+        assert investigate(drifting, ()).gap.test.detected
 
 
 def test_noise_that_is_not_the_stated_is_detected_every_time():
-    assert all(investigate(gap_free(seed, NOISE / 2.0), ()).test.detected for seed in range(10))
+    assert all(investigate(gap_free(seed, NOISE / 2.0), ()).gap.test.detected for seed in range(10))
 
 
 PLAN = """

@@ -322,7 +322,7 @@ def test_the_probability_in_words_is_that_of_the_first_candidate(found):
     doubtful = replace(found, gap=replace(found.gap, test=replace(found.gap.test, p_value=9e-4)))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]
     assert none.probability == pytest.approx(9e-4 / 1.0009)
-    read_off = replace(doubtful, coarse=True)
+    read_off = replace(doubtful, prepared=replace(doubtful.prepared, coarse=True))
     (none,) = [c for c in candidates(read_off, excess_base(read_off)) if c.effect == "none"]
     assert none.probability == 0.0
 

@@ -94,7 +94,7 @@ def test_a_pendulum_is_no_gap_to_its_own_model(tmp_path: Path, ref: float) -> No
 
 def test_without_its_model_the_same_pendulum_is_a_gap() -> None:
     data = campaign(inertia=INERTIA, damping=0.001)
-    assert investigate(data, ()).test.detected
+    assert investigate(data, ()).gap.test.detected
 
 
 def test_what_is_not_free_is_held_at_the_models_value(tmp_path: Path) -> None:

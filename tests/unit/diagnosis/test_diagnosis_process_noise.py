@@ -308,8 +308,8 @@ def test_of_sets_that_the_rounds_go_to_and_fro_between_the_likeliest_is_taken(mo
     base = nominal(buffeted(campaign(drift, spring), 0.003, 3.0))
     turns = iter(order)
 
-    def grown(start, _kinds):
-        found, chosen = start, (type(drift), type(spring))[: next(turns)]
+    def grown(view):
+        found, chosen = view.base, (type(drift), type(spring))[: next(turns)]
         for kind in chosen:
             point = starting_points(found, kind)[0]
             found = fit(point.problem, point.point)

@@ -51,7 +51,7 @@ KNOWN_IN_SEVERAL = {
 }
 
 #: Where usual settings may be made: what people call, and what has no campaign.
-VERBS = {"_diagnose.py", "by_hand.py", "investigate.py", "lead.py", "prepare.py", "__init__.py"}
+VERBS = {"_diagnose.py", "blocks.py", "by_hand.py", "investigate.py", "__init__.py"}
 
 
 def sources():
@@ -132,11 +132,11 @@ def test_an_unknown_setting_is_refused_in_one_line(name):
 
 def test_the_settings_given_decide_and_are_in_the_document():
     data = campaign()
-    assert not investigate(data, ()).test.detected
+    assert not investigate(data, ()).gap.test.detected
     everything = Settings().changed(
         {"gap.detection_rate": 1e3}
     )  # the tests share it, and no p-value is above 1
-    assert investigate(data, (), settings=everything).test.detected
+    assert investigate(data, (), settings=everything).gap.test.detected
     given = {"words.runs_without_caution": len(data.runs) + 1}
     usual, changed = (diagnose(data, settings=Settings().changed(one)).to_json_dict() for one in ({}, given))
     assert (usual["provenance"]["settings"], changed["provenance"]["settings"]) == ({}, given)

@@ -177,7 +177,7 @@ def assert_same_answer(data, first, time, moment):
     found = investigate(stretched(data, time, moment), FEW)
     assert found.causes == first.causes == ("coulomb_friction", "cubic_stiffness")
     assert found.similarity.time == pytest.approx(first.similarity.time / time, rel=1e-6)
-    known = {answer.effects: answer.probability for answer in first.weighed}
+    known = {answer.effects: answer.probability for answer in first.answers}
     for answer in found.answers:
         assert answer.probability == pytest.approx(known[answer.effects], abs=0.02)
     change, units = (
@@ -217,7 +217,7 @@ def test_a_factor_on_the_angles_leaves_the_causes(twice_caused, factor):
     )
     found = investigate(dataclasses.replace(data, sensor=sensor, runs=runs), FEW)
     assert found.causes == first.causes
-    known = {answer.effects: answer.probability for answer in first.weighed}
+    known = {answer.effects: answer.probability for answer in first.answers}
     for answer in found.answers:
         assert answer.probability == pytest.approx(known[answer.effects], abs=0.02)
     name = "cubic_stiffness.coefficient"
