@@ -92,7 +92,12 @@ class Problem:
             common: as in `Point`, shape (common,).
             own: of the run, a row of ``Point.release``, shape (own,).
         """
-        return self._values(common, own).get("zero", 0.0)
+        parameters = self.parameters
+        if "zero" in parameters.names:
+            return float(common[parameters.names.index("zero")])
+        if "zero" in parameters.own_names:
+            return float(own[parameters.own_names.index("zero")])
+        return self.data.model.held.get("zero", 0.0)
 
     def _values(self, common: Array, own: Array) -> dict[str, float]:
         """Values of all parameters in one run by name, those held among them; arguments as in `zero`."""
@@ -149,6 +154,7 @@ class Problem:
         # jobs whose moment law another run may share: the zero and, where no effect knows the time or the release,
         # the release do not matter to it
         first: dict[object, _Job] = {}
+        of_physics = self.parameters.of_physics
         for i, point in enumerate(points):
             if not np.all(np.isfinite(point.common)):
                 continue
@@ -158,7 +164,7 @@ class Problem:
             law = tuple(value for name, value in named if name != "zero")
             for r, run in enumerate(self.data.runs):
                 if np.all(np.isfinite(point.release[r])):
-                    same = law, run.conditions, *point.release[r, self.parameters.of_physics].tolist()
+                    same = law, run.conditions, *(point.release[r, place] for place in of_physics)
                     like = first.get(same) if autonomous else None
                     job = _Job(self, point, r, effects) if like is None else like.released(self, point, r)
                     first.setdefault(same, job)
