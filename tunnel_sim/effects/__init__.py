@@ -10,7 +10,6 @@ from tunnel_sim.effects.registry import (
     effect_from,
     known_effects,
     register_effect,
-    the_effect,
 )
 
 __all__ = [
@@ -22,5 +21,4 @@ __all__ = [
     "effect_from",
     "known_effects",
     "register_effect",
-    "the_effect",
 ]
