@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import takewhile
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -164,14 +165,14 @@ class Path:
         moments = {
             "yaw_inertia": swing,
             "stiffness": -self.angle,
+            "added_stiffness": -self.angle,
             "mechanical_damping": -self.rate,
             "cn_beta": pressure * self.angle,
             "cn_r": lag * self.rate,
         }
-        names = self.fit.problem.names
-        along = self.response(np.column_stack([moments[name] for name in names if name in moments]))
-        others = [place for place, name in enumerate(names) if name not in moments]
-        return np.column_stack([along, self.rows(self.fit.jacobian[self.index][0][:, others])])
+        first = [moments[name] for name in takewhile(moments.__contains__, self.fit.problem.names)]
+        others = self.rows(self.fit.jacobian[self.index][0][:, len(first) :])
+        return np.column_stack([self.response(np.column_stack(first)), others])
 
 
 def paths(fit: Fit) -> list[Path]:
