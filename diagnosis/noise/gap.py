@@ -21,7 +21,7 @@ from diagnosis.noise.kinds import Coloured, Noise
 from diagnosis.noise.rounding import repeated, repetitions, samples
 from diagnosis.noise.sensor_noise import NoiseTrend, trend_statistics
 from diagnosis.settings import GapSettings
-from tunnel_sim.effects import effect_class
+from tunnel_sim.effects import the_effect
 
 _MOST, _FEWEST = 32, 16  # repetitions of the campaign
 #: A step this many times the noise hides its level, since crossed edges look like noise; several are tried.
@@ -253,7 +253,7 @@ def _follows_input(white: Fit) -> bool:
 
 def _beside_mode(nominal: Fit) -> Fit | None:
     """The fit with the oscillation that the input excites; None where it fails."""
-    starts = starting_points(nominal, effect_class("second_mode"))
+    starts = starting_points(nominal, the_effect(line="ringing"))
     driven = [start for start in starts if any(value != 0.0 for _, value in start.problem.fixed)]
     return try_fit(driven[0].problem, driven[0].point) if driven else None
 

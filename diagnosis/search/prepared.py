@@ -36,13 +36,13 @@ from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place, locate
-from tunnel_sim.effects import Effect, effect_class
+from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 #: The effects that are read off the records before any is fitted.
-HUM, COARSE_STEP = effect_class("mains_hum"), effect_class("sensor_quantisation")
+HUM, COARSE_STEP = the_effect(line="mains"), the_effect(lattice=True)
 
 
 @dataclass(frozen=True, eq=False)

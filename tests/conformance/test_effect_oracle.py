@@ -23,7 +23,7 @@ from tunnel_reference.forms import forms_of
 from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
-from tunnel_sim.effects import Effect, EffectChain, effect_class, effect_from
+from tunnel_sim.effects import Effect, EffectChain, effect_from, the_effect
 from tunnel_sim.effects.base import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
@@ -180,7 +180,7 @@ def test_effect_matches_the_reference_simulator(name: str) -> None:
 def test_every_effect_is_compared() -> None:
     compared = {name for name, _, _ in VARIANTS} | {"buffeting", "sensor_quantisation"}
     assert compared == SOLVED
-    assert compared | set(REFERRED) | {effect_class("input_delay").name} == set(VOCABULARY)
+    assert compared | set(REFERRED) | {the_effect(driven=True).name} == set(VOCABULARY)
 
 
 @pytest.mark.parametrize("held", [False, True], ids=["linear", "zero"])
@@ -191,7 +191,7 @@ def test_a_delayed_input_matches_the_equation_between_its_kinks(delay: float, he
     driven = replace(settings(run), drive=DriveMoment(time, values, held=held))
     found = []
     for late in (delay, 0.0):
-        chain = EffectChain(driven, (effect_class("input_delay")(late),), (None,))
+        chain = EffectChain(driven, (the_effect(driven=True)(late),), (None,))
         found.append(forward_motion(RIG, chain.physics(), run.sample_rate).angle)
         expected = oracle.driven_reading(time, values, late, run, held=held)
         assert np.max(np.abs(found[-1] - expected)) < SMOOTH
@@ -204,7 +204,7 @@ def test_a_motion_is_continuous_in_the_delay_of_its_input() -> None:
     driven = replace(settings(replace(RUN, duration=1.5)), drive=DriveMoment(time, values, held=True))
 
     def moved(delay: float) -> np.ndarray:
-        chain = EffectChain(driven, (effect_class("input_delay")(delay),), (None,))
+        chain = EffectChain(driven, (the_effect(driven=True)(delay),), (None,))
         return forward_motion(RIG, chain.physics(), RUN.sample_rate).angle
 
     # around one sample, where every jump passes from one step of the integrator to the next

@@ -10,6 +10,7 @@ from tunnel_sim.effects.registry import (
     effect_from,
     known_effects,
     register_effect,
+    the_effect,
 )
 
 __all__ = [
@@ -21,4 +22,5 @@ __all__ = [
     "effect_from",
     "known_effects",
     "register_effect",
+    "the_effect",
 ]

@@ -158,6 +158,21 @@ def effect_class(name: str) -> type[Effect]:
     raise TunnelError(f"unknown effect {name!r}", remedy=remedy)
 
 
+def the_effect(**traits: object) -> type[Effect]:
+    """The class of the only built-in effect with given traits.
+
+    Args:
+        **traits: as listed in `Effect`.
+
+    Raises:
+        LookupError: when there is none, or more than one.
+    """
+    found = [kind for kind in ALL_EFFECTS if all(getattr(kind, t) == v for t, v in traits.items())]
+    if len(found) != 1:
+        raise LookupError(f"{len(found)} effects have the traits {traits}")
+    return found[0]
+
+
 def effect_from(name: str, parameters: Mapping[str, float]) -> Effect:
     """An effect by name.
 

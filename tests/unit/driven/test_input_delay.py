@@ -12,7 +12,7 @@ from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
 from diagnosis.model.rig import Rig
 from tests.marks import slow
-from tunnel_sim.effects import ALL_EFFECTS, Effect, effect_class
+from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.engine.virtual_campaign import plan_effects
 from tunnel_sim.files.plan_file import paper_plan
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
@@ -23,7 +23,7 @@ from tunnel_sim.vocabulary.record import Record
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
-DELAY = effect_class("input_delay")
+DELAY = the_effect(driven=True)
 FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness", "rod_flexibility", "sensor_drift"])
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from diagnosis.identifiability import identifiability
 from tests.unit.own_effects import DETENT, OwnCubic
-from tunnel_sim.effects import Effect, effect_class
+from tunnel_sim.effects import Effect, the_effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.engine.effect_laws import check
@@ -115,7 +115,7 @@ def test_a_twin_of_a_known_effect_is_recognised() -> None:
 
 
 def test_an_effect_of_the_input_is_judged_on_driven_runs() -> None:
-    kind = effect_class("input_delay")
+    kind = the_effect(driven=True)
     assert [verdict.fault for verdict in check(kind)] == [""] * 8
     found = identifiability(kind)
     assert found.fault == ""
