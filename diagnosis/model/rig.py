@@ -50,6 +50,21 @@ class Rig(NominalModel):
         """Where every run states its spring."""
         return all(run.spring_stiffness is not None for run in campaign.runs)
 
+    def refuse(self, campaign: Campaign) -> None:
+        """Refuse runs that do not state their spring, where such a model is given.
+
+        Raises:
+            TunnelError: for all of them.
+        """
+        bare = [run.id for run in campaign.runs if run.spring_stiffness is None]
+        if bare:
+            raise TunnelError(
+                f"the nominal model {type(self).__name__} needs the spring of every run, and these state none: "
+                f"{', '.join(bare)}",
+                where=campaign.name,
+                remedy="state spring_stiffness, or leave the model out",
+            )
+
     def starts(self, data: Data) -> Iterator[Start]:
         """From the runs' spectra; then from their own decays, as `identify` finds them."""
         yield self._start(data, Shown.of(data))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.model.blocks import prepare
 from diagnosis.model.choose import nominal_model
@@ -23,6 +24,7 @@ from diagnosis.search.prepared import fit_nominal
 from tunnel_sim.effects import ALL_EFFECTS
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import JointLaw, Term
 from tunnel_sim.vocabulary.units import dimension
@@ -190,6 +192,13 @@ def test_what_it_says_is_said_of_its_runs(fitted: tuple[Case, Fit]) -> None:
         assert set(kinds) <= set(ALL_EFFECTS)
     springs = data.model.planned_springs(data)
     assert list(springs) == sorted(springs)
+
+
+def test_a_rig_of_ones_own_needs_the_spring_of_every_run() -> None:
+    stated, _, _ = hardening()
+    bare = replace(stated, runs=(replace(stated.runs[0], spring_stiffness=None), *stated.runs[1:]))
+    with pytest.raises(TunnelError, match=r"Hardening needs the spring of every run.*: r0"):
+        diagnose(bare, model=Hardening())
 
 
 SLOWER, HEAVIER = 10.0, 3.0
