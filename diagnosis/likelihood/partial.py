@@ -43,7 +43,8 @@ def refit_releases(problem: Problem, start: Point, slopes: list[Array]) -> tuple
         trial = Point(best.common, best.release + np.stack(steps))
         moved = scaled_residuals(problem, trial)
         with np.errstate(invalid="ignore"):  # a prediction that grows without bound is left as it is
-            gains = [float(r @ r - m @ m) for r, m in zip(residuals, moved, strict=True)]
+            saved = problem.parameters.surprises(best) - problem.parameters.surprises(trial)
+            gains = [float(r @ r - m @ m) + own for r, m, own in zip(residuals, moved, saved, strict=True)]
         better = [gain > _RELEASE_GAIN * float(r @ r) for gain, r in zip(gains, residuals, strict=True)]
         if not any(better):
             break

@@ -131,10 +131,14 @@ class ParameterSet:
 
     def surprise(self, point: Point) -> float:
         """How far the own parameters are from their priors, in variances, summed; a part of χ²."""
+        return float(self.surprises(point).sum()) if self.precision.any() else 0.0
+
+    def surprises(self, point: Point) -> Array:
+        """The same by run, shape (runs,); 0 without priors."""
         if not self.precision.any():
-            return 0.0
+            return np.zeros(len(point.release))
         away = self.pull(point)
-        return float(np.sum(away**2 / np.where(self.precision > 0.0, self.precision, 1.0)))
+        return np.asarray(np.sum(away**2 / np.where(self.precision > 0.0, self.precision, 1.0), axis=1))
 
     def value(self, point: Point, name: str, run: int) -> float | None:
         """A parameter in one run, in its unit; None where there is none of that name.

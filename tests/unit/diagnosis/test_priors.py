@@ -109,7 +109,7 @@ def test_a_run_that_is_not_seen_returns_to_its_prior() -> None:
     start = Point(found.point.common, moved)
     slopes = [1e-9 * own for _, own in found.jacobian]
     back, _ = refit_releases(problem, start, slopes)
-    assert np.abs(back.release[:, place]).max() < 5.0 * SCATTER
+    assert np.abs(back.release[:, place]).max() < 1e-3 * SCATTER
 
 
 def test_a_prior_is_a_part_of_chi2() -> None:
