@@ -73,16 +73,16 @@ class SensorTable(StrictModel):
     zero: Zero | None = optional("'common', 'per_run' or 'auto'")
 
 
-_Spread = Annotated[float, Field(ge=0.0, lt=1.0)]
-_SPREAD = "a relative standard deviation from 0 to below 1, such as 0.003"
+Spread = Annotated[float, Field(ge=0.0, lt=1.0)]
+SPREAD = "a relative standard deviation from 0 to below 1, such as 0.003"
 
 
 class RepeatabilityTable(StrictModel):
     """``[repeatability]``."""
 
-    wind_speed: _Spread | None = optional(_SPREAD)
-    spring_stiffness: _Spread | None = optional(_SPREAD)
-    mechanical_damping: _Spread | None = optional(_SPREAD)
+    wind_speed: Spread | None = optional(SPREAD)
+    spring_stiffness: Spread | None = optional(SPREAD)
+    mechanical_damping: Spread | None = optional(SPREAD)
 
 
 class RunTable(StrictModel):
