@@ -74,7 +74,13 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
         known = {"id": run.id, **_conditions(run), **_record(campaign, run)}
         runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
     rig: Mapping[str, Any] = {"name": campaign.name, **_of_campaign(campaign)}
-    savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
+    savemat(
+        cast(Any, stream),
+        {"runs": runs, "rig": rig},
+        do_compression=True,
+        oned_as="column",
+        long_field_names=True,
+    )
 
 
 def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
