@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tunnel_sim.files.campaign_folder import IMPORT_RECIPE, SPREAD, Spread
+from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.text import read_cells
 from tunnel_sim.files.importing.units import UNITS, kind_of, split_unit
+from tunnel_sim.files.scatter_tables import SPREAD, Spread
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
