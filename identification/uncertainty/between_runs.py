@@ -1,8 +1,8 @@
 """Chance differences between runs as random effects: how likely widths are, and what they leave uncertain.
 
 Run i is measured as z_i = J_i δ + D_i e_i + noise of unit variance, with common parameters δ and the run's own
-deviations e_i ~ N(0, S²), S = diag(widths). What else the run has of its own, such as its release, is projected out of
-every column first. The deviations are integrated out exactly, since all of this is linear (Pinheiro and Bates,
+deviations e_i ~ N(0, S²), S = diag(widths). What else the run has of its own, such as its release, is projected out
+of every column first. The deviations are integrated out exactly, since all of this is linear (Pinheiro and Bates,
 Mixed-Effects Models in S and S-PLUS, Springer 2000, chapter 2; Harville, J. Am. Stat. Assoc. 72 (1977) 320, doi
 10.1080/01621459.1977.10480998).
 """
