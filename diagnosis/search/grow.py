@@ -133,7 +133,8 @@ def _worth_fitting(
     scale = misfit_scale(misfit(parent.fit), weighing)
     scored.sort(
         key=lambda item: min(
-            -log_weight(start.predicted, scale, 0, 0, weighing, (start.scatter_cost, np.inf)) for start in item[1]
+            -log_weight(start.predicted, scale, 0, 0, weighing, (start.scatter_cost, np.inf))
+            for start in item[1]
         )
     )
     if parent.effects:

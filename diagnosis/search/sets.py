@@ -53,7 +53,9 @@ class Sets:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
         sets = [h.fitted_set(self.view.repeating) for h in self.hypotheses]
-        sets += [h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses]
+        sets += [
+            h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses
+        ]
         sets += [answer.left for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess))

@@ -17,7 +17,7 @@ from tunnel_sim.effects.between_runs import BetweenRuns
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
-from tunnel_sim.vocabulary.between_runs import SCATTERED, along, together
+from tunnel_sim.vocabulary.between_runs import along, between_runs, together
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, SensorModel, Truth
@@ -110,17 +110,12 @@ class _Drawn:
         return found
 
 
-_BETWEEN_RUNS = 2**32 - 1
-"""Key of the generator of the scatter, beyond any number of runs: a campaign without scatter draws as before."""
-
-
 def _drawn(plan: CampaignPlan) -> list[_Drawn]:
     """What every run of a plan draws before it is simulated."""
     effects = plan_effects(plan)
     runs = len(plan.conditions)
     seeds = np.random.SeedSequence(plan.seed).spawn(runs)
-    between = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(_BETWEEN_RUNS,)))
-    deviations = plan.scatter.deviations(between.standard_normal((runs, len(SCATTERED) + 1)), along(runs))
+    deviations = plan.scatter.deviations(between_runs(np.random.SeedSequence(plan.seed)), along(runs))
     found = []
     for condition, seed, own in zip(plan.conditions, seeds, deviations, strict=True):
         rng, zero = np.random.default_rng(seed), own.pop("zero", 0.0)

@@ -27,23 +27,22 @@ class RepeatabilityTable(StrictModel):
         return found if found.stated else None
 
 
-_Width = Annotated[float, Field(ge=0.0, le=WIDEST_SCATTER)]
+Width = Annotated[float, Field(ge=0.0, le=WIDEST_SCATTER)]
 _WIDTH = f"a relative standard deviation from 0 to {WIDEST_SCATTER:g}, such as 0.003"
-_Drift = Annotated[float, Field(ge=-LARGEST_DRIFT, le=LARGEST_DRIFT)]
+ZeroWidth = Annotated[float, Field(ge=0.0, le=1.0)]
+Drift = Annotated[float, Field(ge=-LARGEST_DRIFT, le=LARGEST_DRIFT)]
 _DRIFT = f"the relative change from the first to the last run, from {-LARGEST_DRIFT:g} to {LARGEST_DRIFT:g}"
 
 
 class ScatterTable(StrictModel):
     """``[scatter]``: differences between the runs."""
 
-    wind_speed: _Width = Field(default=0.0, description=_WIDTH)
-    spring_stiffness: _Width = Field(default=0.0, description=_WIDTH)
-    mechanical_damping: _Width = Field(default=0.0, description=_WIDTH)
-    zero: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
-        default=0.0, description="a standard deviation from 0 to 1 rad"
-    )
-    spring_stiffness_drift: _Drift = Field(default=0.0, description=_DRIFT)
-    wind_speed_drift_between_runs: _Drift = Field(default=0.0, description=_DRIFT)
+    wind_speed: Width = Field(default=0.0, description=_WIDTH)
+    spring_stiffness: Width = Field(default=0.0, description=_WIDTH)
+    mechanical_damping: Width = Field(default=0.0, description=_WIDTH)
+    zero: ZeroWidth = Field(default=0.0, description="a standard deviation from 0 to 1 rad")
+    spring_stiffness_drift: Drift = Field(default=0.0, description=_DRIFT)
+    wind_speed_drift_between_runs: Drift = Field(default=0.0, description=_DRIFT)
 
     @property
     def value(self) -> Scatter:

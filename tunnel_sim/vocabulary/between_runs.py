@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -90,28 +89,35 @@ class Scatter:
         """The numbers that are not zero, by name, dimensionless, and rad of ``zero``."""
         return {name: float(value) for name, value in vars(self).items() if value != 0.0}
 
-    def deviations(self, deviates: Array, share: Sequence[float] | Array) -> list[dict[str, float]]:
-        """The deviations of runs.
+    def deviations(self, rng: np.random.Generator, share: Array) -> list[dict[str, float]]:
+        """Draw the deviations of runs; those of the first runs do not depend on how many there are.
 
         Args:
-            deviates: in standard deviations, of the numbers in the order of `SCATTERED` and of the zero, shape
-                (runs, 4).
             share: how far each run is from the first to the last, 0 to 1, shape (runs,), a fraction.
 
         Returns:
             By run, the deviation of every number that scatters or drifts: relative, and rad of ``zero``.
         """
         found = []
-        for own, along in zip(deviates.tolist(), share, strict=True):
-            run = {}
+        for along in share.tolist():
+            own, run = rng.standard_normal(len(SCATTERED) + 1).tolist(), dict[str, float]()
             for name, deviate in zip((*SCATTERED, "zero"), own, strict=True):
                 scattered, drift = getattr(self, name) * deviate, 0.0
                 if name in self._drifts:
-                    drift = getattr(self, self._drifts[name]) * float(along)
+                    drift = getattr(self, self._drifts[name]) * along
                 if getattr(self, name) or (name in self._drifts and getattr(self, self._drifts[name])):
                     run[name] = together(scattered, drift)
             found.append(run)
         return found
+
+
+_APART = 2**32 - 1
+
+
+def between_runs(seed: np.random.SeedSequence) -> np.random.Generator:
+    """The generator of the scatter: apart from those spawned from the same seed, whose draws stay as they are."""
+    key = (*seed.spawn_key, _APART)
+    return np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=key))
 
 
 def together(one: float, other: float) -> float:

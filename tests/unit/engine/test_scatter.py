@@ -155,16 +155,21 @@ def test_the_same_number_scatters_once(plan: CampaignPlan) -> None:
 def test_deviations_are_normal_and_drift_along_the_runs() -> None:
     """Truth: their moments, within five standard errors; the drift exactly."""
     count = 4000
-    deviates = np.random.default_rng(3).standard_normal((count, 4))
-    found = Scatter(0.003, 0.0005, 0.01, 0.002).deviations(deviates, along(count))
+
+    def rng() -> np.random.Generator:
+        return np.random.default_rng(3)
+
+    wide = Scatter(0.003, 0.0005, 0.01, 0.002)
+    found = wide.deviations(rng(), along(count))
+    assert wide.deviations(rng(), along(5)) == found[:5]
     for name, width in zip((*SCATTERED, "zero"), (0.003, 0.0005, 0.01, 0.002), strict=True):
         values = np.array([run[name] for run in found]) / width
         assert abs(np.mean(values)) < 5.0 / np.sqrt(count)
         assert abs(np.mean(values**2) - 1.0) < 5.0 * np.sqrt(2.0 / count)
-    drift = Scatter(spring_stiffness_drift=-0.01).deviations(deviates, along(count))
+    drift = Scatter(spring_stiffness_drift=-0.01).deviations(rng(), along(count))
     assert drift[0] == {"spring_stiffness": 0.0}
     assert drift[-1] == {"spring_stiffness": -0.01}
-    assert Scatter().deviations(deviates, along(count)) == [{}] * count
+    assert Scatter().deviations(rng(), along(count)) == [{}] * count
     assert along(1).tolist() == [0.0]
 
 
