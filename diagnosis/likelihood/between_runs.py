@@ -1,7 +1,7 @@
 """What chance differences between runs make of a fit: their widths, and what they cost and gain.
 
-The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such as
-its release, is projected out of them run by run, and the deviations of the runs are integrated out
+The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such
+as its release, is projected out of them run by run, and the deviations of the runs are integrated out
 (`identification.uncertainty.between_runs`).
 """
 
@@ -32,10 +32,9 @@ _NULL = 1e-10  # singular value of a run's own columns, relative to the largest,
 
 def width_prior(problem: Problem) -> WidthPrior:
     """What is known of the widths before the runs; where the campaign states them, they are at least that."""
-    kinds = [kind for kind, _ in problem.scatter]
     chosen, known = problem.data.settings.scatter, problem.data.repeatability
-    usual = np.array([kind.parameters()[0].scale for kind in kinds])
-    given = np.array([known.get(kind.scatters, 0.0) for kind in kinds])
+    usual = np.array([one.usual for one in problem.scatter])
+    given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
     least = np.maximum(chosen.least * usual, given)
     decades = np.full(usual.size, chosen.decades)
     return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(chosen.most * usual, least))
@@ -67,8 +66,7 @@ class RunColumns:
             residuals: scaled, by run.
             jacobian: as a fit has it.
         """
-        names = problem.parameters.own_names
-        places = [names.index(kind.name) for kind, _ in problem.scatter]
+        places = problem.parameters.places(problem.scatter)
         bases, deviations, common, seen = [], [], [], []
         for residual, (of_common, own), values in zip(residuals, jacobian, point.release, strict=True):
             basis = _orthonormal(np.delete(own, places, axis=1))

@@ -133,7 +133,8 @@ def _worth_fitting(
     scale = misfit_scale(misfit(parent.fit), weighing)
     scored.sort(
         key=lambda item: min(
-            -log_weight(start.predicted, scale, 0, 0, weighing, (start.scatter_cost, np.inf)) for start in item[1]
+            -log_weight(start.predicted, scale, 0, 0, weighing, (start.scatter_cost, np.inf))
+            for start in item[1]
         )
     )
     if parent.effects:
@@ -154,4 +155,4 @@ def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
         found = try_fit(start.problem, start.point)
     else:
         found = try_fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
-    return settled(found) if found is not None and np.isfinite(found.total) else None
+    return settled(found, rounds=1) if found is not None and np.isfinite(found.total) else None

@@ -247,6 +247,18 @@ class ScatterSettings:
         "convention",
         ONE_IN_1000,
     )
+    which_rate: float = setting(
+        0.05,
+        "Rate at which a number is said to scatter beside others that do.",
+        "convention",
+        "Whether the runs differ at all is tested at the rate above.",
+    )
+    outlier_rate: float = setting(
+        0.001,
+        "Rate at which a run is said to deviate far beyond the others.",
+        "convention",
+        ONE_IN_1000,
+    )
     settled: float = setting(
         1.0,
         "Fall of −2 ln L from which a fit is repeated with other widths.",

@@ -16,6 +16,8 @@ import numpy as np
 
 from tunnel_sim.vocabulary.record import Array
 
+_ABSORBED = 1e-13  # share of a column's power, below which deviations of the runs absorb all of it
+_RIDGE = 1e-11  # of the scaled normal matrix: what the runs do not determine says nothing of widths
 _NULL = 1e-11  # eigenvalue of the scaled normal matrix, relative to the largest, that counts as zero
 
 
@@ -104,8 +106,10 @@ def marginal(runs: RunProducts, widths: Array) -> Marginal:
     weighted = weight @ runs.mixed
     normal = (runs.common - np.swapaxes(runs.mixed, 1, 2) @ weighted).sum(axis=0)
     seen = (runs.common_seen - np.einsum("rkp,rk->rp", weighted, runs.own_seen)).sum(axis=0)
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
+    seen_at_all = np.diag(normal) > _ABSORBED * np.diagonal(runs.common, axis1=1, axis2=2).sum(axis=0)
+    size = np.sqrt(np.where(seen_at_all, np.diag(normal), 1.0))
+    scaled_normal = np.where(np.outer(seen_at_all, seen_at_all), normal / np.outer(size, size), 0.0)
+    values, vectors = np.linalg.eigh(scaled_normal)
     kept = values > _NULL * values[-1] if values.size else np.zeros(0, bool)
     root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     covariance = root @ root.T
@@ -187,3 +191,54 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
     found = minimize(at, np.log(widths[free]), jac=True, method="L-BFGS-B", bounds=bounds)
     widths[free] = np.exp(found.x)
     return widths
+
+
+_GRID = 15  # widths in each direction
+_REACH = (40.0, 8.0)  # how far below and above the likeliest width the grid reaches, as ratios
+_AT_ONCE = 1500  # points of the grid
+
+
+def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float]) -> Array:
+    """Quantiles of every width given the runs, the others integrated out.
+
+    Args:
+        levels: of the quantiles, fractions.
+
+    Returns:
+        Widths, shape (levels, k); a width that is stated is as stated at every level.
+    """
+    best = likeliest_widths(runs, prior)
+    axes = []
+    for width, free, least, most in zip(best, prior.free, prior.least, prior.most, strict=True):
+        low, high = max(least, width / _REACH[0]), min(most, width * _REACH[1])
+        axes.append(np.geomspace(low, high, _GRID) if free and high > low else np.array([width]))
+    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
+    parts = [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
+    cost = np.concatenate([_restricted(runs, part) for part in parts])
+    cost += np.array([prior.cost(point) for point in points])
+    density = np.exp(-0.5 * (cost - cost.min())).reshape([axis.size for axis in axes])
+    found = np.empty((len(levels), best.size))
+    for k, axis in enumerate(axes):
+        others = tuple(j for j in range(len(axes)) if j != k)
+        share = density.sum(axis=others)
+        total = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
+        level = total / total[-1] if axis.size > 1 else np.ones(1)
+        found[:, k] = np.exp(np.interp(levels, level, np.log(axis)))
+    return found
+
+
+def _restricted(runs: RunProducts, widths: Array) -> Array:
+    """−2 ln L of many widths, as `Marginal.restricted`, shape (points,); widths of shape (points, k)."""
+    scale = widths[:, None, :, None] * widths[:, None, None, :]
+    inverse = np.linalg.inv(np.eye(widths.shape[1]) + scale * runs.own)
+    weight = scale * inverse
+    weighted = weight @ runs.mixed
+    normal = (runs.common - np.swapaxes(runs.mixed, 1, 2) @ weighted).sum(axis=1)
+    seen = (runs.common_seen - np.einsum("grkp,rk->grp", weighted, runs.own_seen)).sum(axis=1)
+    size = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-300))
+    scaled = normal / (size[:, :, None] * size[:, None, :]) + _RIDGE * np.eye(size.shape[1])
+    explained = np.einsum("gp,gp->g", seen / size, np.linalg.solve(scaled, (seen / size)[..., None])[..., 0])
+    alone = np.einsum("rk,grkl,rl->g", runs.own_seen, weight, runs.own_seen)
+    information = np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum(axis=1)
+    cost = -np.linalg.slogdet(inverse)[1].sum(axis=1) - alone - explained + information
+    return np.asarray(cost + runs.power.sum(), np.float64)
