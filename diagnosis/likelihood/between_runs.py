@@ -35,9 +35,11 @@ def width_prior(problem: Problem) -> WidthPrior:
     chosen, known = problem.data.settings.scatter, problem.data.repeatability
     usual = np.array([one.usual for one in problem.scatter])
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
-    least = np.maximum(chosen.least * usual, given)
-    decades = np.full(usual.size, chosen.decades)
-    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(chosen.most * usual, least))
+    least = np.maximum(chosen.least_scatter * usual, given)
+    decades = np.full(usual.size, chosen.scatter_decades)
+    return WidthPrior(
+        np.maximum(usual, given), decades, least, np.maximum(chosen.greatest_scatter * usual, least)
+    )
 
 
 @dataclass(frozen=True, eq=False)

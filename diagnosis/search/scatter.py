@@ -1,8 +1,8 @@
 """Chance differences between runs: a layer under every set of causes.
 
 A wind speed, a spring or a damping that is a little different in every run is no cause beside others. Every run has
-its own deviations under every set, with a normal prior whose width is the likeliest for the set. They are integrated
-out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
+its own deviations under every set, with a normal prior whose width is the likeliest for the set. They are
+integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> K
         places = np.flatnonzero(kept)
         gains = [_gain(columns, prior, kept, np.arange(kept.size) == place) for place in places]
         least = int(np.argmin(gains))
-        if gains[least] >= chdtri(1.0, chosen.which_rate):
+        if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
             break
         kept[places[least]] = False
     return kept
@@ -159,7 +159,7 @@ def named(fitted: Fit) -> tuple[str, ...]:
 
 def _evident(columns: RunColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
     """Whether the runs differ by more than the least widths."""
-    limit = chdtri(float(which.sum()), chosen.rate)
+    limit = chdtri(float(which.sum()), chosen.scatter_rate)
     return bool(_gain(columns, prior, np.ones_like(which), which) >= limit)
 
 
@@ -185,7 +185,7 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
         prior = width_prior(fitted.problem)
         now = np.array([one.width for one in fitted.problem.scatter])
         here = fitted.columns.at(now, prior)
-        if here.restricted - between.restricted < fitted.settings.scatter.settled:
+        if here.restricted - between.restricted < fitted.settings.scatter.widths_settled:
             return fitted
         again = try_fit(with_widths(fitted.problem, between), fitted.point, base=fitted)
         if again is None:
