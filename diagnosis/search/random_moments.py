@@ -151,11 +151,12 @@ def _may_act(best: Hypothesis, scale: Scale) -> bool:
     random motion misleads the fit of the wind-off runs too.
     """
     runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
-    if not any(run.wind_on for run, _ in runs) or scale.greatest(best) <= scale.weight(best):
+    if not any(run.wind_on for run, _ in runs) or scale.greatest(best, repeating=False) <= scale.weight(best):
         return False
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
     count, chosen = len(best.effects) + 1, best.fit.settings.moment
-    if log_weight(still, scale.misfit, count, best.further_numbers, scale.chosen) > scale.weight(best):
+    costs = best.fit.scatter_cost, scale.scatter_cost
+    if log_weight(still, scale.misfit, count, best.further_numbers, scale.chosen, costs) > scale.weight(best):
         return True
     process = likeliest(random_moments(best.fit), chosen)
     return process is not None and is_steady_noise(process, chosen)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
+from diagnosis.likelihood.residuals import misfit
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
@@ -51,14 +52,16 @@ class Sets:
     def weighed(self) -> list[Weighed]:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
-        sets = [h.fitted_set(base) for h in self.hypotheses]
-        sets += [h.fitted_set(base, outside=True) for rival in self.rivals for h in rival.hypotheses]
+        sets = [h.fitted_set(self.view.repeating) for h in self.hypotheses]
+        sets += [h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses]
         sets += [answer.left for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess))
         nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
         own = self.view.left_by_read_off
-        return weigh([replace(one, excess=one.excess - own) for one in sets], nominal, base.settings.weighing)
+        whole = None if self.view.repeating is base else misfit(self.view.repeating)
+        sets = [replace(one, excess=one.excess - own) for one in sets]
+        return weigh(sets, nominal, base.settings.weighing, whole)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
         """The set of these effects; None where they were not fitted together."""

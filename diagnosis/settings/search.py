@@ -227,10 +227,55 @@ class RandomMomentSettings:
 
 
 @dataclass(frozen=True)
+class ScatterSettings:
+    """Chance differences between runs."""
+
+    decades: float = setting(
+        1.0,
+        "Standard deviation of the decimal logarithm of a width about the usual one.",
+        "judgement",
+        "Rigs repeat ten times better or worse than usual.",
+        decision="0036",
+    )
+    least: float = setting(
+        1e-3, "Least width, as a share of the usual one.", "judgement", "No run shows so little."
+    )
+    most: float = setting(30.0, "Greatest width, over the usual one.", "judgement")
+    rate: float = setting(
+        0.001,
+        "Rate at which runs that repeat are said to differ by chance.",
+        "convention",
+        ONE_IN_1000,
+    )
+    settled: float = setting(
+        1.0,
+        "Fall of −2 ln L from which a fit is repeated with other widths.",
+        "convention",
+        "A change of less says nothing.",
+        unit="χ²",
+    )
+
+
+@dataclass(frozen=True)
 class WeighingSettings:
     """How sets of effects are weighed, and when none of them is named."""
 
     steepness: float = setting(1.25, "Exponent of what is left in a channel.", "tuned", decision="0007")
+    scatter: float = setting(
+        1.0,
+        "Exponent of the evidence of chance differences between the runs.",
+        "convention",
+        "A likelihood.",
+        decision="0036",
+    )
+    needless_scatter: float = setting(
+        14.0,
+        "−2 ln of that evidence by which a needless effect may lower it.",
+        "judgement",
+        "With the price of an effect it is 20, by which a needless one lowers χ² once in 22,000 effects tried.",
+        unit="χ²",
+        decision="0036",
+    )
     set_price: float = setting(
         3.0,
         "Logarithm of the weight that every effect costs.",

@@ -68,6 +68,8 @@ class Effect:
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
+    - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
+      ``mechanical_damping``; empty: none.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
@@ -95,6 +97,7 @@ class Effect:
     on_spring: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
+    scatters: ClassVar[str] = ""
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
@@ -32,6 +32,7 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
     Quantity,
+    Repeatability,
     RigProperties,
     Run,
     SensorProperties,
@@ -72,6 +73,18 @@ class SensorTable(StrictModel):
     zero: Zero | None = optional("'common', 'per_run' or 'auto'")
 
 
+_Spread = Annotated[float, Field(ge=0.0, lt=1.0)]
+_SPREAD = "a relative standard deviation from 0 to below 1, such as 0.003"
+
+
+class RepeatabilityTable(StrictModel):
+    """``[repeatability]``."""
+
+    wind_speed: _Spread | None = optional(_SPREAD)
+    spring_stiffness: _Spread | None = optional(_SPREAD)
+    mechanical_damping: _Spread | None = optional(_SPREAD)
+
+
 class RunTable(StrictModel):
     """``[[runs]]``."""
 
@@ -95,6 +108,9 @@ class CampaignDocument(StrictModel):
     campaign: CampaignTable = Field(description="a [campaign] table with a name")
     rig: RigTable = Field(default=RigTable(), description="a [rig] table")
     sensor: SensorTable = Field(default=SensorTable(), description="a [sensor] table")
+    repeatability: RepeatabilityTable = Field(
+        default=RepeatabilityTable(), description="a [repeatability] table"
+    )
     runs: list[RunTable] = Field(min_length=1, description="one [[runs]] table or more")
 
 
@@ -143,9 +159,10 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
     """The tables of ``campaign.toml`` in their order, without values that are None; ``files`` by id of the run."""
     head = {"name": campaign.name, "description": campaign.description or None}
     document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
-    for key, values in (("rig", vars(campaign.rig)), ("sensor", vars(campaign.sensor))):
-        if _stated(values):
-            document[key] = _stated(values)
+    for key in ("rig", "sensor", "repeatability"):
+        values = getattr(campaign, key)
+        if values is not None and _stated(vars(values)):
+            document[key] = _stated(vars(values))
     document["runs"] = [
         {"id": run.id, "file": files[run.id]}
         | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record", "drive")})
@@ -235,12 +252,14 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         samples += record.time_s.size
         remedy = "put the runs into several campaigns"
         check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
+    repeatability = Repeatability(**document.repeatability.model_dump())
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
         rig=RigProperties(**document.rig.model_dump()),
         sensor=sensor,
         runs=tuple(runs),
+        repeatability=repeatability if repeatability.stated else None,
     )
 
 

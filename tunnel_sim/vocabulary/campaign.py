@@ -79,6 +79,37 @@ class SensorProperties:
 
 
 @dataclass(frozen=True)
+class Repeatability:
+    """What the experimenter knows of the scatter between runs, as one standard deviation; None where not stated.
+
+    Args:
+        wind_speed: of the true speed about the stated one, a fraction of it.
+        spring_stiffness: of the true stiffness about the stated one, a fraction of it.
+        mechanical_damping: of the mechanical damping about its mean, a fraction of it.
+    """
+
+    wind_speed: float | None = None
+    spring_stiffness: float | None = None
+    mechanical_damping: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a number that is not a standard deviation of a positive quantity."""
+        for name, value in vars(self).items():
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if value is not None and not (number and 0.0 <= value < 1.0):
+                raise TunnelError(
+                    f"{name} = {value!r} is not a relative standard deviation",
+                    where="repeatability",
+                    remedy="give a number from 0 to below 1, such as 0.003 for 0.3 %",
+                )
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """The numbers that are stated, by name, dimensionless."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
 class Run:
     """One run: its record and its conditions.
 
@@ -157,6 +188,7 @@ class Campaign:
         name: short name, also of the folder.
         runs: at least one run, with unique ids.
         law: of the joint in a model of one's own; None: spring and damper.
+        repeatability: stated scatter between runs; None: nothing is stated.
     """
 
     name: str
@@ -165,6 +197,7 @@ class Campaign:
     runs: tuple[Run, ...]
     description: str = ""
     law: JointLaw | None = None
+    repeatability: Repeatability | None = None
 
     @property
     def driven(self) -> bool:

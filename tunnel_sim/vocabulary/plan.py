@@ -121,6 +121,10 @@ class SensorModel:
     zero: float = 0.0
 
 
+WIDEST_SCATTER = 0.2
+"""Greatest standard deviation between runs, relative: a deviation that reverses the sign has five of them."""
+
+
 @dataclass(frozen=True)
 class EffectSetting:
     """One effect to inject, by name; ``tunnel_sim.effects`` validates it.
