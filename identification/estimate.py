@@ -179,7 +179,7 @@ class RunEstimate:
 
 
 @dataclass(frozen=True)
-class Repeatability:
+class RunScatter:
     """How runs of equal conditions differ by chance, beyond their noise. It is in the coefficients' intervals.
 
     Args:
@@ -211,7 +211,7 @@ class Repeatability:
         }
         return {name: width for name, width in every.items() if width is not None}
 
-    def among(self, kept: Sequence[int]) -> Repeatability:
+    def among(self, kept: Sequence[int]) -> RunScatter:
         """The same for some of the parameters, by their places."""
         chosen = [tuple(tuple(rows[i][j] for j in kept) for i in kept) for rows in self.covariances]
         return replace(self, covariances=tuple(chosen))
@@ -261,7 +261,7 @@ class Estimate:
     covariance: tuple[tuple[float, ...], ...] = ()
     noise: NoiseLevel | None = None
     remarks: tuple[Remark, ...] = ()
-    repeatability: Repeatability | None = None
+    repeatability: RunScatter | None = None
 
     @property
     def status(self) -> Status:

@@ -21,7 +21,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.repeatability import MeasuredRuns, scatter_between, stated_repeatability
+from identification.campaign.repeatability import MeasuredRuns, scatter_between
 from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
 from identification.printing import with_std
@@ -118,7 +118,7 @@ def combined_estimate(
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     parameters, covariance = combined
     measured = MeasuredRuns.of(runs, linked, decays, informations, parameters)
-    scatter = scatter_between(measured, parameters, stated_repeatability(campaign))
+    scatter = scatter_between(measured, parameters, campaign.repeatability)
     if scatter is not None:
         misfit, parameters, covariance = scatter.quadratic, scatter.parameters, scatter.covariance
     else:

@@ -21,8 +21,8 @@ from identification.estimate import (
     Estimate,
     NoiseLevel,
     Quantity,
-    Repeatability,
     RunEstimate,
+    RunScatter,
     Status,
     by_severity,
 )
@@ -221,7 +221,7 @@ def filled_estimate(
     found: Derivatives,
     covariance: Array,
     statuses: set[Status],
-    repeatability: Repeatability | None = None,
+    repeatability: RunScatter | None = None,
 ) -> Estimate:
     """The estimate with coefficients, the air of its runs and the wind-off line.
 
@@ -313,7 +313,7 @@ def design_statuses(design: Design, parameters: Array) -> set[Status]:
 
 
 def wind_off(
-    estimates: Sequence[RunEstimate], runs: Sequence[Run], repeatability: Repeatability | None = None
+    estimates: Sequence[RunEstimate], runs: Sequence[Run], repeatability: RunScatter | None = None
 ) -> dict[str, Any]:
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
 

@@ -23,7 +23,6 @@ from identification.campaign.repeatability import (
     MeasuredRuns,
     Scatter,
     scatter_between,
-    stated_repeatability,
 )
 from identification.campaign.springs import inertia_of_springs
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status, by_severity
@@ -125,7 +124,7 @@ def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> Scatter | None:
         return None
     runs = [one.run for one in seen]
     measured = MeasuredRuns.of(runs, design, values, weights, start[0])
-    return scatter_between(measured, start[0], stated_repeatability(campaign))
+    return scatter_between(measured, start[0], campaign.repeatability)
 
 
 def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: Scatter) -> list[Array]:

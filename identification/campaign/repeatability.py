@@ -17,7 +17,7 @@ Variances with estimated widths have the degrees of freedom of Satterthwaite, Bi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,13 +34,38 @@ from identification.campaign.between_runs import (
     marginal,
 )
 from identification.campaign.derivatives import Design
-from identification.estimate import Quantity, Repeatability
+from identification.estimate import Quantity, RunScatter
 from identification.statistics import inverse, student_factor
-from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.campaign import Repeatability, Run
 from tunnel_sim.vocabulary.record import Array
 
 _STEP = 0.02  # of ln(width), by which the curvature is taken
 _ZERO = 1e-9  # width, relative to the usual one, that counts as none
+
+
+def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Array]:
+    """What each of `DEVIATIONS` does to every run's values by its relative size, shape (m, 3).
+
+    Args:
+        design: of the runs, with the gains of inputs where there are driven ones.
+        parameters: φ, shape (p,).
+    """
+    columns = {name: float(parameters[place]) for name, place in design.columns.items()}
+    stiff, aero = columns.get("g", 0.0), columns.get("n", 0.0)
+    still, air = columns.get("d", 0.0), columns.get("m", 0.0)
+    moves = []
+    for run, link, load, damping in zip(
+        runs, design.links, design.stiffness_loads, design.damping_loads, strict=True
+    ):
+        spring = (run.spring_stiffness or 0.0) * stiff
+        move = np.zeros((len(link), len(DEVIATIONS)))
+        move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
+        move[1, 1] = spring
+        move[0, 2] = 0.5 * still
+        if run.driven_by_stiffness and len(link) > 2:
+            move[2, 1] = spring
+        moves.append(move)
+    return moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,22 +99,7 @@ class MeasuredRuns:
             design: of the runs, with the gains of inputs where there are driven ones.
             start: φ, shape (p,).
         """
-        columns = {name: float(start[place]) for name, place in design.columns.items()}
-        stiff, aero = columns.get("g", 0.0), columns.get("n", 0.0)
-        still, air = columns.get("d", 0.0), columns.get("m", 0.0)
-        moves = []
-        for run, link, load, damping in zip(
-            runs, design.links, design.stiffness_loads, design.damping_loads, strict=True
-        ):
-            spring = (run.spring_stiffness or 0.0) * stiff
-            move = np.zeros((len(link), len(DEVIATIONS)))
-            move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
-            move[1, 1] = spring
-            move[0, 2] = 0.5 * still
-            if run.driven_by_stiffness and len(link) > 2:
-                move[2, 1] = spring
-            moves.append(move)
-        return cls(design.links, seen, weights, moves)
+        return cls(design.links, seen, weights, moves_of(runs, design, start))
 
     def misfit(self, parameters: Array) -> float:
         """χ² of common parameters, shape (p,), without scatter."""
@@ -191,7 +201,7 @@ class Scatter:
         wider = np.outer(factor, factor)
         return np.asarray(total * wider), [one @ one.T * wider for one in moved]
 
-    def of(self, jacobian: Array) -> tuple[Array, Repeatability]:
+    def of(self, jacobian: Array) -> tuple[Array, RunScatter]:
         """The covariance of functions of φ, and how the runs repeat.
 
         Args:
@@ -204,7 +214,7 @@ class Scatter:
         covariance, added = self.counted(noise, self.moved(whole))
         return covariance, self.described(added)
 
-    def described(self, added: Sequence[Array] = ()) -> Repeatability:
+    def described(self, added: Sequence[Array] = ()) -> RunScatter:
         """How the runs repeat, for an estimate.
 
         Args:
@@ -223,7 +233,7 @@ class Scatter:
         sizes = np.array([seen[:2] for seen in self.seen]) ** 2
         shares = np.divide(spread, sizes, out=np.zeros_like(spread), where=sizes > 0.0)
         relative = np.sqrt(shares.sum(axis=0) / np.maximum((sizes > 0.0).sum(axis=0), 1))
-        return Repeatability(
+        return RunScatter(
             frequency=0.5 * float(relative[1]),
             damping=float(relative[0]),
             stated=self.stated,
@@ -235,16 +245,17 @@ class Scatter:
 def scatter_between(
     measured: MeasuredRuns,
     start: Array,
-    stated: Mapping[str, float],
+    repeatability: Repeatability | None,
     usual: UsualWidths | None = None,
 ) -> Scatter | None:
     """The scatter between runs; None where none is stated, and the runs show none beyond their noise.
 
     Args:
         start: φ of generalised least squares without scatter, shape (p,).
-        stated: relative standard deviations that the campaign states, by name of `DEVIATIONS`.
-        usual: what is known of the others.
+        repeatability: as the campaign states it; it is used as it is.
+        usual: what is known of the widths that are not stated.
     """
+    stated = {} if repeatability is None else repeatability.stated
     usual = usual or UsualWidths()
     measured = measured.floored(usual.prior(DEVIATIONS, {}).least)
     pairs = list(zip(measured.moves, measured.weights, strict=True))
@@ -283,13 +294,6 @@ def scatter_between(
         moves,
         measured.seen,
     )
-
-
-def stated_repeatability(campaign: Campaign) -> dict[str, float]:
-    """What a campaign states of its repeatability, by name of `DEVIATIONS`."""
-    given = getattr(campaign, "repeatability", None)
-    found = {name: getattr(given, name, None) for name in DEVIATIONS}
-    return {name: float(value) for name, value in found.items() if value is not None}
 
 
 def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:

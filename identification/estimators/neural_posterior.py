@@ -28,7 +28,7 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.campaign.repeatability import MeasuredRuns, scatter_between, stated_repeatability
+from identification.campaign.repeatability import MeasuredRuns, scatter_between
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.posterior import (
@@ -122,7 +122,7 @@ class NeuralPosterior:
         values = Derivatives(names, posterior.values[known], np.eye(known.size))
         covariance, repeatability = posterior.covariance[np.ix_(known, known)], None
         measured = MeasuredRuns.of(known_runs, design, decays, informations, combined[0])
-        scatter = scatter_between(measured, combined[0], stated_repeatability(campaign))
+        scatter = scatter_between(measured, combined[0], campaign.repeatability)
         linear = derivatives(design, combined[0] if scatter is None else scatter.parameters)
         if scatter is not None and set(names) <= set(linear.names):
             # the network knows the noise only; the scatter comes on top, as for a linear combination of the runs
