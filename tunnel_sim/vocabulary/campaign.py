@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -76,37 +77,6 @@ class SensorProperties:
     def derivative(self) -> int:
         """Which derivative of the angle the readings are: 0, 1 or 2."""
         return 0 if self.quantity is None else ("angle", "rate", "acceleration").index(self.quantity)
-
-
-@dataclass(frozen=True)
-class Repeatability:
-    """What the experimenter knows of the scatter between runs, as one standard deviation; None where not stated.
-
-    Args:
-        wind_speed: of the true speed about the stated one, a fraction of it.
-        spring_stiffness: of the true stiffness about the stated one, a fraction of it.
-        mechanical_damping: of the mechanical damping about its mean, a fraction of it.
-    """
-
-    wind_speed: float | None = None
-    spring_stiffness: float | None = None
-    mechanical_damping: float | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse a number that is not a standard deviation of a positive quantity."""
-        for name, value in vars(self).items():
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if value is not None and not (number and 0.0 <= value < 1.0):
-                raise TunnelError(
-                    f"{name} = {value!r} is not a relative standard deviation",
-                    where="repeatability",
-                    remedy="give a number from 0 to below 1, such as 0.003 for 0.3 %",
-                )
-
-    @property
-    def stated(self) -> dict[str, float]:
-        """The numbers that are stated, by name, dimensionless."""
-        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
