@@ -128,7 +128,7 @@ class DiagnosisDocument(Document):
     cautions: list[str] = Field(description="caveats")
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")
-    provenance: Table = Field(description="versions, and SHA-256 of the records")
+    provenance: Table = Field(description="versions, SHA-256 of the records, and runs left out as asked")
 
 
 def read_whole(path: Path) -> dict[str, Any]:
