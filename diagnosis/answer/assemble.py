@@ -122,6 +122,7 @@ def assemble(
         },
         inclusion=inclusion(weighed, study.read_off, settings.gap),
         waterfall=closes.steps,
+        disturbed=study.disturbed,
         rest=_remains(study, found, answers, closes.steps),
         model=patched,
         found=beside_the_numbers(study, said, before, after, caveats),
