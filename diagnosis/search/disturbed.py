@@ -92,7 +92,8 @@ def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[
     from scipy.special import stdtr  # only here: slow to load
 
     instants = sum(one.drop.size for one in runs)
-    sizes = np.log([max(float(one.drop.max()), 1.0) for one in runs])
+    # what is below the greatest of as many values of χ² by chance is no jump, and not a small one
+    sizes = np.log([max(float(one.drop.max()), 2.0 * np.log(one.drop.size), 1.0) for one in runs])
     order = np.argsort(-sizes)
     most = min(max(1, int(chosen.disturbed_share * len(runs))), len(runs) - 2)
     p_values = []
