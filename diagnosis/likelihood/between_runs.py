@@ -39,9 +39,7 @@ def width_prior(problem: Problem) -> WidthPrior:
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
     least = np.maximum(_USUAL.least * usual, given)
     decades = np.full(usual.size, _USUAL.decades)
-    return WidthPrior(
-        np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least)
-    )
+    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least))
 
 
 @dataclass(frozen=True, eq=False)
