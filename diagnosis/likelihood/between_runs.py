@@ -1,8 +1,8 @@
 """What chance differences between runs make of a fit: their widths, and what they cost and gain.
 
-The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such as
-its release, is projected out of them run by run, and the deviations of the runs are integrated out
-(`identification.uncertainty.between_runs`).
+The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such
+as its release, is projected out of them run by run, and the deviations of the runs are integrated out
+(`identification.campaign.between_runs`).
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ import numpy as np
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from identification.uncertainty.between_runs import (
+from identification.campaign.between_runs import (
     Marginal,
     RunProducts,
+    UsualWidths,
     WidthPrior,
     likeliest_widths,
     marginal,
@@ -27,18 +28,18 @@ from tunnel_sim.vocabulary.record import Array
 #: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
 #: differences, which would pin a parameter that the runs do not determine.
 _APART = 1e-4
+_USUAL = UsualWidths()
 _NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
 
 
 def width_prior(problem: Problem) -> WidthPrior:
     """What is known of the widths before the runs; where the campaign states them, they are at least that."""
-    kinds = [kind for kind, _ in problem.scatter]
-    chosen, known = problem.data.settings.scatter, problem.data.repeatability
-    usual = np.array([kind.parameters()[0].scale for kind in kinds])
-    given = np.array([known.get(kind.scatters, 0.0) for kind in kinds])
-    least = np.maximum(chosen.least * usual, given)
-    decades = np.full(usual.size, chosen.decades)
-    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(chosen.most * usual, least))
+    known = problem.data.repeatability
+    usual = np.array([getattr(_USUAL, one.kind.scatters) for one in problem.scatter])
+    given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
+    least = np.maximum(_USUAL.least * usual, given)
+    decades = np.full(usual.size, _USUAL.decades)
+    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +68,7 @@ class RunColumns:
             residuals: scaled, by run.
             jacobian: as a fit has it.
         """
-        names = problem.parameters.own_names
-        places = [names.index(kind.name) for kind, _ in problem.scatter]
+        places = problem.parameters.places(problem.scatter)
         bases, deviations, common, seen = [], [], [], []
         for residual, (of_common, own), values in zip(residuals, jacobian, point.release, strict=True):
             basis = _orthonormal(np.delete(own, places, axis=1))

@@ -217,7 +217,7 @@ class Fit:
         """The likeliest widths of chance differences between the runs; None in a fit without any."""
         if not self.problem.scatter:
             return None
-        widths = np.array([width for _, width in self.problem.scatter])
+        widths = np.array([one.width for one in self.problem.scatter])
         return self.columns.likeliest(width_prior(self.problem), widths)
 
     @property

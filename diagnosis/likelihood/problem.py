@@ -11,7 +11,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from diagnosis.model.parameters import Parameter, ParameterSet, Point, Prior
+from diagnosis.model.chance import RunDeparture, Scatter, departure
+from diagnosis.model.parameters import Parameter, ParameterSet, Point
 from diagnosis.model.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.files.rig_file import load_rig
@@ -24,7 +25,6 @@ from tunnel_sim.vocabulary.rig import Rig
 
 _THREADS = 2
 _TOGETHER = 4  # motions that the integrator takes side by side
-_WIDE = 10.0  # widths of a usual scatter that steps of differences are a share of
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
 _POOL = ThreadPoolExecutor(_THREADS)
 #: Parameters of the law that do nothing without wind, and fields of a run that point to samples.
@@ -44,8 +44,7 @@ class Problem:
         fixed: value of effect parameters that are held, as ``effect.parameter``.
         free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
         instants: how many instants every run has for an effect that skips samples.
-        scatter: chance differences between runs beside the effects, and the widths of their distributions; each run
-            has a deviation of its own of each.
+        scatter: chance differences between runs beside the effects; each run has a deviation of its own of each.
         rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
             motion, which is much faster and exact as far as the rig is linear.
     """
@@ -55,7 +54,7 @@ class Problem:
     fixed: tuple[tuple[str, float], ...] = ()
     free_forms: tuple[str, ...] = ()
     instants: int = 1
-    scatter: tuple[tuple[type[Effect], float], ...] = ()
+    scatter: Scatter = ()
     rod_followed: bool = False
 
     @cached_property
@@ -63,7 +62,7 @@ class Problem:
         """All parameters: the nominal model's first, then the effects' in their order."""
         nominal, held = self.data.model.parameters(self.data), dict(self.fixed)
         found, swing = list(nominal), self.data.swing
-        found += [_deviation(kind, width) for kind, width in self.scatter]
+        found += [one.parameter for one in self.scatter]
         for kind in self.effects:
             for info in kind.parameters():
                 name = f"{kind.name}.{info.name}"
@@ -147,13 +146,13 @@ class Problem:
             for kind in self.effects
         )
         known = self.effects_at(common) if effects is None else effects
-        own_names = self.parameters.own_names
-        chance = [(_unit(kind), float(own[own_names.index(kind.name)])) for kind, _ in self.scatter]
-        return EffectChain(
-            self.stated(common, own, run),
-            (*(effect for effect, _ in chance), *known),
-            (*(deviation / effect.severity for effect, deviation in chance), *drawn),
+        stated = self.stated(common, own, run)
+        if not self.scatter:
+            return EffectChain(stated, known, drawn)
+        changed = departure(
+            self.scatter, own[self.parameters.places(self.scatter)].tolist(), stated, self.data
         )
+        return EffectChain(stated, (*known, RunDeparture()), (*drawn, np.array(changed)))
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means of the reading, for every point, for every run.
@@ -192,18 +191,6 @@ class Problem:
             for (i, r, _), values in zip(motion, readings, strict=True):
                 found[i][r] = values
         return found
-
-
-def _deviation(kind: type[Effect], width: float) -> Parameter:
-    """A run's own relative deviation, by chance."""
-    size = _WIDE * kind.parameters()[0].scale
-    return Parameter(kind.name, "1", size=size, owner="per_run", prior=Prior(width))
-
-
-def _unit(kind: type[Effect]) -> Effect:
-    """A scatter of the usual width, in whose units deviations are drawn."""
-    severity = kind.parameters()[0]
-    return kind(**{severity.name: severity.scale})
 
 
 class _Job:

@@ -13,6 +13,7 @@ from diagnosis.likelihood.least_squares import Fit, Products, clip, damped_step,
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
+from diagnosis.model.chance import Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
@@ -157,7 +158,7 @@ class _Added:
     slope: float
     drop: float
     left: list[Array]
-    scatter: tuple[tuple[type[Effect], float], ...] = ()
+    scatter: Scatter = ()
     scatter_cost: float = 0.0
 
 
@@ -180,12 +181,11 @@ def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _
         return None
     columns, size = base.columns.with_column(change)
     beside = columns.likeliest(width_prior(base.problem), between.widths)
-    kinds = (kind for kind, _ in base.problem.scatter)
     return _Added(
         float(beside.found.common[-1]) / size,
         between.likelihood - beside.likelihood,
         columns.left(beside.found),
-        tuple(zip(kinds, beside.widths.tolist(), strict=True)),
+        tuple(one.as_wide_as(width) for one, width in zip(base.problem.scatter, beside.widths, strict=True)),
         beside.cost,
     )
 

@@ -155,4 +155,4 @@ def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
         found = try_fit(start.problem, start.point)
     else:
         found = try_fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
-    return settled(found) if found is not None and np.isfinite(found.total) else None
+    return settled(found, rounds=1) if found is not None and np.isfinite(found.total) else None

@@ -1,8 +1,8 @@
-"""Chance differences between runs: a layer under every set of causes (docs/decisions/0036-runs-that-do-not-repeat.md).
+"""Chance differences between runs: a layer under every set of causes.
 
 A wind speed, a spring or a damping that is a little different in every run is no cause beside others. Every run has
-its own deviations under every set, with a normal prior whose width is the likeliest for the set; they are integrated
-out where sets are compared.
+its own deviations under every set, with a normal prior whose width is the likeliest for the set. They are
+integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
 """
 
 from __future__ import annotations
@@ -11,23 +11,29 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
-from diagnosis.likelihood.least_squares import Fit, sensitivities, try_fit
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities, try_fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.model.chance import Chance, Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
+from diagnosis.settings import ScatterSettings
+from identification.campaign.between_runs import WidthPrior
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of widths and fits
 _FEWEST = 2  # runs that may differ from each other
 
-Scatter = tuple[tuple[type[Effect], float], ...]
+_TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
+
+Kept = NDArray[np.bool_]
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:
-    """The differences that the runs could show: two runs at least have what differs, and a spring holds the body."""
+    """The differences that the runs could show: two of them at least have what differs, and a spring."""
     runs = {"always": len(data.runs), "wind_on": sum(run.wind_on for run in data.runs)}
     held = data.model.restored
     return tuple(kind for kind in kinds if kind.scatters and held and runs[kind.condition] >= _FEWEST)
@@ -49,37 +55,125 @@ def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[P
 def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
     """The problem of a fit without chance differences between runs, and its point."""
     names = fitted.problem.parameters.own_names
-    chance = {kind.name for kind, _ in fitted.problem.scatter}
-    kept = [place for place, name in enumerate(names) if name not in chance]
+    own = fitted.problem.parameters.places(fitted.problem.scatter)
+    kept = [place for place in range(len(names)) if place not in own]
     return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.release[:, kept])
 
 
-def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
-    """A fit with chance differences between the runs; None where they do not differ, or the fit fails.
+def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
+    """A chance difference beside the nominal model as it is fitted."""
+    run = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
+    return Chance(kind, width, run.derivatives, run.mechanical_damping)
+
+
+def usual(found: Fit, kind: type[Effect]) -> Chance:
+    """A chance difference of usual width."""
+    return chance(found, kind, kind.parameters()[0].scale)
+
+
+def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
+    """A fit whose runs differ as much as the campaign states; as given where it states nothing.
 
     Args:
-        found: without such differences.
+        found: whose runs repeat exactly.
+        kinds: the effects that may be named.
+    """
+    known = found.problem.data.repeatability
+    stated = [kind for kind in may_scatter(kinds, found.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
+    if not stated:
+        return found
+    scatter = tuple(chance(found, kind, known[kind.scatters]) for kind in stated)
+    return try_fit(*with_deviations(found.problem, found.point, scatter)) or found
+
+
+def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
+    """A fit whose runs differ by chance, and more than is stated; None where they do not, or the fit fails.
+
+    Args:
+        found: whose runs differ as much as is stated.
         kinds: the effects that may be named.
     """
     able = may_scatter(kinds, found.problem.data)
     if not able:
         return None
-    problem, point = with_deviations(found.problem, found.point, usual(able))
+    scatter = tuple(usual(found, kind) for kind in able)
+    problem, point = with_deviations(*without_deviations(found), scatter)
     jacobian = sensitivities(problem, point)
     if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
         return None
-    columns, prior = RunColumns.of(problem, point, found.residuals, jacobian), width_prior(problem)
-    between = columns.likeliest(prior)
-    gain = columns.at(prior.least, prior).found.restricted - between.found.restricted
-    if gain < chdtri(len(able), found.settings.scatter.rate):
+    residuals = found.residuals if not found.problem.scatter else scaled_residuals(problem, point)
+    columns, prior = RunColumns.of(problem, point, residuals, jacobian), width_prior(problem)
+    if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
         return None
-    layered = try_fit(replace(problem, scatter=tuple(zip(able, between.widths.tolist(), strict=True))), point)
+    layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
     return None if layered is None else settled(layered)
 
 
-def usual(kinds: Sequence[type[Effect]]) -> Scatter:
-    """Differences of usual widths."""
-    return tuple((kind, kind.parameters()[0].scale) for kind in kinds)
+def evident(fitted: Fit) -> Fit:
+    """A fit with chance differences between its runs where they show any beyond what is stated; else as stated."""
+    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
+    if not scatter:
+        return fitted
+    columns, prior, known = fitted.columns, width_prior(fitted.problem), fitted.problem.data.repeatability
+    if _evident(columns, prior, np.ones(len(scatter), bool), chosen):
+        shown, widths = _shown(columns, prior, chosen), columns.likeliest(prior).widths
+        found = [
+            replace(one, width=float(width), shown=bool(seen))
+            for one, width, seen in zip(scatter, widths, shown, strict=True)
+        ]
+    else:
+        stated = [(one, known.get(one.kind.scatters, 0.0)) for one in scatter]
+        found = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
+    return with_scatter(fitted, tuple(found))
+
+
+def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
+    """In which of the numbers that may scatter the runs differ: the one missed least is left out, one by one."""
+    kept = np.ones(prior.usual.size, bool)
+    while kept.sum() > 1:
+        places = np.flatnonzero(kept)
+        gains = [_gain(columns, prior, kept, np.arange(kept.size) == place) for place in places]
+        least = int(np.argmin(gains))
+        if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
+            break
+        kept[places[least]] = False
+    return kept
+
+
+def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
+    """A fit with other chance differences between its runs; as given where that fails."""
+    if scatter == fitted.problem.scatter:
+        return fitted
+    names = fitted.problem.parameters.own_names
+    problem, point = with_deviations(*without_deviations(fitted), scatter)
+    for place, name in enumerate(problem.parameters.own_names):
+        if name in names:
+            point.release[:, place] = fitted.point.release[:, names.index(name)]
+    return try_fit(problem, point, tolerance=_TOLERANCE) or fitted
+
+
+def named(fitted: Fit) -> tuple[str, ...]:
+    """The chance differences of a fit that its runs show beyond what the campaign states."""
+    return tuple(one.name for one in fitted.problem.scatter if one.shown)
+
+
+def _evident(columns: RunColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
+    """Whether the runs differ by more than the least widths."""
+    limit = chdtri(float(which.sum()), chosen.scatter_rate)
+    return bool(_gain(columns, prior, np.ones_like(which), which) >= limit)
+
+
+def _gain(columns: RunColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
+    """Fall of −2 ln L by some of the differences beside the others that are kept."""
+    whole = columns.likeliest(_held(prior, ~kept))
+    without = columns.likeliest(_held(prior, ~kept | lost))
+    return without.found.restricted - whole.found.restricted
+
+
+def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
+    """The prior with some widths held at their least."""
+    usual, decades = np.where(at_least, prior.least, prior.usual), np.where(at_least, 0.0, prior.decades)
+    return replace(prior, usual=usual, decades=decades)
 
 
 def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
@@ -89,9 +183,9 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
         if between is None:
             return fitted
         prior = width_prior(fitted.problem)
-        now = np.array([width for _, width in fitted.problem.scatter])
+        now = np.array([one.width for one in fitted.problem.scatter])
         here = fitted.columns.at(now, prior)
-        if here.restricted - between.restricted < fitted.settings.scatter.settled:
+        if here.restricted - between.restricted < fitted.settings.scatter.widths_settled:
             return fitted
         again = try_fit(with_widths(fitted.problem, between), fitted.point, base=fitted)
         if again is None:
@@ -102,5 +196,5 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
 
 def with_widths(problem: Problem, between: Between) -> Problem:
     """A problem with other widths of the same differences."""
-    kinds = (kind for kind, _ in problem.scatter)
-    return replace(problem, scatter=tuple(zip(kinds, between.widths.tolist(), strict=True)))
+    wider = (one.as_wide_as(width) for one, width in zip(problem.scatter, between.widths, strict=True))
+    return replace(problem, scatter=tuple(wider))

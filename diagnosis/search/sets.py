@@ -18,6 +18,7 @@ from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival
+from diagnosis.search.scatter import with_scatter
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 
 if TYPE_CHECKING:
@@ -112,7 +113,11 @@ class Sets:
         found = {h.names: self.view.whole(h) for h in self.hypotheses if set(h.names) < set(names)}
         if self.settled is not None:
             at_random = any(moment.effects == names for moment in self.random)
-            found[names] = self.settled if at_random else self.view.finished(self.settled)
+            found[names] = whole = self.settled if at_random else self.view.finished(self.settled)
+            # its parts are compared with it: their runs differ by chance as much as the answer's
+            parts = {key: part for key, part in found.items() if part is not None and key != names}
+            for key, part in parts.items():
+                found[key] = replace(part, fit=with_scatter(part.fit, whole.fit.problem.scatter))
         return found
 
 

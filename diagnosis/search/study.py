@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from diagnosis.facts.disturbance import Disturbance
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.nominal import NominalModel
@@ -16,6 +17,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
+from diagnosis.search.scatter import named
 from diagnosis.search.sets import Names, Sets
 from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
@@ -82,6 +84,7 @@ class Study:
         answers: the answer first, then the most probable ones; empty where there is no gap.
         refused: by names of refused answers, their effects that no half of the records shows.
         rivals: what was weighed from outside the vocabulary.
+        disturbed: runs that were disturbed, which are left out from then on.
         caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
         seconds: wall time by step, s.
     """
@@ -91,6 +94,7 @@ class Study:
     answers: tuple[Answer, ...] = ()
     refused: Mapping[Names, Names] = field(default_factory=dict)
     rivals: tuple[FoundRival, ...] = ()
+    disturbed: tuple[Disturbance, ...] = ()
     caution: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 
@@ -135,11 +139,21 @@ class Study:
         return self.answer.effects if self.answer else ()
 
     @property
+    def scattering(self) -> Names:
+        """The chance differences between the runs, as far as they are more than is stated."""
+        return () if self.fitted == UNKNOWN else named(self.chosen)
+
+    @property
+    def beside(self) -> Names:
+        """Causes beside those that sets of effects differ by: read off the records, or differences between runs."""
+        return (*self.read_off, *self.scattering)
+
+    @property
     def causes(self) -> Names:
         """All causes, sorted; ``unknown`` alone where nothing in the vocabulary explains the gap."""
         if self.fitted == UNKNOWN:
             return UNKNOWN
-        return tuple(sorted({*self.read_off, *self.fitted}))
+        return tuple(sorted({*self.beside, *self.fitted}))
 
     @property
     def named(self) -> bool:
@@ -185,7 +199,9 @@ class Study:
             left = misfit(prepared.nominal)
             answers = [replace(one, choices=_choices(one, prepared.nominal, left)) for one in answers]
         caution, refused = sets.view.caution, sets.refused
-        return cls(prepared, gap, tuple(answers), refused, sets.rivals, caution, clock.seconds)
+        return cls(
+            prepared, gap, tuple(answers), refused, sets.rivals, caution=caution, seconds=clock.seconds
+        )
 
 
 def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:

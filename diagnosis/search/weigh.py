@@ -184,7 +184,7 @@ def log_weight(
     """
     own, nominal = scatter_cost
     cost = min(own + chosen.needless_scatter * effects, max(own, nominal))
-    price = chosen.set_price * effects + chosen.form_price * numbers + 0.5 * chosen.scatter * cost
+    price = chosen.set_price * effects + chosen.form_price * numbers + 0.5 * chosen.scatter_exponent * cost
     return -chosen.steepness * log_misfit(left, scale, OF_MOTION, chosen.leak) - price
 
 

@@ -230,24 +230,25 @@ class RandomMomentSettings:
 class ScatterSettings:
     """Chance differences between runs."""
 
-    decades: float = setting(
-        1.0,
-        "Standard deviation of the decimal logarithm of a width about the usual one.",
-        "judgement",
-        "Rigs repeat ten times better or worse than usual.",
-        decision="0036",
-    )
-    least: float = setting(
-        1e-3, "Least width, as a share of the usual one.", "judgement", "No run shows so little."
-    )
-    most: float = setting(30.0, "Greatest width, over the usual one.", "judgement")
-    rate: float = setting(
+    scatter_rate: float = setting(
         0.001,
         "Rate at which runs that repeat are said to differ by chance.",
         "convention",
         ONE_IN_1000,
     )
-    settled: float = setting(
+    which_scatters_rate: float = setting(
+        0.05,
+        "Rate at which a number is said to scatter beside others that do.",
+        "convention",
+        "Whether the runs differ at all is tested at the rate above.",
+    )
+    outlier_rate: float = setting(
+        0.001,
+        "Rate at which a run is said to deviate far beyond the others.",
+        "convention",
+        ONE_IN_1000,
+    )
+    widths_settled: float = setting(
         1.0,
         "Fall of −2 ln L from which a fit is repeated with other widths.",
         "convention",
@@ -261,7 +262,7 @@ class WeighingSettings:
     """How sets of effects are weighed, and when none of them is named."""
 
     steepness: float = setting(1.25, "Exponent of what is left in a channel.", "tuned", decision="0007")
-    scatter: float = setting(
+    scatter_exponent: float = setting(
         1.0,
         "Exponent of the evidence of chance differences between the runs.",
         "convention",

@@ -186,6 +186,24 @@ class Effect:
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
 
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """What a relative deviation of 1 of the number that scatters changes of a run's linear motion.
+
+        Args:
+            spring: Kr, N m/rad.
+            damping: Cr, N m s/rad.
+            air_stiffness: Ka of the run, N m/rad.
+            air_damping: Ca of the run, N m s/rad.
+
+        Returns:
+            Changes of the stiffness Kr − Ka, N m/rad, and of the damping Cr − Ca, N m s/rad.
+        """
+        del spring, damping, air_stiffness, air_damping
+        return 0.0, 0.0
+
     def plausible(self, omega: float) -> bool:
         """Whether a fitted effect is still what its name means.
 

@@ -63,6 +63,14 @@ class WindSpeedScatter(BetweenRuns):
 
     spread: float = _spread("standard deviation of the speed between runs, relative", 0.003)
 
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """Ka grows with V², and Ca with V."""
+        del spring, damping
+        return -2.0 * air_stiffness, -air_damping
+
 
 @dataclass(frozen=True)
 class StiffnessScatter(BetweenRuns):
@@ -84,6 +92,14 @@ class StiffnessScatter(BetweenRuns):
 
     spread: float = _spread("standard deviation of the stiffness between runs, relative", 0.0005)
 
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """The spring's own."""
+        del damping, air_stiffness, air_damping
+        return spring, 0.0
+
 
 @dataclass(frozen=True)
 class DampingScatter(BetweenRuns):
@@ -101,3 +117,11 @@ class DampingScatter(BetweenRuns):
     example = (0.2,)
 
     spread: float = _spread("standard deviation of the mechanical damping between runs, relative", 0.01)
+
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """The mechanical one's own."""
+        del spring, air_stiffness, air_damping
+        return 0.0, damping

@@ -12,7 +12,7 @@ from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis, polish
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
-from diagnosis.search.scatter import scattered
+from diagnosis.search.scatter import evident, scattered
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 
@@ -82,4 +82,5 @@ class WholeRuns(View):
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer fitted to convergence: only now, as another view may follow."""
-        return polish(settled)
+        polished = polish(settled)
+        return replace(polished, fit=evident(polished.fit))

@@ -9,13 +9,15 @@ Mixed-Effects Models in S and S-PLUS, Springer 2000, chapter 2; Harville, J. Am.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tunnel_sim.vocabulary.record import Array
 
+_ABSORBED = 1e-13  # share of a column's power, below which deviations of the runs absorb all of it
+_RIDGE = 1e-11  # of the scaled normal matrix: what the runs do not determine says nothing of widths
 _NULL = 1e-11  # eigenvalue of the scaled normal matrix, relative to the largest, that counts as zero
 
 
@@ -104,8 +106,10 @@ def marginal(runs: RunProducts, widths: Array) -> Marginal:
     weighted = weight @ runs.mixed
     normal = (runs.common - np.swapaxes(runs.mixed, 1, 2) @ weighted).sum(axis=0)
     seen = (runs.common_seen - np.einsum("rkp,rk->rp", weighted, runs.own_seen)).sum(axis=0)
-    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
+    seen_at_all = np.diag(normal) > _ABSORBED * np.diagonal(runs.common, axis1=1, axis2=2).sum(axis=0)
+    size = np.sqrt(np.where(seen_at_all, np.diag(normal), 1.0))
+    scaled_normal = np.where(np.outer(seen_at_all, seen_at_all), normal / np.outer(size, size), 0.0)
+    values, vectors = np.linalg.eigh(scaled_normal)
     kept = values > _NULL * values[-1] if values.size else np.zeros(0, bool)
     root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     covariance = root @ root.T
@@ -187,3 +191,93 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
     found = minimize(at, np.log(widths[free]), jac=True, method="L-BFGS-B", bounds=bounds)
     widths[free] = np.exp(found.x)
     return widths
+
+
+DEVIATIONS = ("wind_speed", "spring_stiffness", "mechanical_damping")
+"""What differs between runs, by the key of ``[repeatability]``; each relative to the run's own value."""
+
+
+@dataclass(frozen=True)
+class UsualWidths:
+    """What is known of the widths of runs that nobody has stated: judgements on rigs in general.
+
+    Args:
+        wind_speed: a good tunnel holds its speed to some tenths of a per cent; relative, one standard deviation.
+        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; the same.
+        mechanical_damping: bearings and cables come back to a per cent; the same.
+        decades: standard deviation of log10(width): a rig ten times as good or as bad is not unusual.
+        least: least width that is considered, over the usual one.
+        most: greatest width that is considered, over the usual one.
+    """
+
+    wind_speed: float = 0.003
+    spring_stiffness: float = 0.0005
+    mechanical_damping: float = 0.01
+    decades: float = 1.0
+    least: float = 1e-3
+    most: float = 30.0
+
+    def prior(self, names: Sequence[str], stated: Mapping[str, float]) -> WidthPrior:
+        """What is known of the widths of some deviations.
+
+        Args:
+            names: of `DEVIATIONS`.
+            stated: relative standard deviations that the campaign states, by name; they are used as they are.
+        """
+        usual = np.array([getattr(self, name) for name in names], np.float64)
+        least = self.least * usual
+        known = np.array([stated.get(name, 0.0) for name in names])
+        free = np.array([name not in stated for name in names], bool)
+        middle = np.where(free, usual, np.maximum(known, 1e-6 * usual))  # of a width of zero nothing is seen
+        return WidthPrior(middle, np.where(free, self.decades, 0.0), least, self.most * usual)
+
+
+_GRID = 15  # widths in each direction
+_REACH = (40.0, 8.0)  # how far below and above the likeliest width the grid reaches, as ratios
+_AT_ONCE = 1500  # points of the grid
+
+
+def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float]) -> Array:
+    """Quantiles of every width given the runs, the others integrated out.
+
+    Args:
+        levels: of the quantiles, fractions.
+
+    Returns:
+        Widths, shape (levels, k); a width that is stated is as stated at every level.
+    """
+    best = likeliest_widths(runs, prior)
+    axes = []
+    for width, free, least, most in zip(best, prior.free, prior.least, prior.most, strict=True):
+        low, high = max(least, width / _REACH[0]), min(most, width * _REACH[1])
+        axes.append(np.geomspace(low, high, _GRID) if free and high > low else np.array([width]))
+    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
+    parts = [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
+    cost = np.concatenate([_restricted(runs, part) for part in parts])
+    cost += np.array([prior.cost(point) for point in points])
+    density = np.exp(-0.5 * (cost - cost.min())).reshape([axis.size for axis in axes])
+    found = np.empty((len(levels), best.size))
+    for k, axis in enumerate(axes):
+        others = tuple(j for j in range(len(axes)) if j != k)
+        share = density.sum(axis=others)
+        total = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
+        level = total / total[-1] if axis.size > 1 else np.ones(1)
+        found[:, k] = np.exp(np.interp(levels, level, np.log(axis)))
+    return found
+
+
+def _restricted(runs: RunProducts, widths: Array) -> Array:
+    """−2 ln L of many widths, as `Marginal.restricted`, shape (points,); widths of shape (points, k)."""
+    scale = widths[:, None, :, None] * widths[:, None, None, :]
+    inverse = np.linalg.inv(np.eye(widths.shape[1]) + scale * runs.own)
+    weight = scale * inverse
+    weighted = weight @ runs.mixed
+    normal = (runs.common - np.swapaxes(runs.mixed, 1, 2) @ weighted).sum(axis=1)
+    seen = (runs.common_seen - np.einsum("grkp,rk->grp", weighted, runs.own_seen)).sum(axis=1)
+    size = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-300))
+    scaled = normal / (size[:, :, None] * size[:, None, :]) + _RIDGE * np.eye(size.shape[1])
+    explained = np.einsum("gp,gp->g", seen / size, np.linalg.solve(scaled, (seen / size)[..., None])[..., 0])
+    alone = np.einsum("rk,grkl,rl->g", runs.own_seen, weight, runs.own_seen)
+    information = np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum(axis=1)
+    cost = -np.linalg.slogdet(inverse)[1].sum(axis=1) - alone - explained + information
+    return np.asarray(cost + runs.power.sum(), np.float64)
