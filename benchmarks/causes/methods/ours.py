@@ -26,7 +26,8 @@ def answer(folder: Path) -> dict[str, Any]:
     stated = {
         when: _stated(values) for when, values in found["coefficients"].items() if when in ("before", "after")
     }
-    return answer_of(found["causes"], probability, [(n, p / total) for n, p in sets], stated)
+    answered = answer_of(found["causes"], probability, [(n, p / total) for n, p in sets], stated)
+    return answered | ({"scatter": found["scatter"]} if found.get("scatter") else {})
 
 
 def _names(effect: str) -> tuple[str, ...]:
