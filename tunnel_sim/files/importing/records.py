@@ -271,15 +271,10 @@ _RIG = {
     "yaw_inertia": "kg m2, nominal Izz of model and support; optional",
     "width": "m, for Strouhal numbers; optional",
 }
-_SPREAD = "one standard deviation between runs, relative, such as"
-_TABLES: Mapping[str, Mapping[str, str]] = {
-    "rig": _RIG,
-    "repeatability": {
-        "wind_speed": f"{_SPREAD} 0.003; optional",
-        "spring_stiffness": f"{_SPREAD} 0.0005; optional",
-        "mechanical_damping": f"{_SPREAD} 0.01; optional",
-    },
-}
+_REPEATABILITY = (
+    "# [repeatability]   # optional: wind_speed, spring_stiffness and mechanical_damping, each as one standard\n"
+    "#                   # deviation between runs, relative, such as 0.003\n"
+)
 _RUN = {
     "spring_stiffness": "N m/rad: needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
     "air_density": "kg/m3: needed for Cnβ and Cnr",
@@ -349,12 +344,10 @@ def originals(imported: Imported) -> list[str]:
 def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too."""
     tables = {key: value for key, value in document.items() if key != "runs"}
-    known = [(name, hints, tables.pop(name, {})) for name, hints in _TABLES.items()]
-    head = [tomli_w.dumps(tables)]
-    for name, hints, stated in known:
-        unknown = [f"# {key} =   # {why}" for key, why in hints.items() if key not in stated]
-        head.append("\n".join([f"[{name}]", *unknown, tomli_w.dumps(stated)]))
-    head.append(_RUNS_HEAD)
+    rig = tables.pop("rig", {})
+    unknown = [f"# {key} =   # {why}" for key, why in _RIG.items() if key not in rig]
+    head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)])]
+    head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
     blocks = []
     for run in document["runs"]:
         unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
