@@ -113,11 +113,25 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
         ],
         "inclusion": {n: float(answer["probability"].get(n, 0.0)) for n in NAMES} if own is not None else {},
         "coefficients": answer.get("coefficients", {}),
-        "scatter": answer.get("scatter", {}),
+        "repeatability": {"spreads": _spreads(answer.get("scatter", {}))},
         "gap": {"closed": 0.0},  # not asked of an entry
         "wall_s": float(answer.get("seconds", 0.0)),
     }
     return case(name, truth, document)
+
+
+def _spreads(scatter: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What an entry says of the scatter between runs, as a diagnosis has it."""
+    effects = {number: name for name, number in SCATTERING.items()}
+    return [
+        {
+            "effect": effects[number],
+            "width": one["value"],
+            "interval": one["interval_90"],
+            "shown": one["named"],
+        }
+        for number, one in scatter.items()
+    ]
 
 
 def log_score(cases: Sequence[Case]) -> float | None:

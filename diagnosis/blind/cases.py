@@ -70,14 +70,20 @@ class _Gap(_Read):
     closed: float | None = None
 
 
-class _Scattering(_Read):
-    value: _Width
-    interval_90: tuple[_Width, _Width] = Field(strict=False)
+class _Spread(_Read):
+    effect: str
+    width: _Width
+    interval: tuple[_Width, _Width] = Field(strict=False)
+    shown: bool
+
+
+class _Repeatability(_Read):
+    spreads: list[_Spread] = []
 
 
 class _Answer(_Read):
     causes: list[str] | None
-    scatter: dict[str, _Scattering] = {}
+    repeatability: _Repeatability | None = None
     ambiguous_with: list[str] = []
     candidates: list[_Candidate] = []
     inclusion: dict[str, _Probability] = {}
@@ -154,8 +160,16 @@ class Case:
     @property
     def named_scatter(self) -> frozenset[str]:
         """The numbers of the runs that are said to scatter."""
-        beside = self.answer.get("scatter", {})
-        return frozenset({*beside, *(SCATTERING[n] for n in self.answer["causes"] or () if n in SCATTERING)})
+        return frozenset(
+            {SCATTERING[name] for name in self.answer["causes"] or () if name in SCATTERING}
+            | {number for number, spread in self.spreads.items() if spread["shown"]}
+        )
+
+    @property
+    def spreads(self) -> dict[str, Mapping[str, Any]]:
+        """What is said of the scatter of each number: its ``width``, ``interval`` and whether it is ``shown``."""
+        said = (self.answer.get("repeatability") or {}).get("spreads", ())
+        return {SCATTERING[one["effect"]]: one for one in said if one["effect"] in SCATTERING}
 
     @property
     def right(self) -> bool:

@@ -24,8 +24,8 @@ class FoundScatter:
         number: ``wind_speed``, ``spring_stiffness``, ``mechanical_damping`` or ``all``.
         named: where it scatters and nothing is stated, how often that is said.
         false: where it is said to scatter, how often it does not.
-        within: of the widths named rightly, those within a factor of 1.5 of the one drawn.
-        covered: of these, those whose 90 % interval holds the one drawn.
+        within: where it scatters and nothing is stated, how often the width is right within a factor of 1.5.
+        covered: where the width has an interval of 90 % as well, how often that holds the true one.
     """
 
     number: str
@@ -91,19 +91,24 @@ def scatter_score(cases: Sequence[Case]) -> ScatterScore:
 
 
 def _found(names: Sequence[str], normal: Sequence[Case], repeating: Sequence[Case]) -> FoundScatter:
-    acting = [(c, name) for c in normal for name in names if name in c.scatter.widths]
-    said = [(c, name) for c in (*normal, *repeating) for name in names if name in c.named_scatter]
-    widths = [
-        (c.answer["scatter"][name], c.scatter.widths[name])
-        for c, name in acting
-        if name in c.answer.get("scatter", {})
+    acting = [
+        (c, name, c.scatter.widths[name], c.spreads.get(name))
+        for c in normal
+        if not c.scatter.stated
+        for name in names
+        if name in c.scatter.widths
     ]
+    said = [(c, name) for c in (*normal, *repeating) for name in names if name in c.named_scatter]
+    intervals = [(true, *spread["interval"]) for _, _, true, spread in acting if spread is not None]
     return FoundScatter(
         names[0] if len(names) == 1 else ALL,
-        named=Proportion.of([name in c.named_scatter for c, name in acting if not c.scatter.stated]),
+        named=Proportion.of([name in c.named_scatter for c, name, _, _ in acting]),
         false=Proportion.of([name not in c.scatter.widths for c, name in said]),
-        within=Proportion.of([1.0 / FACTOR <= one["value"] / true <= FACTOR for one, true in widths]),
-        covered=Proportion.of(
-            [one["interval_90"][0] <= true <= one["interval_90"][1] for one, true in widths]
+        within=Proportion.of(
+            [
+                spread is not None and true / FACTOR <= spread["width"] <= true * FACTOR
+                for _, _, true, spread in acting
+            ]
         ),
+        covered=Proportion.of([low <= true <= high for true, low, high in intervals if low < high]),
     )

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from diagnosis.blind.cases import case, found_by_group, inclusions
+from diagnosis.blind.cases import SCATTERING, case, found_by_group, inclusions
 from diagnosis.blind.scatter import scatter_score
 from diagnosis.blind.score import Score
 from identification.statistics import Proportion
@@ -17,8 +17,14 @@ SPEED = {"wind_speed": 0.003}
 THREE = {"wind_speed": 0.003, "spring_stiffness": 0.0005, "mechanical_damping": 0.01}
 
 
-def width(value, low, high):
-    return {"value": value, "interval_90": [low, high]}
+def width(value, low, high, *, shown=True):
+    return {"width": value, "interval": [low, high], "shown": shown}
+
+
+def spreads(said):
+    """What an answer says of the scatter, by number."""
+    effects = {number: name for name, number in SCATTERING.items()}
+    return {"spreads": [{"effect": effects[number], **one} for number, one in said.items()]}
 
 
 def made(effects, causes, *, widths=None, said=None, stated=None, form="normal", **more):
@@ -26,7 +32,7 @@ def made(effects, causes, *, widths=None, said=None, stated=None, form="normal",
     truth = {**TRUTH, "effects": effects, "scatter_form": form, **more}
     truth |= {} if widths is None else {"scatter": widths, "scatter_level": "large"}
     truth |= {} if stated is None else {"repeatability": stated}
-    return case("c", truth, document(causes) | ({} if said is None else {"scatter": said}))
+    return case("c", truth, document(causes) | ({} if said is None else {"repeatability": spreads(said)}))
 
 
 CASES = (
@@ -34,7 +40,9 @@ CASES = (
     made([], [], widths=SPEED, said={"wind_speed": width(0.004, 0.002, 0.006),
                                      "mechanical_damping": width(0.01, 0.005, 0.02)}),
     made([], [], widths={"mechanical_damping": 0.01}, said={"mechanical_damping": width(0.02, 0.015, 0.03)}),
-    made([], ["unknown"], widths=THREE),
+    # all three, of which the likeliest widths are said although none is shown
+    made([], ["unknown"], widths=THREE, said={name: width(1.2 * w, 0.0, 0.5 * w, shown=False)
+                                              for name, w in THREE.items()}),
     made([], ["wind_speed_scatter"], widths=SPEED),  # named among the causes
     made([], ["coulomb_friction", "wind_speed_scatter"], widths=SPEED),
     # stated
@@ -66,13 +74,13 @@ def test_scatter_is_counted_as_by_hand():
     # of normal campaigns whose speed scatters unstated: three say so, two of them by naming a cause
     assert speed.named == Proportion(3, 6)
     assert speed.false == Proportion(0, 4)
-    assert (speed.within, speed.covered) == (Proportion(2, 2), Proportion(2, 2))
+    assert (speed.within, speed.covered) == (Proportion(2, 6), Proportion(1, 2))
     assert spring.named == Proportion(0, 1)
     assert spring.false == Proportion(1, 1)
-    assert spring.within == Proportion(0, 0)
+    assert (spring.within, spring.covered) == (Proportion(1, 1), Proportion(0, 1))
     assert damping.named == Proportion(2, 3)
     assert damping.false == Proportion(1, 3)
-    assert (damping.within, damping.covered) == (Proportion(0, 1), Proportion(0, 1))
+    assert (damping.within, damping.covered) == (Proportion(1, 3), Proportion(0, 2))
     assert by_number["all"].named == Proportion(5, 10)
     assert by_number["all"].false == Proportion(2, 8)
 
@@ -111,7 +119,15 @@ def test_a_set_whose_runs_repeat_says_nothing_of_scatter():
     assert score.to_json_dict()["scatter"] is None
 
 
-@pytest.mark.parametrize("said", [{"wind_speed": 0.003}, {"wind_speed": width(-1.0, 0.0, 1.0)}, [1]])
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"spreads": [{"effect": "wind_speed_scatter", "width": 0.003}]},
+        {"spreads": [{"effect": "wind_speed_scatter", **width(-1.0, 0.0, 1.0)}]},
+        {"spreads": [{"effect": "wind_speed_scatter", **width(0.1, 0.0, 1.0), "interval": [0.1]}]},
+        [1],
+    ],
+)
 def test_a_malformed_scatter_is_refused(said):
     with pytest.raises(ValueError, match="validation error"):
-        made([], [], widths=SPEED, said=said)
+        case("c", {**TRUTH, "effects": []}, document([]) | {"repeatability": said})

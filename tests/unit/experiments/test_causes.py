@@ -112,7 +112,8 @@ def test_scatter_is_scored_beside_the_causes(tmp_path):
     knows, gaps, everywhere = {}, {}, {}
     for name, truth in truths.items():
         width = {
-            n: {"value": v, "interval_90": [0.5 * v, 2.0 * v]} for n, v in truth.get("scatter", {}).items()
+            n: {"value": v, "interval_90": [0.5 * v, 2.0 * v], "named": True}
+            for n, v in truth.get("scatter", {}).items()
         }
         unstated = {} if truth.get("repeatability") else width
         knows[name] = {"campaign": name, **answer_of(truth["effects"], {}), "scatter": unstated}
