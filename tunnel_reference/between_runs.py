@@ -119,7 +119,7 @@ FORMS: Mapping[str, tuple[Group, Draw]] = {
 
 
 def draw_scatter(
-    rng: np.random.Generator, runs: int, *, level: str, textbook: float, rare: float, stated: float
+    rng: np.random.Generator, runs: int, *, level: str, normal: float, rare: float, stated: float
 ) -> ScatterDraw:
     """Draw how the runs of a campaign differ.
 
@@ -127,7 +127,7 @@ def draw_scatter(
         rng: source of all random numbers.
         runs: number of runs, a count.
         level: of ``LEVELS``, or ``MIXED``.
-        textbook: probability that the deviations are normal.
+        normal: probability that the deviations are normal.
         rare: probability that another form is a rare one.
         stated: probability that the campaign states the widths.
     """
@@ -137,7 +137,7 @@ def draw_scatter(
     )
     names = names or [str(rng.choice(list(USUAL)))]
     widths = {name: USUAL[name] * float(np.exp(rng.uniform(*np.log(LEVELS[of])))) for name in names}
-    group = Group.TEXTBOOK if rng.random() < textbook else Group.RARE if rng.random() < rare else Group.COMMON
+    group = Group.TEXTBOOK if rng.random() < normal else Group.RARE if rng.random() < rare else Group.COMMON
     form = str(rng.choice([name for name, (of_form, _) in FORMS.items() if of_form is group]))
     known = {name: float(f"{width:.2g}") for name, width in widths.items()} if rng.random() < stated else {}
     return ScatterDraw(of, form, widths, FORMS[form][1](rng, widths, runs), known)

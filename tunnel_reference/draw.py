@@ -153,6 +153,7 @@ class Mixture:
         scatter: probability that the runs differ from each other.
         level: of these differences, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
         stated: probability that a campaign states its differences.
+        normal: probability that they are normally distributed; ``rare`` is that of a rare form of the others.
     """
 
     textbook: float = 0.5
@@ -165,6 +166,7 @@ class Mixture:
     scatter: float = 0.0
     level: str = MIXED
     stated: float = 0.5
+    normal: float = 0.5
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -219,7 +221,7 @@ def draw_campaign(
             between,
             conditions.runs,
             level=mixture.level,
-            textbook=mixture.textbook,
+            normal=mixture.normal,
             rare=mixture.rare,
             stated=mixture.stated,
         )

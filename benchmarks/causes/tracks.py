@@ -30,7 +30,7 @@ class Track:
         scatter: whether the runs differ by chance.
         level: of the scatter, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
         stated: share of campaigns that state their scatter.
-        textbook: share of textbook forms, of effects and of the distribution of the scatter, which is normal.
+        normal: share of campaigns whose scatter is normal; the others have another distribution.
     """
 
     count: int
@@ -41,7 +41,7 @@ class Track:
     scatter: bool = False
     level: str = MIXED
     stated: float = 0.0
-    textbook: float = 0.5
+    normal: float = 0.5
 
 
 TRACKS: Mapping[str, Track] = {
@@ -63,10 +63,10 @@ TRACKS: Mapping[str, Track] = {
 
 _SCATTERING: Mapping[str, Track] = {
     "scatter_alone": Track(
-        16, {"none": 1.0}, "runs that differ by chance, and nothing else", scatter=True, level="usual", textbook=1.0
+        16, {"none": 1.0}, "runs that differ by chance, and nothing else", scatter=True, level="usual", normal=1.0
     ),
     "scatter_stated": Track(
-        16, {"none": 1.0}, "the same, and the campaign states by how much", scatter=True, stated=1.0, textbook=1.0
+        16, {"none": 1.0}, "the same, and the campaign states by how much", scatter=True, stated=1.0, normal=1.0
     ),
     "beside_scatter": Track(
         24, {"single": 0.6, "pair": 0.4}, "one or two effects in runs that differ by chance", scatter=True,
@@ -145,12 +145,12 @@ def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
     pool = np.array(track.first or FAMILIES)
     turns = [str(f) for _ in range(-(-count // len(pool))) for f in rng.permutation(pool)]
     mixture = Mixture(
-        textbook=track.textbook,
         variety=0.0,
         certain=track.certain,
         scatter=float(track.scatter),
         level=track.level,
         stated=track.stated,
+        normal=track.normal,
     )
     draws = []
     for index, kind in enumerate(plan_kinds(count, dict(track.kinds))):

@@ -423,6 +423,7 @@ def score_set(
                     "scatter": float(made_with.get("scatter", 0.0)),
                     "scatter_level": str(made_with.get("scatter_level", "mixed")),
                     "stated": float(made_with.get("stated", 0.5)),
+                    "scatter_normal": float(made_with.get("scatter_normal", 0.5)),
                 }
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"

@@ -153,6 +153,7 @@ def make_blind(
                 "scatter": mixture.scatter,
                 "scatter_level": mixture.level,
                 "stated": mixture.stated,
+                "scatter_normal": mixture.normal,
             },
             "truths": truths,
         }

@@ -22,7 +22,7 @@ RIG = rig((21.02, 67.98, 21.02, 67.98), (0.0, 0.0, 25.0, 15.0), (0.35, 0.2, 0.35
 
 
 def scatter(seed=1, runs=4, **changes):
-    chosen = {"level": "usual", "textbook": 1.0, "rare": 0.0, "stated": 0.0, **changes}
+    chosen = {"level": "usual", "normal": 1.0, "rare": 0.0, "stated": 0.0, **changes}
     return draw_scatter(np.random.default_rng(seed), runs, **chosen)
 
 
@@ -84,7 +84,7 @@ def test_forms_are_of_their_group():
     for seed in range(30):
         assert scatter(seed).form == "normal"
         for rare, group in ((0.0, Group.COMMON), (1.0, Group.RARE)):
-            found = scatter(seed, level=MIXED, textbook=0.0, rare=rare)
+            found = scatter(seed, level=MIXED, normal=0.0, rare=rare)
             assert FORMS[found.form][0] is group
 
 
@@ -118,7 +118,7 @@ def simulated(found, base=RIG):
 
 def test_every_run_moves_with_its_own_numbers():
     quiet = replace(RIG, noise_std=1e-12, resolution=1e-9, zero=0.0)
-    found = scatter(3, level="large", textbook=0.0, rare=0.0)
+    found = scatter(3, level="large", normal=0.0, rare=0.0)
     deviations = {
         "wind_speed": np.array([0.02, -0.01, 0.03, -0.02]),
         "spring_stiffness": np.array([0.01, -0.02, 0.005, 0.015]),

@@ -104,6 +104,15 @@ def make(
         ScatterLevel,
         Option("--scatter-level", help="Widths: small or large (mixed), or the usual ones throughout."),
     ] = ScatterLevel.MIXED,
+    scatter_normal: Annotated[
+        float,
+        Option(
+            "--scatter-normal",
+            min=0,
+            max=1,
+            help="Share of these that are normal; the rest has tails, zeros of the runs, a walk or a drift.",
+        ),
+    ] = 0.5,
     stated: Annotated[
         float, Option("--stated", min=0, max=1, help="Share of these that state a [repeatability].")
     ] = 0.5,
@@ -142,7 +151,7 @@ def make(
             out, count=count, seed=seed, shares=shares, key=key,
             mixture=Mixture(
                 textbook, rare, variety, small, driven=driven, departures=departures,
-                scatter=scatter, level=scatter_level.value, stated=stated,
+                scatter=scatter, level=scatter_level.value, stated=stated, normal=scatter_normal,
             ),
             progress=progress,
             show_steps=console(stderr=True).is_terminal,

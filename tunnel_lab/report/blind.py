@@ -256,8 +256,9 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
             + (f" --departures {made['departures']:g}" if made["departures"] else "")
             + f" --scatter {made.get('scatter', 0.0):g}"
             + (
-                f" --scatter-level {made['scatter_level']} --stated {made['stated']:g}"
-                if made["scatter"]
+                f" --scatter-level {made['scatter_level']} --scatter-normal {made['scatter_normal']:g}"
+                f" --stated {made['stated']:g}"
+                if made.get("scatter")
                 else ""
             )
         ]
