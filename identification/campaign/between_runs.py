@@ -204,10 +204,10 @@ class UsualWidths:
 
     Args:
         wind_speed: a good tunnel holds its speed to some tenths of a per cent; a fraction, one standard deviation.
-        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; a fraction, one
-            standard deviation.
+        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; a fraction,
+            one standard deviation.
         mechanical_damping: bearings and cables come back to a per cent; a fraction, one standard deviation.
-        decades: standard deviation of log10(width), dimensionless: a rig ten times as good or as bad is not unusual.
+        decades: standard deviation of log10(width), dimensionless: a rig ten times as good or bad is not unusual.
         least: least width that is considered, over the usual one; a ratio.
         most: greatest width that is considered, over the usual one; a ratio.
     """
