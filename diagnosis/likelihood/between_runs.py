@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtrc
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
@@ -39,9 +40,7 @@ def width_prior(problem: Problem) -> WidthPrior:
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
     least = np.maximum(_USUAL.least * usual, given)
     decades = np.full(usual.size, _USUAL.decades)
-    return WidthPrior(
-        np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least)
-    )
+    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +108,11 @@ class RunColumns:
         """The likeliest widths and what they make of the runs."""
         widths = likeliest_widths(self.products, prior, start)
         return self.at(widths, prior)
+
+    def wider(self, prior: WidthPrior, widths: Array) -> float:
+        """Probability that runs of given widths seem to differ as much more as they do, by the likelihood ratio."""
+        gain = self.at(widths, prior).found.restricted - self.likeliest(prior, widths).found.restricted
+        return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
     def at(self, widths: Array, prior: WidthPrior) -> Between:
         """What given widths make of the runs."""

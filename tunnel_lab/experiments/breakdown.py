@@ -151,12 +151,7 @@ def make_cases(
         starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
         noise = float(np.sqrt(draw.conditions.noise_power))
         bound = campaign_bound(
-            campaign,
-            **TRUTH,
-            noise_std=noise,
-            initial_states=starts,
-            random_moments=None,
-            repeatability=None,
+            campaign, noise_std=noise, initial_states=starts, random_moments=None, repeatability=None, **TRUTH
         )
         cases.append(
             BiasCase(

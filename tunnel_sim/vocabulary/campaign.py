@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
@@ -178,6 +179,25 @@ class Campaign:
     def unrestrained(self) -> bool:
         """Whether nothing holds the body in any run (`Run.unrestrained`)."""
         return all(run.unrestrained for run in self.runs)
+
+    def without(self, ids: Collection[str]) -> Campaign:
+        """The other runs; the campaign itself where none is named.
+
+        Args:
+            ids: of the runs to leave out.
+
+        Raises:
+            TunnelError: for an id that no run has, and where no run would remain.
+        """
+        known = [run.id for run in self.runs]
+        for name in ids:
+            if name not in known:
+                remedy = did_you_mean(name, known)
+                raise TunnelError(f"there is no run {name!r} to leave out", where=self.name, remedy=remedy)
+        kept = tuple(run for run in self.runs if run.id not in ids)
+        if not kept:
+            raise TunnelError("every run is left out", where=self.name, remedy="leave out fewer runs")
+        return replace(self, runs=kept) if ids else self
 
     def __repr__(self) -> str:
         """The runs, their conditions, and where to go from here, in three lines."""
