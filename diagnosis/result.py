@@ -16,6 +16,7 @@ from diagnosis.facts.disturbance import Disturbance
 from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Closable, Remainder
+from diagnosis.facts.repeatability import Repeatability
 from diagnosis.settings import settings_of
 from diagnosis.words.tables import diagnosis_brief, diagnosis_parts
 from diagnosis.words.written import sentences
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 1
 _LAST = (
     "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "hidden", "blind_spots", "cautions", "disturbed", "remarks", "found", "seconds", "maps", "provenance",
+    "hidden", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds", "maps",
+    "provenance",
 )  # fmt: skip
 
 
@@ -254,6 +256,7 @@ class Diagnosis:
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
         rest: what remains after the causes.
+        repeatability: how the runs repeat; None where there is one run only, or nothing holds the body.
         model: the model given, with the causes written into it; None where none was given.
         closable: how much of that could be closed, and by what; None where nothing remains beyond chance.
         sizes: what each fitted cause does to a swing.
@@ -283,6 +286,7 @@ class Diagnosis:
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)
     rest: Remainder | None = None
+    repeatability: Repeatability | None = None
     model: PatchedModel | None = None
     closable: Closable | None = None
     sizes: tuple[CauseSize, ...] = ()

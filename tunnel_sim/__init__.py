@@ -16,7 +16,13 @@ if TYPE_CHECKING:
     from tunnel_sim.files.plan_file import load_plan, paper_plan
     from tunnel_sim.files.rig_file import load_rig
     from tunnel_sim.physics.run_settings import RunSettings
-    from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+    from tunnel_sim.vocabulary.campaign import (
+        Campaign,
+        Repeatability,
+        RigProperties,
+        Run,
+        SensorProperties,
+    )
     from tunnel_sim.vocabulary.errors import TunnelError
     from tunnel_sim.vocabulary.plan import (
         AeroDerivatives,
@@ -40,7 +46,7 @@ else:
             ".files.plan_file": "load_plan paper_plan",
             ".files.rig_file": "load_rig",
             ".physics.run_settings": "RunSettings",
-            ".vocabulary.campaign": "Campaign RigProperties Run SensorProperties",
+            ".vocabulary.campaign": "Campaign Repeatability RigProperties Run SensorProperties",
             ".vocabulary.errors": "TunnelError",
             ".vocabulary.plan": "AeroDerivatives CampaignPlan Condition EffectSetting SensorModel Truth",
             ".vocabulary.record": "Record",
@@ -57,6 +63,7 @@ __all__ = [
     "Effect",
     "EffectSetting",
     "Record",
+    "Repeatability",
     "Rig",
     "RigProperties",
     "Run",

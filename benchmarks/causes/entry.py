@@ -21,8 +21,10 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 SCHEMA = Path(__file__).parent / "answer.schema.json"
 UNKNOWN = "unknown"
-NAMES: tuple[str, ...] = tuple(sorted(kind.name for kind in ALL_EFFECTS if not kind.driven))
-"""The vocabulary of causes of free decays, which all campaigns of the sets are; `unknown` is one more label."""
+NAMES: tuple[str, ...] = tuple(
+    sorted(kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters))
+)
+"""The causes of free decays, which all campaigns of the sets are; `unknown` is one more. Scatter is beside them."""
 
 Answer = Callable[[Path], dict[str, Any]]
 

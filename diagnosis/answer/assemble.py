@@ -15,6 +15,7 @@ from diagnosis.answer.held_out import excess_base, predict_held_out, waterfall
 from diagnosis.answer.judgements import beside_the_numbers, cautions, outside_the_fits, remainder
 from diagnosis.answer.linear_theory import coefficient_move, coefficients_of
 from diagnosis.answer.next_run import separating_run
+from diagnosis.answer.repeatability import repeatability
 from diagnosis.answer.reported import gap_summary, held_out_totals, report_fits
 from diagnosis.answer.units import own_estimate, own_hidden, sized_coefficients
 from diagnosis.facts.closure import PATCHED, Confirmation, NoiseSummary, Waterfall
@@ -120,10 +121,11 @@ def assemble(
             "versions": {name: version(name) for name in _PACKAGES},
             "settings": settings.differences(),
         },
-        inclusion=inclusion(weighed, study.read_off, settings.gap),
+        inclusion=inclusion(weighed, study.beside, settings.gap),
         waterfall=closes.steps,
         disturbed=study.disturbed,
         rest=_remains(study, found, answers, closes.steps),
+        repeatability=repeatability(chosen),
         model=patched,
         found=beside_the_numbers(study, said, before, after, caveats),
     )

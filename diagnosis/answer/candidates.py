@@ -104,7 +104,7 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         if answer.effects == UNKNOWN:
             found.append(Candidate("unknown", answer.probability, before / block, 0.0))
             continue
-        name = " + ".join(sorted({*study.read_off, *answer.effects}))
+        name = " + ".join(sorted({*study.beside, *answer.effects}))
         left, closed = answer.share * before / block, max(0.0, 1.0 - answer.share)
         found.append(Candidate(name, answer.probability, left, closed, _parameters(study, answer)))
     if not study.answers:
@@ -114,7 +114,7 @@ def candidates(study: Study, base: Base) -> tuple[Candidate, ...]:
         even = study.settings.weighing.even_share
         found.append(Candidate(name, 1.0 - even, excess, closed, _parameters(study)))
         found.append(Candidate("unknown", even, whole, 0.0))
-    none = 0.0 if study.read_off else min(study.gap.test.p_value, rate)
+    none = 0.0 if study.beside else min(study.gap.test.p_value, rate)
     found.append(Candidate("none", none, before / block, 0.0))
     total = sum(candidate.probability for candidate in found)
     first, *others = (replace(c, probability=c.probability / total) for c in found)
@@ -159,6 +159,10 @@ def _parameters(study: Study, answer: Answer | None = None) -> dict[str, Paramet
             given = ParameterEstimate(fit.value(name), std, infos[name].unit, bound)
             undetermined = study.settings.answer.undetermined_from
             found[name] = meant_parameter(given, infos[name], problem.data.swing, undetermined)
+        for one in problem.scatter:
+            if one.shown:
+                spread = one.kind.parameters()[0]
+                found[f"{one.name}.{spread.name}"] = ParameterEstimate(one.width, None, spread.unit)
         for name, value in problem.fixed:
             found[name] = ParameterEstimate(value, 0.0, infos[name].unit)
     if random is not None:

@@ -18,6 +18,7 @@ from diagnosis.model.run_data import FOLDS, folds
 from diagnosis.search.hypothesis import restricted
 from diagnosis.search.prepared import COARSE_STEP, HUM
 from diagnosis.search.random_moments import RandomAnswer
+from diagnosis.search.scatter import with_scatter, without_deviations
 from diagnosis.search.study import Study
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.record import Array
@@ -153,7 +154,9 @@ class Subsets:
     def __init__(self, study: Study) -> None:
         self._study = study
         self.causes: Names = frozenset(kind.name for kind in study.chosen.problem.effects)
-        self._fits: dict[Names, Fit] = {self.causes: study.chosen, frozenset(): study.nominal}
+        # with fewer causes the runs differ by chance as much as with all of them
+        none = with_scatter(study.nominal, study.chosen.problem.scatter)
+        self._fits: dict[Names, Fit] = {self.causes: study.chosen, frozenset(): none}
 
     def __call__(self, names: Collection[str]) -> Fit:
         """The best fit found with these causes.
@@ -204,7 +207,7 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     """
     models = _Models(study, base, known)
     names: Names = frozenset()
-    steps = [Step(None, models.excess(names))]
+    steps = models.first_steps()
     left = sorted(models.causes)
     while left:
         best = min(left, key=lambda name: models.fitted_excess(names | {name}))
@@ -214,6 +217,8 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
     random = study.random
     if random is None:
         without = {name: models.excess(models.causes - {name}) for name in sorted(models.causes)}
+        if len(steps) > 1 and study.scattering:
+            without[" + ".join(study.scattering)] = models.repeating()
     else:
         last = models.random_excess(random)
         without = {name: last + size for name, size in models.read_off.items()}
@@ -227,8 +232,9 @@ def waterfall(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfa
 def both_ends(study: Study, base: Base, known: Mapping[Fit, HeldOut]) -> Waterfall:
     """The first and the last step only: the nominal model, and all causes together."""
     models = _Models(study, base, known)
-    last = Step(" + ".join(sorted(models.causes)), models.excess(models.causes))
-    return Waterfall((Step(None, models.excess(frozenset())), last), {}, models.words)
+    names = sorted({*models.causes, *study.scattering})
+    last = Step(" + ".join(names), models.excess(models.causes))
+    return Waterfall((models.first_steps()[0], last), {}, models.words)
 
 
 class _Models:
@@ -255,6 +261,20 @@ class _Models:
             return ON_RUNS
         return ON_STRETCHES if runs == 0 else ON_BOTH
 
+    def first_steps(self) -> list[Step]:
+        """What the nominal model leaves, and what it leaves where the runs differ by chance, if they do."""
+        none: Names = frozenset()
+        steps = [Step(None, self._excess_of(self._study.nominal) + self._left(none))]
+        if self._study.scattering:
+            steps.append(Step(" + ".join(self._study.scattering), self.excess(none)))
+        return steps
+
+    def repeating(self) -> float:
+        """What the causes leave where the runs repeat exactly, in noise variances of a sample."""
+        problem, point = without_deviations(self._study.chosen)
+        fitted = _finite(try_fit(problem, point)) or self._study.nominal
+        return self._excess_of(fitted) + self._left(self.causes)
+
     def fitted_excess(self, names: Names) -> float:
         """What the causes leave in the readings they are fitted to, in noise variances of a sample."""
         fitted = self._fit(names - self.read_off.keys())
@@ -262,10 +282,12 @@ class _Models:
 
     def excess(self, names: Names) -> float:
         """What the causes leave in readings held out of the fit, in noise variances of a sample."""
-        fitted = self._fit(names - self.read_off.keys())
+        return self._excess_of(self._fit(names - self.read_off.keys())) + self._left(names)
+
+    def _excess_of(self, fitted: Fit) -> float:
         if fitted not in self._excess:
             self._excess[fitted] = self._in_samples(self._predicted(fitted))
-        return self._excess[fitted] + self._left(names)
+        return self._excess[fitted]
 
     def random_excess(self, random: RandomAnswer) -> float:
         """What all causes and a random moment leave: the moment's innovations where the wind is on."""

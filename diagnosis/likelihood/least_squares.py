@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.settings import Settings
@@ -205,6 +206,24 @@ class Fit:
     def products(self) -> Products:
         """Products of the sensitivities."""
         return Products.of(self.jacobian, self.problem.parameters.precision)
+
+    @cached_property
+    def columns(self) -> RunColumns:
+        """The columns of a fit with chance differences between the runs."""
+        return RunColumns.of(self.problem, self.point, self.residuals, self.jacobian)
+
+    @cached_property
+    def between(self) -> Between | None:
+        """The likeliest widths of chance differences between the runs; None in a fit without any."""
+        if not self.problem.scatter:
+            return None
+        widths = np.array([one.width for one in self.problem.scatter])
+        return self.columns.likeliest(width_prior(self.problem), widths)
+
+    @property
+    def scatter_cost(self) -> float:
+        """−2 ln of the evidence of the chance differences between the runs, beside χ²; 0 without any."""
+        return 0.0 if self.between is None else self.between.cost
 
     @property
     def total(self) -> float:

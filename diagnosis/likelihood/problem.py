@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from diagnosis.model.chance import RunDeparture, Scatter, departure
 from diagnosis.model.parameters import Parameter, ParameterSet, Point
 from diagnosis.model.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
@@ -43,6 +44,7 @@ class Problem:
         fixed: value of effect parameters that are held, as ``effect.parameter``.
         free_forms: names of the effects whose form parameters are free; the others keep the textbook form.
         instants: how many instants every run has for an effect that skips samples.
+        scatter: chance differences between runs beside the effects; each run has a deviation of its own of each.
         rod_followed: whether a flexible rod is integrated with its ringing; else the ringing is added to the slow
             motion, which is much faster and exact as far as the rig is linear.
     """
@@ -52,6 +54,7 @@ class Problem:
     fixed: tuple[tuple[str, float], ...] = ()
     free_forms: tuple[str, ...] = ()
     instants: int = 1
+    scatter: Scatter = ()
     rod_followed: bool = False
 
     @cached_property
@@ -59,6 +62,7 @@ class Problem:
         """All parameters: the nominal model's first, then the effects' in their order."""
         nominal, held = self.data.model.parameters(self.data), dict(self.fixed)
         found, swing = list(nominal), self.data.swing
+        found += [one.parameter for one in self.scatter]
         for kind in self.effects:
             for info in kind.parameters():
                 name = f"{kind.name}.{info.name}"
@@ -142,7 +146,13 @@ class Problem:
             for kind in self.effects
         )
         known = self.effects_at(common) if effects is None else effects
-        return EffectChain(self.stated(common, own, run), known, drawn)
+        stated = self.stated(common, own, run)
+        if not self.scatter:
+            return EffectChain(stated, known, drawn)
+        changed = departure(
+            self.scatter, own[self.parameters.places(self.scatter)].tolist(), stated, self.data
+        )
+        return EffectChain(stated, (*known, RunDeparture()), (*drawn, np.array(changed)))
 
     def predict(self, points: Sequence[Point]) -> list[list[Array]]:
         """Predicted block means of the reading, for every point, for every run.

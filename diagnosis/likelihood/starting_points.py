@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.likelihood.least_squares import Fit, clip, damped_step, normal_equations
+from diagnosis.likelihood.between_runs import Between, width_prior
+from diagnosis.likelihood.least_squares import Fit, Products, clip, damped_step, normal_equations
 from diagnosis.likelihood.per_run import ResidualsOf
 from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, misfit
+from diagnosis.model.chance import Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
@@ -19,6 +21,7 @@ from tunnel_sim.effects.evidence import Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
+_HELD = 1e18  # precision of deviations that stay as they are
 _NEARER = 0.02  # of the size that linear theory gives an effect
 
 
@@ -45,6 +48,7 @@ class StartingPoint:
         predicted: χ² beyond noise that linear theory leaves by channel, shape (6,), dimensionless.
         scaled: place of the common parameter that linear theory has scaled; None where it scaled none.
         second_order: whether the other parameters absorb the first order of the effect.
+        scatter_cost: −2 ln of the evidence of chance differences between the runs by linear theory, dimensionless.
     """
 
     problem: Problem
@@ -53,6 +57,7 @@ class StartingPoint:
     predicted: Array
     scaled: int | None
     second_order: bool = False
+    scatter_cost: float = 0.0
 
     def nearer(self) -> StartingPoint | None:
         """The point with much less of the effect; None where linear theory did not say how much.
@@ -95,7 +100,8 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
     point = Point(np.concatenate([base.point.common, values]), release)
     predicted = misfit(base).excess
     predicted[CHANNELS.index("frequency" if kind.skips else "harmonics")] -= one.drop
-    return StartingPoint(problem, point, one.drop, predicted, base.point.common.size)
+    cost = base.scatter_cost
+    return StartingPoint(problem, point, one.drop, predicted, base.point.common.size, scatter_cost=cost)
 
 
 def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
@@ -113,14 +119,10 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
     if trial.second_order:
         moved = absorbed(base, change)
         change = change_to(base, problem, Point(np.concatenate([moved.common, sizes]), moved.release))
-    left = project_out(base, change)
-    power = sum(float(c @ c) for c in left)
-    if not 0.0 < power < np.inf:
+    added = _added(base, change)
+    if added is None or (moved is not None and added.slope <= 0.0):
         return None
-    slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
-    if moved is not None and slope <= 0.0:
-        return None
-    start, drop = sizes.copy(), slope * slope * power
+    start, drop, slope = sizes.copy(), added.drop, added.slope
     if scaled is not None:
         by = slope if moved is None else np.sqrt(slope)
         moderate = np.clip(by * sizes[scaled], -trial.at_most, trial.at_most)
@@ -136,8 +138,56 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
         release = point.release + part * (moved.release - base.point.release)
         point = clip(problem, Point(point.common, release))
     place = None if scaled is None else base.point.common.size + scaled
+    problem = dataclasses.replace(problem, scatter=added.scatter)
+    left = misfit(base, added.left).excess
+    return StartingPoint(problem, point, drop, left, place, trial.second_order, added.scatter_cost)
+
+
+@dataclass(frozen=True, eq=False)
+class _Added:
+    """What a change of the prediction closes by linear theory, at its best size.
+
+    Args:
+        slope: that size, in the change.
+        drop: of −2 ln L, dimensionless.
+        left: residuals, scaled, by run.
+        scatter: chance differences between the runs, with their likeliest widths beside it.
+        scatter_cost: −2 ln of their evidence, dimensionless.
+    """
+
+    slope: float
+    drop: float
+    left: list[Array]
+    scatter: Scatter = ()
+    scatter_cost: float = 0.0
+
+
+def _added(base: Fit, change: list[Array]) -> _Added | None:
+    """A change added to a fit; None where the fit absorbs it, or the change is not finite."""
+    if base.between is not None:
+        return _added_beside_scatter(base, base.between, change)
+    left = project_out(base, change)
+    power = sum(float(c @ c) for c in left)
+    if not 0.0 < power < np.inf:
+        return None
+    slope = sum(float(c @ r) for c, r in zip(left, base.residuals, strict=True)) / power
     after = [r - slope * c for c, r in zip(left, base.residuals, strict=True)]
-    return StartingPoint(problem, point, drop, misfit(base, after).excess, place, trial.second_order)
+    return _Added(slope, slope * slope * power, after)
+
+
+def _added_beside_scatter(base: Fit, between: Between, change: list[Array]) -> _Added | None:
+    """The same where the runs differ by chance: with a further cause, they may differ by less."""
+    if not all(np.all(np.isfinite(one)) for one in change):
+        return None
+    columns, size = base.columns.with_column(change)
+    beside = columns.likeliest(width_prior(base.problem), between.widths)
+    return _Added(
+        float(beside.found.common[-1]) / size,
+        between.likelihood - beside.likelihood,
+        columns.left(beside.found),
+        tuple(one.as_wide_as(width) for one, width in zip(base.problem.scatter, beside.widths, strict=True)),
+        beside.cost,
+    )
 
 
 def _tried(base: Fit, kind: type[Effect], trial: Trial) -> Problem:
@@ -202,8 +252,12 @@ def _with_effect(base: Fit, values: Array, scaled: int | None, replaced: int | N
 
 def absorbed(base: Fit, change: Sequence[Array]) -> Point:
     """Where the parameters of a fit go to absorb a change of the scaled prediction, by one Gauss–Newton step."""
+    products = base.products
+    if base.problem.scatter:  # which may be chance beside what is absorbed
+        precision = base.problem.parameters.precision
+        products = Products.of(base.jacobian, np.where(precision > 0.0, _HELD, 0.0))
     return damped_step(
-        base.problem, base.point, [-c for c in change], base.jacobian, 0.0, base.products, linear=True
+        base.problem, base.point, [-c for c in change], base.jacobian, 0.0, products, linear=True
     )
 
 

@@ -77,6 +77,7 @@ def prepare(
         model=model,
         similarity=similarity,
         settings=settings,
+        repeatability={} if campaign.repeatability is None else campaign.repeatability.stated,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -15,6 +15,14 @@ _RELATIVE_STEP = 1e-5  # of finite differences, in a parameter's size
 
 #: Whether the runs share a parameter, or each of them has its own.
 Owner = Literal["common", "per_run"]
+
+
+class Named(Protocol):
+    """What has a name."""
+
+    @property
+    def name(self) -> str:
+        """The name."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +126,14 @@ class ParameterSet:
         """Places of a run's own parameters that change its physics, among its own; those of effects apart."""
         apart = ("release_angle", "release_rate", "zero")
         return [i for i, one in enumerate(self.own) if one.name not in apart and not one.effect]
+
+    def places(self, scatter: Sequence[Named]) -> list[int]:
+        """Places of a run's deviations among its own parameters.
+
+        Args:
+            scatter: what differs between runs.
+        """
+        return [self.own_names.index(one.name) for one in scatter]
 
     @cached_property
     def precision(self) -> Array:

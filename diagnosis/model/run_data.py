@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -307,6 +307,7 @@ class Data:
         model: nominal model of the campaign, whose parameters a part of its runs has, too.
         similarity: how the campaign was made from the measured one.
         settings: of the diagnosis.
+        repeatability: stated relative standard deviations between runs, by what scatters; empty: none is stated.
     """
 
     runs: tuple[RunData, ...]
@@ -316,6 +317,7 @@ class Data:
     model: NominalModel
     similarity: Similarity = AS_MEASURED
     settings: Settings = field(default_factory=Settings)
+    repeatability: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def driven(self) -> bool:

@@ -12,7 +12,8 @@ from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, of_more_weight, own_gain, turned_back
-from diagnosis.search.weigh import OF_MOTION, log_misfit, misfit_scale
+from diagnosis.search.scatter import settled
+from diagnosis.search.weigh import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
 
 if TYPE_CHECKING:
@@ -31,8 +32,9 @@ def grow(view: View, progress: Progress | None = None) -> list[Hypothesis]:
         Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
         could not rise, and at the most causes named.
     """
-    level, gap = [view.smallest], misfit(view.base)
-    found = {first.names: first for first in level if first.effects}
+    level, gap = [view.smallest], view.gap
+    # that the runs differ by chance alone is an answer, too
+    found = {first.names: first for first in level if first.effects or first.fit.problem.scatter}
     while level:
         children = view.with_forms(view.larger(level, progress), level)
         found |= {child.names: child for child in children}
@@ -131,7 +133,8 @@ def _worth_fitting(
     scale = misfit_scale(misfit(parent.fit), weighing)
     scored.sort(
         key=lambda item: min(
-            log_misfit(start.predicted, scale, OF_MOTION, weighing.leak) for start in item[1]
+            -log_weight(start.predicted, scale, 0, 0, weighing, (start.scatter_cost, np.inf))
+            for start in item[1]
         )
     )
     if parent.effects:
@@ -152,4 +155,4 @@ def _fitted(start: StartingPoint, base: Fit) -> Fit | None:
         found = try_fit(start.problem, start.point)
     else:
         found = try_fit(start.problem, start.point, base=base, max_iterations=_ITERATIONS)
-    return found if found is not None and np.isfinite(found.total) else None
+    return settled(found, rounds=1) if found is not None and np.isfinite(found.total) else None

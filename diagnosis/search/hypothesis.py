@@ -89,7 +89,8 @@ class Hypothesis:
         """
         by_chance = own_gain(self.fit.problem) / self.fit.count
         share = (self.fit.excess + by_chance) / nominal.gap
-        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside)
+        cost = self.fit.scatter_cost
+        return FittedSet(self.effects, share, self.excess, self.further_numbers, outside, cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,33 +101,45 @@ class Scale:
         misfit: χ² by channel, shape (6,).
         least: χ² by channel, shape (6,), 0 or less.
         chosen: how sets are weighed.
+        scatter_cost: of the nominal model, as `ChannelMisfit` has it.
     """
 
     misfit: Array
     least: Array
     chosen: WeighingSettings
+    scatter_cost: float = 0.0
 
     @classmethod
     def of(cls, sets: Sequence[Hypothesis], gap: ChannelMisfit, chosen: WeighingSettings) -> Scale:
         """The scale of some sets, from what the nominal model leaves."""
-        return cls(misfit_scale(gap, chosen), least_excess([h.excess for h in sets]), chosen)
+        least = least_excess([h.excess for h in sets])
+        return cls(misfit_scale(gap, chosen), least, chosen, gap.scatter_cost)
 
     def weight(self, hypothesis: Hypothesis) -> float:
         """Logarithm of the weight of a set."""
-        return self._log_weight(hypothesis.excess - self.least, hypothesis)
+        cost = hypothesis.fit.scatter_cost
+        return self._log_weight(hypothesis.excess - self.least, hypothesis, scatter_cost=cost)
 
-    def greatest(self, hypothesis: Hypothesis) -> float:
-        """The same of the set with one more effect that leaves nothing."""
-        return self._log_weight(np.zeros(6), hypothesis, effects=1)
+    def greatest(self, hypothesis: Hypothesis, *, repeating: bool = True) -> float:
+        """The same of the set with one more effect that leaves nothing.
+
+        Args:
+            repeating: whether the runs then repeat, too; else they differ by chance as much as before.
+        """
+        cost = 0.0 if repeating else hypothesis.fit.scatter_cost
+        return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
     def form_may_gain(self, hypothesis: Hypothesis) -> bool:
         """Whether the weight of a set would rise with one more form that leaves nothing."""
         return self._log_weight(np.zeros(6), hypothesis, numbers=1) > self.weight(hypothesis)
 
-    def _log_weight(self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0) -> float:
+    def _log_weight(
+        self, left: Array, of: Hypothesis, *, effects: int = 0, numbers: int = 0, scatter_cost: float = 0.0
+    ) -> float:
         """Logarithm of the weight of a set with so many more effects and numbers that leaves ``left``."""
         count, further = len(of.effects) + effects, of.further_numbers + numbers
-        return log_weight(left, self.misfit, count, further, self.chosen)
+        costs = scatter_cost, self.scatter_cost
+        return log_weight(left, self.misfit, count, further, self.chosen, costs)
 
 
 def of_more_weight(one: Hypothesis | None, other: Hypothesis, gap: ChannelMisfit) -> Hypothesis:
@@ -201,6 +214,7 @@ def restricted(whole: Fit, names: Collection[str]) -> Fit:
         tuple((name, value) for name, value in large.fixed if name.split(".")[0] in names),
         tuple(name for name in large.free_forms if name in names),
         large.instants,
+        large.scatter,
         large.rod_followed,
     )
     common = [large.names.index(name) for name in problem.names]

@@ -18,7 +18,6 @@ from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
-from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
@@ -104,9 +103,11 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
             if not bands.keys() <= allowed.keys():
                 return []
             kinds = tuple(allowed[band] for band in bands)
-            share = (abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)) / nominal.gap
+            excess = abs(process.excess) + max(wind_off_excess(seen.fit), 0.0)
             names = tuple(dict.fromkeys((*(kind.name for kind in kinds), *seen.effects)))
-            left = FittedSet(names, share, share * view.gap.excess, seen.further_numbers)
+            share, by_channel = excess / view.repeating.gap, excess / nominal.gap * view.gap.excess
+            cost = seen.fit.scatter_cost
+            left = FittedSet(names, share, by_channel, seen.further_numbers, scatter_cost=cost)
             return [RandomAnswer(kinds, process, seen if seen.effects else None, left)]
     return []
 
@@ -151,11 +152,12 @@ def _may_act(best: Hypothesis, scale: Scale) -> bool:
     random motion misleads the fit of the wind-off runs too.
     """
     runs = list(zip(best.fit.problem.data.runs, best.fit.residuals, strict=True))
-    if not any(run.wind_on for run, _ in runs) or scale.greatest(best) <= scale.weight(best):
+    if not any(run.wind_on for run, _ in runs) or scale.greatest(best, repeating=False) <= scale.weight(best):
         return False
     still = misfit(best.fit, [np.zeros_like(r) if run.wind_on else r for run, r in runs]).excess
     count, chosen = len(best.effects) + 1, best.fit.settings.moment
-    if log_weight(still, scale.misfit, count, best.further_numbers, scale.chosen) > scale.weight(best):
+    costs = best.fit.scatter_cost, scale.scatter_cost
+    if log_weight(still, scale.misfit, count, best.further_numbers, scale.chosen, costs) > scale.weight(best):
         return True
     process = likeliest(random_moments(best.fit), chosen)
     return process is not None and is_steady_noise(process, chosen)
@@ -255,7 +257,7 @@ def _settled(best: Hypothesis, view: View) -> Hypothesis:
             noisy = None if process is None else with_response(known, process.spectrum)
             if noisy is None:
                 break
-            base = fit(Problem(noisy), nominal.point)
+            base = fit(replace(nominal.problem, data=noisy), nominal.point)
             sets = [Hypothesis((), base), *grow(view.on(base))]
             found = max(sets, key=Scale.of(sets, misfit(base), base.settings.weighing).weight)
             # a random moment leaves little of a gap in the wind for effects to be compared there: more are added

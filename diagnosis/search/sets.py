@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, try_fit
+from diagnosis.likelihood.residuals import misfit
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import same_change, sets_with_one_more
 from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival
+from diagnosis.search.scatter import with_scatter
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 
 if TYPE_CHECKING:
@@ -51,14 +53,18 @@ class Sets:
     def weighed(self) -> list[Weighed]:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
-        sets = [h.fitted_set(base) for h in self.hypotheses]
-        sets += [h.fitted_set(base, outside=True) for rival in self.rivals for h in rival.hypotheses]
+        sets = [h.fitted_set(self.view.repeating) for h in self.hypotheses]
+        sets += [
+            h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses
+        ]
         sets += [answer.left for answer in self.random]
         if prepared.read_off:  # it may be the only cause, and is part of the gap
             sets.append(FittedSet((), 1.0, nominal.excess))
         nominal = replace(nominal, chi2=nominal.chi2 + prepared.hum_power(base))
         own = self.view.left_by_read_off
-        return weigh([replace(one, excess=one.excess - own) for one in sets], nominal, base.settings.weighing)
+        whole = None if self.view.repeating is base else misfit(self.view.repeating)
+        sets = [replace(one, excess=one.excess - own) for one in sets]
+        return weigh(sets, nominal, base.settings.weighing, whole)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
         """The set of these effects; None where they were not fitted together."""
@@ -107,7 +113,11 @@ class Sets:
         found = {h.names: self.view.whole(h) for h in self.hypotheses if set(h.names) < set(names)}
         if self.settled is not None:
             at_random = any(moment.effects == names for moment in self.random)
-            found[names] = self.settled if at_random else self.view.finished(self.settled)
+            found[names] = whole = self.settled if at_random else self.view.finished(self.settled)
+            # its parts are compared with it: their runs differ by chance as much as the answer's
+            parts = {key: part for key, part in found.items() if part is not None and key != names}
+            for key, part in parts.items():
+                found[key] = replace(part, fit=with_scatter(part.fit, whole.fit.problem.scatter))
         return found
 
 

@@ -17,6 +17,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
+from diagnosis.search.scatter import named
 from diagnosis.search.sets import Names, Sets
 from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
@@ -138,11 +139,21 @@ class Study:
         return self.answer.effects if self.answer else ()
 
     @property
+    def scattering(self) -> Names:
+        """The chance differences between the runs, as far as they are more than is stated."""
+        return () if self.fitted == UNKNOWN else named(self.chosen)
+
+    @property
+    def beside(self) -> Names:
+        """Causes beside those that sets of effects differ by: read off the records, or differences between runs."""
+        return (*self.read_off, *self.scattering)
+
+    @property
     def causes(self) -> Names:
         """All causes, sorted; ``unknown`` alone where nothing in the vocabulary explains the gap."""
         if self.fitted == UNKNOWN:
             return UNKNOWN
-        return tuple(sorted({*self.read_off, *self.fitted}))
+        return tuple(sorted({*self.beside, *self.fitted}))
 
     @property
     def named(self) -> bool:

@@ -49,6 +49,7 @@ class FittedSet:
         excess: χ² beyond that of noise by channel, shape (6,), dimensionless.
         numbers: how many it has beside its own: freed forms and instants, less two where gravity replaces a spring.
         outside: whether it is from outside the vocabulary: what is probable of it is probable of ``unknown``.
+        scatter_cost: −2 ln of the evidence of chance differences between the runs that it takes, dimensionless.
     """
 
     effects: tuple[str, ...]
@@ -56,13 +57,21 @@ class FittedSet:
     excess: Array
     numbers: int = 0
     outside: bool = False
+    scatter_cost: float = 0.0
 
 
-def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit, chosen: WeighingSettings) -> list[Weighed]:
+def weigh(
+    sets: Sequence[FittedSet],
+    nominal: ChannelMisfit,
+    chosen: WeighingSettings,
+    whole: ChannelMisfit | None = None,
+) -> list[Weighed]:
     """Probabilities of the answers.
 
     Args:
         sets: fitted sets of effects; of two with the same effects the better one counts.
+        nominal: what the nominal model leaves, with the chance differences between runs that the sets have.
+        whole: what it leaves without them; None: there are none.
 
     Returns:
         All answers, ``unknown`` among them: the answer first, then the most probable ones. ``unknown`` speaks of
@@ -77,12 +86,18 @@ def weigh(sets: Sequence[FittedSet], nominal: ChannelMisfit, chosen: WeighingSet
     least, common = least_excess(excesses), common_misfit(excesses)
     scale = misfit_scale(nominal, chosen, common)
     logs = np.array(
-        [log_weight(s.excess - least, scale, len(key), s.numbers, chosen) for key, s in best.items()]
+        [
+            log_weight(
+                s.excess - least, scale, len(key), s.numbers, chosen, (s.scatter_cost, nominal.scatter_cost)
+            )
+            for key, s in best.items()
+        ]
     )
     weights = np.exp(logs - logs.max(initial=-np.inf))
     # odds of each set against an unknown cause
     by_chance = misfit_scale(nominal, chosen, common, chosen.chance_stds * np.sqrt(2.0 * nominal.count))
-    gap, against = log_misfit(nominal.excess, by_chance, ALL_CHANNELS, chosen.leak), []
+    left_at_first = (nominal if whole is None else whole).excess
+    gap, against = log_misfit(left_at_first, by_chance, ALL_CHANNELS, chosen.leak), []
     for given in best.values():
         left = log_misfit(given.excess, by_chance, ALL_CHANNELS, chosen.leak)
         closed = max(1.0 - left / gap, 0.0) if gap > 0.0 else 0.0
@@ -149,7 +164,14 @@ def misfit_scale(
     return np.asarray(np.broadcast_to(by_chance, 6) + error, np.float64)
 
 
-def log_weight(left: Array, scale: Array, effects: int, numbers: int, chosen: WeighingSettings) -> float:
+def log_weight(
+    left: Array,
+    scale: Array,
+    effects: int,
+    numbers: int,
+    chosen: WeighingSettings,
+    scatter_cost: tuple[float, float] = (0.0, 0.0),
+) -> float:
     """Logarithm of the weight of a set among all sets.
 
     Args:
@@ -157,8 +179,12 @@ def log_weight(left: Array, scale: Array, effects: int, numbers: int, chosen: We
         scale: from `misfit_scale`, shape (6,).
         effects: how many it has.
         numbers: how many it has beside their own.
+        scatter_cost: −2 ln of the evidence of chance differences between the runs that it takes, and that the
+            nominal model takes. What needless effects may lower it by does not count.
     """
-    price = chosen.set_price * effects + chosen.form_price * numbers
+    own, nominal = scatter_cost
+    cost = min(own + chosen.needless_scatter * effects, max(own, nominal))
+    price = chosen.set_price * effects + chosen.form_price * numbers + 0.5 * chosen.scatter_exponent * cost
     return -chosen.steepness * log_misfit(left, scale, OF_MOTION, chosen.leak) - price
 
 

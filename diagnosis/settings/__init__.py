@@ -12,7 +12,7 @@ from typing import Any
 
 from diagnosis.settings.answer import AnswerSettings, WhereSettings
 from diagnosis.settings.found import GapSettings, NoiseSettings, ReadOffSettings, SelectionSettings
-from diagnosis.settings.search import RandomMomentSettings, SearchSettings, WeighingSettings
+from diagnosis.settings.search import RandomMomentSettings, ScatterSettings, SearchSettings, WeighingSettings
 from diagnosis.settings.words import RemainderSettings, WordsSettings
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -23,6 +23,7 @@ __all__ = [
     "RandomMomentSettings",
     "ReadOffSettings",
     "RemainderSettings",
+    "ScatterSettings",
     "SearchSettings",
     "SelectionSettings",
     "Settings",
@@ -43,6 +44,7 @@ class Settings:
     read_off: ReadOffSettings = field(default_factory=ReadOffSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     moment: RandomMomentSettings = field(default_factory=RandomMomentSettings)
+    scatter: ScatterSettings = field(default_factory=ScatterSettings)
     weighing: WeighingSettings = field(default_factory=WeighingSettings)
     where: WhereSettings = field(default_factory=WhereSettings)
     answer: AnswerSettings = field(default_factory=AnswerSettings)

@@ -227,10 +227,56 @@ class RandomMomentSettings:
 
 
 @dataclass(frozen=True)
+class ScatterSettings:
+    """Chance differences between runs."""
+
+    scatter_rate: float = setting(
+        0.001,
+        "Rate at which runs that repeat are said to differ by chance.",
+        "convention",
+        ONE_IN_1000,
+    )
+    which_scatters_rate: float = setting(
+        0.05,
+        "Rate at which a number is said to scatter beside others that do.",
+        "convention",
+        "Whether the runs differ at all is tested at the rate above.",
+    )
+    outlier_rate: float = setting(
+        0.001,
+        "Rate at which a run is said to deviate far beyond the others.",
+        "convention",
+        ONE_IN_1000,
+    )
+    widths_settled: float = setting(
+        1.0,
+        "Fall of −2 ln L from which a fit is repeated with other widths.",
+        "convention",
+        "A change of less says nothing.",
+        unit="χ²",
+    )
+
+
+@dataclass(frozen=True)
 class WeighingSettings:
     """How sets of effects are weighed, and when none of them is named."""
 
     steepness: float = setting(1.25, "Exponent of what is left in a channel.", "tuned", decision="0007")
+    scatter_exponent: float = setting(
+        1.0,
+        "Exponent of the evidence of chance differences between the runs.",
+        "convention",
+        "A likelihood.",
+        decision="0036",
+    )
+    needless_scatter: float = setting(
+        14.0,
+        "−2 ln of that evidence by which a needless effect may lower it.",
+        "judgement",
+        "With the price of an effect it is 20, by which a needless one lowers χ² once in 22,000 effects tried.",
+        unit="χ²",
+        decision="0036",
+    )
     set_price: float = setting(
         3.0,
         "Logarithm of the weight that every effect costs.",

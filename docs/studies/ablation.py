@@ -175,9 +175,14 @@ def _weighings(seen: list[tuple[Sequence[FittedSet], ChannelMisfit]]) -> Iterato
     """Keep what is weighed meanwhile."""
     weigh = decide.weigh
 
-    def kept(sets: Sequence[FittedSet], nominal: ChannelMisfit, chosen: WeighingSettings) -> list[Weighed]:
+    def kept(
+        sets: Sequence[FittedSet],
+        nominal: ChannelMisfit,
+        chosen: WeighingSettings,
+        whole: ChannelMisfit | None = None,
+    ) -> list[Weighed]:
         seen.append((sets, nominal))
-        return weigh(sets, nominal, chosen)
+        return weigh(sets, nominal, chosen, whole)
 
     weighed_sets.weigh = kept  # type: ignore[attr-defined]
     try:

@@ -78,6 +78,8 @@ VARIANTS: list[tuple[str, dict[str, float], Setting]] = [
     ("sensor_drift", {"drift": -0.01}, RUN),
     ("spring_miscalibration", {"error": -0.1, "spring_stiffness": 16.12}, RUN),
     ("wind_speed_offset", {"offset": -1.5}, RUN),
+    ("stiffness_scatter", {"spread": 0.05}, replace(RUN, speed=0.0)),
+    ("damping_scatter", {"spread": 0.1}, replace(RUN, speed=0.0)),
 ]
 SHORT_STEPS = {"coulomb_friction-0.5", "rod_flexibility-0.0005", "rod_flexibility-1e-05"}  # take long
 
@@ -111,8 +113,10 @@ def nominal_reading(run: Setting) -> np.ndarray:
     return reading("", NOTHING, run)
 
 
-def phase_of(name: str, effect: Effect, values: dict[str, float], found: np.ndarray, run: Setting) -> float:
-    """The phase a periodic effect has drawn: of shedding from the run, of hum from the reading."""
+def drawn_by(name: str, effect: Effect, values: dict[str, float], found: np.ndarray, run: Setting) -> float:
+    """What the run has drawn: the phase of shedding, from the run, and of hum, from the reading; a deviation."""
+    if effect.scatters:
+        return effect.drawn_number(drawn_chain(effect, run).drawn[0])
     if name == "vortex_shedding":
         return drawn_chain(effect, run).physics().parameters["shedding_phase"]
     if name == "mains_hum":
@@ -129,7 +133,7 @@ def test_effect_matches_its_equation(name: str, values: dict[str, float], run: S
     effect, tolerance = effect_from(name, values), TOLERANCE.get(name, SMOOTH)
     for forward in (False, True):
         found = simulated([effect], run, forward=forward)
-        expected = reading(name, values, run, phase=phase_of(name, effect, values, found, run))
+        expected = reading(name, values, run, own=drawn_by(name, effect, values, found, run))
         assert np.max(np.abs(found - expected)) < tolerance
     # what both sides leave out would pass: the effect must be seen
     assert np.max(np.abs(expected - nominal_reading(run))) > max(2e-4, 20.0 * tolerance)
@@ -284,6 +288,32 @@ def test_an_offset_shifts_a_drifting_wind_in_either_order() -> None:
     before = simulated([offset, drift], RUN)
     ahead = reading("wind_speed_drift", {"drift": 0.1}, replace(RUN, speed=21.0))
     assert np.max(np.abs(before - ahead)) < SMOOTH
+
+
+def test_a_drifting_wind_scatters_throughout_the_run() -> None:
+    effects = [
+        effect_from("wind_speed_drift", {"drift": 0.1}),
+        effect_from("wind_speed_scatter", {"spread": 0.05}),
+    ]
+    chain = EffectChain.draw(settings(RUN), effects, np.random.default_rng(3))
+    factor = 1.0 + 0.05 * effects[1].drawn_number(chain.drawn[1])
+    expected = reading("wind_speed_drift", {"drift": 0.1}, replace(RUN, speed=RUN.speed * factor))
+    assert np.max(np.abs(simulated(effects, RUN) - expected)) < SMOOTH
+    assert abs(factor - 1.0) > 1e-3
+
+
+@pytest.mark.parametrize("name", oracle.BETWEEN_RUNS)
+def test_a_number_of_the_run_scatters_normally_with_its_width(name: str) -> None:
+    """Truth: mean, variance and kurtosis of normal deviates, within five standard errors of each."""
+    effect, run, count = effect_from(name, {"spread": 0.01}), settings(RUN), 4000
+    number = effect.scatters
+    chains = (EffectChain.draw(run, [effect], np.random.default_rng([5, i])) for i in range(count))
+    found = (
+        np.array([getattr(chain.physics(), number) / getattr(run, number) - 1.0 for chain in chains]) / 0.01
+    )
+    assert abs(np.mean(found)) < 5.0 / np.sqrt(count)
+    assert abs(np.mean(found**2) - 1.0) < 5.0 * np.sqrt(2.0 / count)
+    assert abs(np.mean(found**4) - 3.0) < 5.0 * np.sqrt(96.0 / count)
 
 
 def test_mains_hum_has_a_phase_of_its_own_in_every_run() -> None:

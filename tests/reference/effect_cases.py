@@ -22,6 +22,9 @@ VOCABULARY = {
 # an independent integration instead (tests/conformance/test_effect_oracle.py).
 ON_DRIVEN_RUNS = frozenset(kind.name for kind in ALL_EFFECTS if kind.driven)
 
+# The reference simulator draws the scatter between runs beside the causes, not among them.
+BETWEEN_RUNS = frozenset(kind.name for kind in ALL_EFFECTS if kind.scatters)
+
 # Values of the parameters at which the effect is seen.
 VALUES = {
     kind.name: {info.name: value for info, value in zip(kind.parameters(), kind.example, strict=False)}

@@ -80,13 +80,14 @@ def air_damping(speed: float) -> float:
     return 0.5 * DENSITY * speed * AREA * LENGTH**2 * CN_R
 
 
-def reading(name: str, p: Parameters, run: Setting, *, phase: float = 0.0) -> np.ndarray:
+def reading(name: str, p: Parameters, run: Setting, *, own: float = 0.0) -> np.ndarray:
     """The reading without zero, noise and rounding, rad, at the run's sample times.
 
-    `phase` is that of a periodic effect. Buffeting has a function of its own.
+    `own` is what the run has drawn: the phase of a periodic effect, or how many standard deviations a number of the
+    run lies from what is stated. Buffeting has a function of its own.
     """
     if name in SENSOR:
-        return SENSOR[name](reading("", NOTHING, run), p, run, phase)
+        return SENSOR[name](reading("", NOTHING, run), p, run, own)
     if name == "coulomb_friction":
         if p.get("presliding", 0.0) > 0.0:
             return _with_presliding(p["friction_moment"], p["presliding"], run)
@@ -97,7 +98,7 @@ def reading(name: str, p: Parameters, run: Setting, *, phase: float = 0.0) -> np
         return _two_masses(p, run)
     if name == "unsteady_aero_lag":
         return _with_lag(p["lag"], run)
-    return _smooth(_total(name, p, run, phase), run)
+    return _smooth(_total(name, p, run, own), run)
 
 
 def buffeted(forcing: np.ndarray, interval: float, run: Setting) -> np.ndarray:
@@ -116,20 +117,22 @@ def buffeted(forcing: np.ndarray, interval: float, run: Setting) -> np.ndarray:
     return np.asarray(states[1])[: run.times.size]
 
 
-def nominal(spring: float, speed: float) -> Moment:
+def nominal(spring: float, speed: float, damping: float = DAMPING) -> Moment:
     """All moments of the nominal model on the right-hand side, N m."""
     ka, ca = pressure(speed) * CN_BETA, air_damping(speed)
-    return lambda _, b, r: (ka - spring) * b + (ca - DAMPING) * r
+    return lambda _, b, r: (ka - spring) * b + (ca - damping) * r
 
 
-def _total(name: str, p: Parameters, run: Setting, phase: float) -> Moment:
+def _total(name: str, p: Parameters, run: Setting, own: float) -> Moment:
     """All moments of a rigid rig with a smooth law."""
+    if name in BETWEEN_RUNS:
+        return BETWEEN_RUNS[name](1.0 + p["spread"] * own, run)
     if name in OTHER_CONDITIONS:
         return OTHER_CONDITIONS[name](p, run)
     base = nominal(run.spring, run.speed)
     if name == "":
         return base
-    added = ADDED[name](p, run, phase)
+    added = ADDED[name](p, run, own)
     return lambda t, b, r: base(t, b, r) + added(t, b, r)
 
 
@@ -173,6 +176,12 @@ OTHER_CONDITIONS: dict[str, Callable[[Parameters, Setting], Moment]] = {
     ),
     "wind_speed_offset": lambda p, run: nominal(run.spring, run.speed + p["offset"]),
     "spring_miscalibration": _other_spring,
+}
+# The nominal moments where a number of the run is so many times as great as stated.
+BETWEEN_RUNS: dict[str, Callable[[float, Setting], Moment]] = {
+    "wind_speed_scatter": lambda factor, run: nominal(run.spring, run.speed * factor),
+    "stiffness_scatter": lambda factor, run: nominal(run.spring * factor, run.speed),
+    "damping_scatter": lambda factor, run: nominal(run.spring, run.speed, DAMPING * factor),
 }
 
 
@@ -335,8 +344,8 @@ SENSOR: dict[str, Callable[[np.ndarray, Parameters, Setting, float], np.ndarray]
 
 #: The effects that are solved here; the others are compared with the reference simulator.
 SOLVED = {
-    *SENSOR, *ADDED, *OTHER_CONDITIONS, "coulomb_friction", "free_play", "rod_flexibility", "unsteady_aero_lag",
-    "buffeting",
+    *SENSOR, *ADDED, *OTHER_CONDITIONS, *BETWEEN_RUNS, "coulomb_friction", "free_play", "rod_flexibility",
+    "unsteady_aero_lag", "buffeting",
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES
-from identification.printing import SYMBOLS, TextTable, status_lines, unit, with_std
+from identification.printing import SYMBOLS, TextTable, repeatability_lines, status_lines, unit, with_std
 from identification.status import Remark
 from tunnel_lab.bench import work
 from tunnel_lab.bench.left_out import build_choice, options
@@ -167,7 +167,7 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
     notes: dict[str, list[str]] = {}
     for document in documents:
         remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-        for line in [*remarks, *status_lines(document)]:
+        for line in [*remarks, *repeatability_lines(document), *status_lines(document)]:
             notes.setdefault(line, []).append(document["estimator"])
     return [
         TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),

@@ -44,7 +44,7 @@ NOTHING_ADDED = "no effect"
 SEVERITIES = (1.0, 10.0)
 """Mean squared residual of the nominal refit over the noise power, minus one."""
 QUANTITIES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
-EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS if not kind.driven)
+EFFECTS: tuple[str, ...] = tuple(kind.name for kind in ALL_EFFECTS if not (kind.driven or kind.scatters))
 REALISATIONS = 3
 TRUTH = {"cn_beta": 0.49, "cn_r": -0.11, "yaw_inertia": 0.1014, "mechanical_damping": 0.012}
 NOISE = 5e-4  # rad

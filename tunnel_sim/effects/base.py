@@ -9,7 +9,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
@@ -68,6 +68,8 @@ class Effect:
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
     - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
+    - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
+      ``mechanical_damping``; empty: none.
     - ``remembers``: whether a reading depends on earlier samples.
     - ``ahead_of_sensor``: whether it acts between the rod and the sensor, before the sensor's own effects.
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
@@ -95,6 +97,7 @@ class Effect:
     on_spring: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
+    scatters: ClassVar[str] = ""
     remembers: ClassVar[bool] = False
     ahead_of_sensor: ClassVar[bool] = False
     turns: ClassVar[str] = ""
@@ -182,6 +185,24 @@ class Effect:
         """
         severity = cls.parameters()[0]
         return (Trial({severity.name: severity.scale * moment_scale(severity, campaign)}, severity.name),)
+
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """What a relative deviation of 1 of the number that scatters changes of a run's linear motion.
+
+        Args:
+            spring: Kr, N m/rad.
+            damping: Cr, N m s/rad.
+            air_stiffness: Ka of the run, N m/rad.
+            air_damping: Ca of the run, N m s/rad.
+
+        Returns:
+            Changes of the stiffness Kr − Ka, N m/rad, and of the damping Cr − Ca, N m s/rad.
+        """
+        del spring, damping, air_stiffness, air_damping
+        return 0.0, 0.0
 
     def plausible(self, omega: float) -> bool:
         """Whether a fitted effect is still what its name means.
@@ -394,11 +415,13 @@ class EffectChain:
     Args:
         effects: in the order in which they act.
         drawn: the random part of each effect in this run.
+        deviations: of the true wind speed, spring and mechanical damping from what is stated, relative, by name.
     """
 
     stated: RunSettings
     effects: tuple[Effect, ...]
     drawn: tuple[Drawn, ...]
+    deviations: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
@@ -421,6 +444,8 @@ class EffectChain:
         run = self.stated
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             run = effect.on_run(run, self.stated, drawn)
+        if self.deviations:
+            run = run.with_deviations(self.deviations)
         if run.drive is None or run.drive.on_body:
             return run
         return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))

@@ -98,9 +98,13 @@ def check_kind(kind: object) -> None:
         except TunnelError as error:
             place = f"{where}, parameter {info.name}"
             raise TunnelError(error.what, where=place, remedy=error.remedy) from None
-    if kind.lattice:
-        what = "lattice is for the built-in effect that is read off the records"
-        raise TunnelError(what, where=where, remedy="leave it at its default")
+    for trait, of in (
+        ("lattice", "effect that is read off the records"),
+        ("scatters", "effects between runs"),
+    ):
+        if getattr(kind, trait):
+            what = f"{trait} is for the built-in {of}"
+            raise TunnelError(what, where=where, remedy="leave it at its default")
     if (kind.line or kind.skips) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
         what = "has a phase or instants in every run, and does not say how they are found"
         raise TunnelError(what, where=where, remedy="override sought")

@@ -271,7 +271,8 @@ def _effects(
     if stated is None:
         if not (config.effect_probability > 0.0 and rng.random() < config.effect_probability):
             return []
-        kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven)]
+        # of one run, which shows no scatter between runs
+        kinds = [kind for kind in ALL_EFFECTS if not (kind.skips or kind.driven or kind.scatters)]
         kind = kinds[int(rng.integers(len(kinds)))]
         severity = kind.parameters()[0]
         value = min(severity.upper, severity.scale * float(rng.uniform(*SEVERITY_SHARE)))

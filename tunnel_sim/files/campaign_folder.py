@@ -15,6 +15,7 @@ from pydantic import Field
 from tunnel_sim.files.plausible import checked_record, plausible_values
 from tunnel_sim.files.readers import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
+from tunnel_sim.files.scatter_tables import RepeatabilityTable
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -95,6 +96,9 @@ class CampaignDocument(StrictModel):
     campaign: CampaignTable = Field(description="a [campaign] table with a name")
     rig: RigTable = Field(default=RigTable(), description="a [rig] table")
     sensor: SensorTable = Field(default=SensorTable(), description="a [sensor] table")
+    repeatability: RepeatabilityTable = Field(
+        default=RepeatabilityTable(), description="a [repeatability] table"
+    )
     runs: list[RunTable] = Field(min_length=1, description="one [[runs]] table or more")
 
 
@@ -143,9 +147,10 @@ def campaign_document(campaign: Campaign, files: dict[str, str]) -> dict[str, An
     """The tables of ``campaign.toml`` in their order, without values that are None; ``files`` by id of the run."""
     head = {"name": campaign.name, "description": campaign.description or None}
     document: dict[str, Any] = {"schema_version": 1, "campaign": _stated(head)}
-    for key, values in (("rig", vars(campaign.rig)), ("sensor", vars(campaign.sensor))):
-        if _stated(values):
-            document[key] = _stated(values)
+    for key in ("rig", "sensor", "repeatability"):
+        values = getattr(campaign, key)
+        if values is not None and _stated(vars(values)):
+            document[key] = _stated(vars(values))
     document["runs"] = [
         {"id": run.id, "file": files[run.id]}
         | _stated({key: value for key, value in vars(run).items() if key not in ("id", "record", "drive")})
@@ -241,6 +246,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         rig=RigProperties(**document.rig.model_dump()),
         sensor=sensor,
         runs=tuple(runs),
+        repeatability=document.repeatability.value,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
@@ -158,6 +159,7 @@ class Campaign:
         name: short name, also of the folder.
         runs: at least one run, with unique ids.
         law: of the joint in a model of one's own; None: spring and damper.
+        repeatability: stated scatter between runs; None: nothing is stated.
     """
 
     name: str
@@ -166,6 +168,7 @@ class Campaign:
     runs: tuple[Run, ...]
     description: str = ""
     law: JointLaw | None = None
+    repeatability: Repeatability | None = None
 
     @property
     def driven(self) -> bool:

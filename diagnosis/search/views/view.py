@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Self
 
+import numpy as np
+
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.search.clock import Clock, Progress
@@ -53,12 +55,18 @@ class View:
     @cached_property
     def gap(self) -> ChannelMisfit:
         """What the nominal model leaves in the view, by channel."""
-        return misfit(self.base)
+        cost = self.base.scatter_cost if self.base.problem.scatter else np.inf
+        return replace(misfit(self.base), scatter_cost=cost)
 
     @cached_property
     def left_by_read_off(self) -> Array:
         """χ² by channel that no set of effects has to explain, shape (6,), dimensionless."""
         return self.prepared.left_by_read_off(self.base)
+
+    @property
+    def repeating(self) -> Fit:
+        """The fit of the nominal model with runs that repeat exactly, of whose gap the sets leave their shares."""
+        return self.base
 
     # ---- how sets are grown ----
 

@@ -12,6 +12,7 @@ from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis, polish
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
+from diagnosis.search.scatter import evident, scattered
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 
@@ -22,16 +23,17 @@ class WholeRuns(View):
 
     Args:
         first: the set that all others contain; None: that without an effect.
+        unscattered: the fit of the nominal model with runs that repeat exactly, where the base's do not.
     """
 
     first: Hypothesis | None = None
+    unscattered: Fit | None = None
 
     may_be_noise: ClassVar[bool] = True
 
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
         """The first view, but of runs that are seen in stretches."""
-        del clock
         if known is not None:
             return None
         first = prepared.ringing
@@ -40,11 +42,22 @@ class WholeRuns(View):
             nominal = try_fit(Problem(moving), prepared.nominal.point)
             if nominal is not None:  # what is left may be too short: whole runs then
                 prepared = replace(prepared, nominal=nominal, rested=rested)
-        return cls(prepared, prepared.nominal, first)
+        if first is not None:
+            return cls(prepared, prepared.nominal, first)
+        with clock.step("scatter"):
+            base = scattered(prepared.nominal, prepared.kinds)
+        if base is None:
+            return cls(prepared, prepared.nominal)
+        return cls(prepared, base, unscattered=prepared.nominal)
+
+    @property
+    def repeating(self) -> Fit:
+        """The fit of the nominal model with runs that repeat exactly."""
+        return self.base if self.unscattered is None else self.unscattered
 
     def on(self, base: Fit) -> Self:
         """The same view of runs with other noise, in which all sets are grown."""
-        return replace(self, base=base, first=None)
+        return replace(self, base=base, first=None, unscattered=None)
 
     @property
     def smallest(self) -> Hypothesis:
@@ -69,4 +82,5 @@ class WholeRuns(View):
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer fitted to convergence: only now, as another view may follow."""
-        return polish(settled)
+        polished = polish(settled)
+        return replace(polished, fit=evident(polished.fit))

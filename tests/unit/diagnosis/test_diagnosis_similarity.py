@@ -23,6 +23,7 @@ from tunnel_sim.effects import ALL_EFFECTS, EffectChain, effect_from
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.campaign import Repeatability
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Record
 
@@ -123,6 +124,14 @@ def test_every_rig_becomes_the_reference_rig():
     bare = free_decays.campaign([Setting(None, 0.0)], duration=5.0, rate=200.0)
     _, change = similar_campaign(bare)
     assert change.similar(1.0, "kg m2") == pytest.approx(1.0)
+
+
+def test_what_is_stated_of_the_scatter_is_the_same_of_the_similar_rig():
+    stated = Repeatability(0.003, 0.0005, 0.01)
+    data = dataclasses.replace(campaign(), repeatability=stated)
+    similar, change = similar_campaign(data)
+    assert change.time != 1.0
+    assert similar.repeatability == stated
 
 
 def stretched(data, time, moment):

@@ -89,6 +89,7 @@ OF_VOLTS = {
         (changed(channel="gear"), "unknown channel 'gear'"),
         (changed(line="of the gear"), "does not say how they are found"),
         (changed(lattice=True), "read off the records"),
+        (changed(scatters="wind_speed"), "for the built-in effects between runs"),
         (changed(random="broad_band"), "is a random moment"),
         (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
         (int, "is not a class derived from Effect"),

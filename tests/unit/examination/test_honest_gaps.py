@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks.examination import NOT_SLIPS, questioned_by
@@ -9,14 +11,30 @@ from tests.unit.gap_campaigns import campaign
 from tunnel_reference.draw import Mixture
 from tunnel_reference.make import as_campaign, draw_set, simulate_set
 from tunnel_sim.effects import ALL_EFFECTS, Effect
+from tunnel_sim.engine.virtual_campaign import simulate_campaign
+from tunnel_sim.files.plan_file import paper_plan
+from tunnel_sim.vocabulary.plan import EffectSetting
 
 _RANDOM = {"buffeting"}  # its moment is drawn by the simulator; it is among the drawn campaigns
-_EFFECTS = [kind for kind in ALL_EFFECTS if kind.name not in _RANDOM]
+_EFFECTS = [kind for kind in ALL_EFFECTS if not (kind.name in _RANDOM or kind.scatters)]
+_SCATTERING = [kind for kind in ALL_EFFECTS if kind.scatters]
 
 
 @pytest.mark.parametrize("kind", _EFFECTS, ids=lambda kind: kind.name)
 def test_no_effect_is_taken_for_a_slip(kind: type[Effect]):
     assert set(questioned_by(campaign(kind(*kind.example)))) <= NOT_SLIPS
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0])
+@pytest.mark.parametrize("kind", _SCATTERING, ids=lambda kind: kind.name)
+def test_no_scatter_is_taken_for_a_slip(kind: type[Effect], factor: float):
+    """Of the typical width and of five times it, which is 1.5 % of the speed and 5 % of the damping."""
+    info = kind.parameters()[0]
+    for seed in range(4):
+        plan = replace(
+            paper_plan(), seed=seed, effects=(EffectSetting(kind.name, {info.name: factor * info.scale}),)
+        )
+        assert set(questioned_by(simulate_campaign(plan))) <= NOT_SLIPS
 
 
 @pytest.mark.slow

@@ -49,6 +49,21 @@ TOML_CASES: dict[str, tuple[str, list[str]]] = {
     ),
     "unknown key like none": (in_run("air_density", "xyz"), ["run 'r2'", "'xyz'", "use one of"]),
     "unknown key of two lines": (in_run("air_density", '"a\\nb"'), ["run 'r2'", "'a b'"]),
+    "unknown repeatability key": (
+        TOML + "[repeatability]\nwind_sped = 0.01\n",
+        ["[repeatability]", "unknown key 'wind_sped'", "did you mean 'wind_speed'?"],
+    ),
+    "repeatability of one": (
+        TOML + "[repeatability]\nwind_speed = 1.0\n",
+        ["[repeatability]", "'wind_speed' = 1.0", "relative standard deviation from 0 to below 1"],
+    ),
+    "repeatability below zero": (TOML + "[repeatability]\nmechanical_damping = -0.1\n", ["[repeatability]"]),
+    "repeatability as nan": (TOML + "[repeatability]\nspring_stiffness = nan\n", ["not a finite number"]),
+    "repeatability in per cent": (TOML + '[repeatability]\nwind_speed = "0.3 %"\n', ["is not a number"]),
+    "repeatability as number": (
+        "repeatability = 0.1\n" + HEAD + R1,
+        ["'repeatability' = 0.1 is not a table"],
+    ),
     "no campaign": (swap('[campaign]\nname = "c"\n', ""), ["'campaign' is missing", "give campaign as"]),
     "no name": (swap('name = "c"\n', ""), ["[campaign]", "'name' is missing"]),
     "empty name": (swap('name = "c"', 'name = ""'), ["[campaign]", "blank"]),

@@ -16,7 +16,14 @@ from tunnel_sim.files import campaign_folder
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.readers import read_table, table_bytes
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.campaign import Campaign, Quantity, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import (
+    Campaign,
+    Quantity,
+    Repeatability,
+    RigProperties,
+    Run,
+    SensorProperties,
+)
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
@@ -67,6 +74,37 @@ def test_what_is_written_reads_back_as_the_same_numbers(tmp_path: Path, run_form
     folder = write_campaign(campaign(), tmp_path / "new" / "c", run_format=run_format)
     assert_same(read_campaign(folder), campaign())
     assert {p.suffix for p in (folder / "runs").iterdir()} == {f".{run_format}"}
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        Repeatability(0.003, 0.0005, 0.01),
+        Repeatability(spring_stiffness=0.0),
+        Repeatability(mechanical_damping=0.02, wind_speed=np.float64(0.1)),
+    ],
+)
+def test_a_stated_repeatability_is_read_back(tmp_path: Path, stated: Repeatability) -> None:
+    given = replace(campaign(), repeatability=stated)
+    folder = write_campaign(given, tmp_path / "c")
+    assert_same(read_campaign(folder), given)
+    assert "[repeatability]" in (folder / "campaign.toml").read_text()
+
+
+def test_an_empty_repeatability_states_nothing(tmp_path: Path) -> None:
+    folder = write_campaign(replace(campaign(), repeatability=Repeatability()), tmp_path / "c")
+    assert "repeatability" not in (folder / "campaign.toml").read_text()
+    path = folder / "campaign.toml"
+    path.write_text(path.read_text().replace("[[runs]]", "[repeatability]\n\n[[runs]]", 1))
+    assert read_campaign(folder).repeatability is None
+
+
+@pytest.mark.parametrize("value", [-0.001, 1.0, np.nan, np.inf, True, "0.1", 10**400])
+def test_a_repeatability_that_is_not_a_standard_deviation_is_refused(value: Any) -> None:
+    with pytest.raises(
+        TunnelError, match=r"repeatability: spring_stiffness = .* give a number from 0 to below 1"
+    ):
+        Repeatability(spring_stiffness=value)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=20)

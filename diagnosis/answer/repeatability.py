@@ -1,0 +1,171 @@
+"""How the runs repeat under the answer: widths with intervals, and every run against the model of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtrc
+
+from diagnosis.facts.repeatability import Repeatability, RunRepeat, Spread
+from diagnosis.likelihood.between_runs import RunColumns, width_prior
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities
+from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.model.chance import Scatter
+from diagnosis.search.scatter import may_scatter, usual, with_deviations, without_deviations
+from identification.campaign.between_runs import (
+    RunProducts,
+    WidthPrior,
+    likeliest_widths,
+    marginal,
+    width_quantiles,
+)
+from tunnel_sim.effects import ALL_EFFECTS
+
+_CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
+_NUMBERS = 2  # by which a run may deviate: its frequency and its damping
+_FEWEST = 5  # runs among which one may deviate far beyond the others
+
+
+def repeatability(fitted: Fit) -> Repeatability | None:
+    """How the runs repeat.
+
+    Args:
+        fitted: the fit of the answer.
+
+    Returns:
+        None of a single run, of a body that nothing holds, and where the model's sensitivities are not finite.
+    """
+    found = _Runs.of(fitted)
+    if found is None:
+        return None
+    runs = tuple(found.run(index) for index in range(len(fitted.problem.data.runs)))
+    rate = fitted.settings.scatter.outlier_rate
+    outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
+    return Repeatability(found.spreads(), runs, outliers[0].id if outliers else "")
+
+
+@dataclass(frozen=True, eq=False)
+class _Runs:
+    """The runs of a fit with deviations of their own.
+
+    Args:
+        fitted: the fit of the answer.
+        scatter: all differences that the runs could show, those of the fit with its widths.
+        columns: of the fit with all of them.
+        kept: places of the fit's own differences among them.
+    """
+
+    fitted: Fit
+    scatter: Scatter
+    columns: RunColumns
+    kept: Sequence[int]
+
+    @classmethod
+    def of(cls, fitted: Fit) -> _Runs | None:
+        own = {one.name: one for one in fitted.problem.scatter}
+        able = may_scatter(ALL_EFFECTS, fitted.problem.data)
+        if not able:
+            return None
+        scatter = tuple(own.get(kind.name, usual(fitted, kind)) for kind in able)
+        problem, point = with_deviations(*without_deviations(fitted), scatter)
+        names = fitted.problem.parameters.own_names
+        for place, name in enumerate(problem.parameters.own_names):
+            if name in own:
+                point.release[:, place] = fitted.point.release[:, names.index(name)]
+        jacobian = sensitivities(problem, point)
+        if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
+            return None
+        columns = RunColumns.of(problem, point, scaled_residuals(problem, point), jacobian)
+        return cls(fitted, scatter, columns, [k for k, one in enumerate(scatter) if one.name in own])
+
+    @property
+    def products(self) -> RunProducts:
+        """Of the columns of the fit's own differences."""
+        deviations = [one[:, self.kept] for one in self.columns.deviations]
+        return RunProducts.of(deviations, self.columns.common, self.columns.seen)
+
+    @property
+    def prior(self) -> WidthPrior:
+        """Of the widths of the fit's own differences."""
+        return width_prior(self.fitted.problem)
+
+    @property
+    def alone(self) -> tuple[int, int]:
+        """Places of the differences of which one is a run's own stiffness, and one its own damping."""
+        numbers = [one.kind.scatters for one in self.scatter]
+        return numbers.index("spring_stiffness"), numbers.index("mechanical_damping")
+
+    def spreads(self) -> tuple[Spread, ...]:
+        """The differences of the fit with the intervals of their widths."""
+        scatter, data = self.fitted.problem.scatter, self.fitted.problem.data
+        if not scatter:
+            return ()
+        if any(one.shown for one in scatter):
+            low, middle, high = width_quantiles(self.products, self.prior, _CENTRAL)
+        else:
+            low = middle = high = np.array([one.width for one in scatter])
+        found = marginal(self.products, middle).deviations
+        spreads = []
+        for k, one in enumerate(scatter):
+            acts = [run.wind_on or one.kind.condition == "always" for run in data.runs]
+            own = {run.id: float(e) for run, e, a in zip(data.runs, found[:, k], acts, strict=True) if a}
+            known, interval = data.repeatability.get(one.kind.scatters), (float(low[k]), float(high[k]))
+            spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
+        return tuple(spreads)
+
+    def run(self, index: int) -> RunRepeat:
+        """One run against the model."""
+        problem = self.fitted.problem
+        run, pair = problem.data.runs[index], self.alone
+        stated = problem.stated(self.fitted.point.common, self.fitted.point.release[index], run)
+        inertia, damping, stiffness = linear_coefficients(self.fitted, index)
+        changes = np.array([one.change(stated, problem.data) for one in self.scatter])
+        # a change of the run's own spring and damper is one of its frequency and its damping
+        per = np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
+        deviation = self.columns.deviations[index][:, pair]
+        covariance = np.linalg.pinv(deviation.T @ deviation)
+        own = per * (covariance @ (deviation.T @ self.columns.seen[index]))
+        std = np.abs(per) * np.sqrt(np.diag(covariance))
+        widths = np.array([one.width if k in self.kept else 0.0 for k, one in enumerate(self.scatter)])
+        bands = (
+            np.abs(per)
+            * np.sqrt(np.sum((widths[:, None] * changes) ** 2, axis=0))
+            / np.abs(np.array([changes[pair[0], 0], changes[pair[1], 1]]))
+        )
+        return RunRepeat(
+            id=run.id,
+            windy=run.wind_on,
+            frequency_hz=problem.data.model.frequency(inertia, stiffness),
+            damping_ratio=damping / (2.0 * float(np.sqrt(max(inertia * stiffness, 1e-300)))),
+            frequency=float(own[0]),
+            frequency_std=float(std[0]),
+            damping=float(own[1]),
+            damping_std=float(std[1]),
+            frequency_band=float(bands[0]),
+            damping_band=float(bands[1]),
+            p_value=self._p_value(index),
+        )
+
+    def _p_value(self, index: int) -> float:
+        """That a run deviates as far by chance, by what the others do, times the number of runs."""
+        count = len(self.columns.seen)
+        if not self.kept or count < _FEWEST:
+            return 1.0
+        products, pair = self.products, self.alone
+        others = RunProducts(*(np.delete(values, index, axis=0) for values in vars(products).values()))
+        widths = likeliest_widths(others, self.prior)
+        found = marginal(others, widths)
+        # in the run's own stiffness and damping
+        own = self.columns.deviations[index][:, pair]
+        covariance = np.linalg.pinv(own.T @ own)
+        kept = self.columns.deviations[index][:, self.kept]
+        by_chance = covariance @ (own.T @ kept) * widths
+        by_common = covariance @ (own.T @ self.columns.common[index])
+        left = self.columns.seen[index] - self.columns.common[index] @ found.common
+        away = covariance @ (own.T @ left)
+        whole = covariance + by_chance @ by_chance.T + by_common @ found.covariance @ by_common.T
+        distance = float(away @ np.linalg.solve(whole, away)) / _NUMBERS
+        # the widths are known by the other runs alone
+        return min(1.0, count * float(fdtrc(_NUMBERS, max(count - 2, 1), distance)))

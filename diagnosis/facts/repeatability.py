@@ -1,0 +1,72 @@
+"""How the runs repeat: by how much they differ from each other by chance, and every run against the model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Spread:
+    """By how much a number of the runs differs from run to run by chance.
+
+    Args:
+        effect: name of the scatter.
+        width: standard deviation of the runs' relative deviations, the likeliest, dimensionless.
+        interval: its central interval of 0.90, dimensionless.
+        stated: what the campaign states of it, dimensionless; None: nothing.
+        shown: whether the runs show it beyond what is stated; it is then among the causes.
+        deviations: of every run that it acts on, by id, relative, dimensionless.
+    """
+
+    effect: str
+    width: float
+    interval: tuple[float, float]
+    stated: float | None
+    shown: bool
+    deviations: dict[str, float]
+
+
+@dataclass(frozen=True)
+class RunRepeat:
+    """A run against the model of all runs.
+
+    Args:
+        id: of the run.
+        windy: whether the wind is on.
+        frequency_hz: of small swings, as the model predicts it without a deviation of the run, Hz.
+        damping_ratio: likewise, dimensionless.
+        frequency: the run's own over the predicted one minus one, a fraction.
+        frequency_std: its standard deviation by the noise, a fraction.
+        damping: the same of the damping ratio, a fraction.
+        damping_std: its standard deviation by the noise, a fraction.
+        frequency_band: standard deviation of the frequency between runs, a fraction; 0 where they repeat.
+        damping_band: likewise of the damping ratio, a fraction.
+        p_value: that a run deviates as far by chance, by what the other runs do, times the number of runs.
+    """
+
+    id: str
+    windy: bool
+    frequency_hz: float
+    damping_ratio: float
+    frequency: float
+    frequency_std: float
+    damping: float
+    damping_std: float
+    frequency_band: float
+    damping_band: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """How the runs repeat under the answer.
+
+    Args:
+        spreads: chance differences between the runs; empty where they repeat.
+        runs: every run against the model.
+        outlier: id of the run that deviates far beyond the others; empty: none.
+    """
+
+    spreads: tuple[Spread, ...] = ()
+    runs: tuple[RunRepeat, ...] = ()
+    outlier: str = ""

@@ -1,0 +1,170 @@
+"""What chance differences between runs make of a fit: their widths, and what they cost and gain.
+
+The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such
+as its release, is projected out of them run by run, and the deviations of the runs are integrated out
+(`identification.campaign.between_runs`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.parameters import Point
+from identification.campaign.between_runs import (
+    Marginal,
+    RunProducts,
+    UsualWidths,
+    WidthPrior,
+    likeliest_widths,
+    marginal,
+)
+from tunnel_sim.vocabulary.record import Array
+
+#: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
+#: differences, which would pin a parameter that the runs do not determine.
+_APART = 1e-4
+_USUAL = UsualWidths()
+_NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
+
+
+def width_prior(problem: Problem) -> WidthPrior:
+    """What is known of the widths before the runs; where the campaign states them, they are at least that."""
+    known = problem.data.repeatability
+    usual = np.array([getattr(_USUAL, one.kind.scatters) for one in problem.scatter])
+    given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
+    least = np.maximum(_USUAL.least * usual, given)
+    decades = np.full(usual.size, _USUAL.decades)
+    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least))
+
+
+@dataclass(frozen=True, eq=False)
+class RunColumns:
+    """The columns of a fit with chance differences between runs, what else a run has of its own projected out.
+
+    Args:
+        bases: orthonormal columns of what else a run has of its own, by run, shape (n, m).
+        deviations: by run, shape (n, kinds).
+        common: by run, shape (n, common).
+        seen: scaled residuals without the deviations of the fit, by run, shape (n,).
+    """
+
+    bases: list[Array]
+    deviations: list[Array]
+    common: list[Array]
+    seen: list[Array]
+
+    @classmethod
+    def of(
+        cls, problem: Problem, point: Point, residuals: list[Array], jacobian: list[tuple[Array, Array]]
+    ) -> RunColumns:
+        """The columns at a point.
+
+        Args:
+            residuals: scaled, by run.
+            jacobian: as a fit has it.
+        """
+        places = problem.parameters.places(problem.scatter)
+        bases, deviations, common, seen = [], [], [], []
+        for residual, (of_common, own), values in zip(residuals, jacobian, point.release, strict=True):
+            basis = _orthonormal(np.delete(own, places, axis=1))
+            chance = own[:, places]
+            bases.append(basis)
+            deviations.append(_without(basis, chance))
+            common.append(_without(basis, of_common))
+            seen.append(_without(basis, residual + chance @ values[places]))
+        inside = [_inside(deviations, column) for column in _columns(common)]
+        common = [np.stack(parts, axis=1) for parts in zip(*inside, strict=True)] if inside else common
+        return cls(bases, deviations, common, seen)
+
+    @cached_property
+    def products(self) -> RunProducts:
+        """Their products."""
+        return RunProducts.of(self.deviations, self.common, self.seen)
+
+    def with_column(self, change: Sequence[Array]) -> tuple[RunColumns, float]:
+        """The columns with one more common one, and its norm, to which it is scaled.
+
+        Args:
+            change: of the scaled prediction, by run, shape (n,).
+        """
+        column = [_without(basis, one) for basis, one in zip(self.bases, change, strict=True)]
+        column = _inside(self.deviations, column)
+        size = float(np.sqrt(sum(float(one @ one) for one in column))) or 1.0
+        common = [np.column_stack([c, one / size]) for c, one in zip(self.common, column, strict=True)]
+        return RunColumns(self.bases, self.deviations, common, self.seen), size
+
+    def left(self, found: Marginal) -> list[Array]:
+        """Residuals at the likeliest parameters and deviations by linear theory, by run, shape (n,)."""
+        rows = zip(self.seen, self.common, self.deviations, found.deviations, strict=True)
+        return [z - j @ found.common - d @ e for z, j, d, e in rows]
+
+    def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
+        """The likeliest widths and what they make of the runs."""
+        widths = likeliest_widths(self.products, prior, start)
+        return self.at(widths, prior)
+
+    def at(self, widths: Array, prior: WidthPrior) -> Between:
+        """What given widths make of the runs."""
+        return Between(widths, marginal(self.products, widths), prior.cost(widths))
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """What widths of chance differences make of the runs.
+
+    Args:
+        widths: relative, shape (kinds,).
+        found: the deviations integrated out.
+        prior_cost: −2 ln of the prior density of the widths, up to a constant.
+    """
+
+    widths: Array
+    found: Marginal
+    prior_cost: float
+
+    @property
+    def likelihood(self) -> float:
+        """−2 ln of the likelihood and the prior of the widths, up to a constant."""
+        return self.found.likelihood + self.prior_cost
+
+    @property
+    def restricted(self) -> float:
+        """The same with the common parameters integrated out, which compares widths."""
+        return self.found.restricted + self.prior_cost
+
+    @property
+    def cost(self) -> float:
+        """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much."""
+        away = float(np.sum((self.found.deviations / self.widths) ** 2))
+        return self.found.log_determinant + away + self.prior_cost
+
+
+def _orthonormal(columns: Array) -> Array:
+    size = np.sqrt(np.maximum(np.sum(columns**2, axis=0), 1e-300))
+    vectors, values, _ = np.linalg.svd(columns / size, full_matrices=False)
+    return np.asarray(vectors[:, values > _NULL * values[0]], np.float64)
+
+
+def _without(basis: Array, values: Array) -> Array:
+    return np.asarray(values - basis @ (basis.T @ values), np.float64)
+
+
+def _columns(by_run: Sequence[Array]) -> list[list[Array]]:
+    return [[one[:, k] for one in by_run] for k in range(by_run[0].shape[1])]
+
+
+def _inside(deviations: Sequence[Array], column: list[Array]) -> list[Array]:
+    """A column of all runs; its part that deviations of the runs do where the rest is an error of differences."""
+    inside = []
+    for chance, one in zip(deviations, column, strict=True):
+        size = np.sqrt(np.sum(chance**2, axis=0)) + 1e-300
+        part = chance @ (np.linalg.lstsq(chance / size, one, rcond=1e-9)[0] / size)
+        inside.append(part)
+    whole = sum(float(one @ one) for one in column)
+    apart = sum(float((one - part) @ (one - part)) for one, part in zip(column, inside, strict=True))
+    return inside if apart < _APART * whole else column

@@ -1,0 +1,200 @@
+"""Chance differences between runs: a layer under every set of causes.
+
+A wind speed, a spring or a damping that is a little different in every run is no cause beside others. Every run has
+its own deviations under every set, with a normal prior whose width is the likeliest for the set. They are
+integrated out where sets are compared (docs/decisions/0036-runs-that-do-not-repeat.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities, try_fit
+from diagnosis.likelihood.problem import Problem
+from diagnosis.model.chance import Chance, Scatter
+from diagnosis.model.parameters import Point
+from diagnosis.model.run_data import Data
+from diagnosis.settings import ScatterSettings
+from identification.campaign.between_runs import WidthPrior
+from tunnel_sim.effects import Effect
+
+_ROUNDS = 3  # of widths and fits
+_FEWEST = 2  # runs that may differ from each other
+
+_TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
+
+Kept = NDArray[np.bool_]
+
+
+def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:
+    """The differences that the runs could show: two of them at least have what differs, and a spring."""
+    runs = {"always": len(data.runs), "wind_on": sum(run.wind_on for run in data.runs)}
+    held = data.model.restored
+    return tuple(kind for kind in kinds if kind.scatters and held and runs[kind.condition] >= _FEWEST)
+
+
+def with_deviations(problem: Problem, point: Point, scatter: Scatter) -> tuple[Problem, Point]:
+    """A problem with chance differences between runs, and a point of it without any.
+
+    Args:
+        problem: without such differences.
+    """
+    layered = replace(problem, scatter=scatter)
+    first = len(problem.parameters.own) - problem.parameters.of_effects
+    none = np.zeros((len(point.release), len(scatter)))
+    release = np.hstack([point.release[:, :first], none, point.release[:, first:]])
+    return layered, Point(point.common, release)
+
+
+def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
+    """The problem of a fit without chance differences between runs, and its point."""
+    names = fitted.problem.parameters.own_names
+    own = fitted.problem.parameters.places(fitted.problem.scatter)
+    kept = [place for place in range(len(names)) if place not in own]
+    return replace(fitted.problem, scatter=()), Point(fitted.point.common, fitted.point.release[:, kept])
+
+
+def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
+    """A chance difference beside the nominal model as it is fitted."""
+    run = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
+    return Chance(kind, width, run.derivatives, run.mechanical_damping)
+
+
+def usual(found: Fit, kind: type[Effect]) -> Chance:
+    """A chance difference of usual width."""
+    return chance(found, kind, kind.parameters()[0].scale)
+
+
+def as_stated(found: Fit, kinds: Sequence[type[Effect]]) -> Fit:
+    """A fit whose runs differ as much as the campaign states; as given where it states nothing.
+
+    Args:
+        found: whose runs repeat exactly.
+        kinds: the effects that may be named.
+    """
+    known = found.problem.data.repeatability
+    stated = [kind for kind in may_scatter(kinds, found.problem.data) if known.get(kind.scatters, 0.0) > 0.0]
+    if not stated:
+        return found
+    scatter = tuple(chance(found, kind, known[kind.scatters]) for kind in stated)
+    return try_fit(*with_deviations(found.problem, found.point, scatter)) or found
+
+
+def scattered(found: Fit, kinds: Sequence[type[Effect]]) -> Fit | None:
+    """A fit whose runs differ by chance, and more than is stated; None where they do not, or the fit fails.
+
+    Args:
+        found: whose runs differ as much as is stated.
+        kinds: the effects that may be named.
+    """
+    able = may_scatter(kinds, found.problem.data)
+    if not able:
+        return None
+    scatter = tuple(usual(found, kind) for kind in able)
+    problem, point = with_deviations(*without_deviations(found), scatter)
+    jacobian = sensitivities(problem, point)
+    if not all(np.all(np.isfinite(c)) and np.all(np.isfinite(r)) for c, r in jacobian):
+        return None
+    residuals = found.residuals if not found.problem.scatter else scaled_residuals(problem, point)
+    columns, prior = RunColumns.of(problem, point, residuals, jacobian), width_prior(problem)
+    if not _evident(columns, prior, np.ones(len(able), bool), found.settings.scatter):
+        return None
+    layered = try_fit(with_widths(problem, columns.likeliest(prior)), point)
+    return None if layered is None else settled(layered)
+
+
+def evident(fitted: Fit) -> Fit:
+    """A fit with chance differences between its runs where they show any beyond what is stated; else as stated."""
+    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
+    if not scatter:
+        return fitted
+    columns, prior, known = fitted.columns, width_prior(fitted.problem), fitted.problem.data.repeatability
+    if _evident(columns, prior, np.ones(len(scatter), bool), chosen):
+        shown, widths = _shown(columns, prior, chosen), columns.likeliest(prior).widths
+        found = [
+            replace(one, width=float(width), shown=bool(seen))
+            for one, width, seen in zip(scatter, widths, shown, strict=True)
+        ]
+    else:
+        stated = [(one, known.get(one.kind.scatters, 0.0)) for one in scatter]
+        found = [replace(one, width=width, shown=False) for one, width in stated if width > 0.0]
+    return with_scatter(fitted, tuple(found))
+
+
+def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> Kept:
+    """In which of the numbers that may scatter the runs differ: the one missed least is left out, one by one."""
+    kept = np.ones(prior.usual.size, bool)
+    while kept.sum() > 1:
+        places = np.flatnonzero(kept)
+        gains = [_gain(columns, prior, kept, np.arange(kept.size) == place) for place in places]
+        least = int(np.argmin(gains))
+        if gains[least] >= chdtri(1.0, chosen.which_scatters_rate):
+            break
+        kept[places[least]] = False
+    return kept
+
+
+def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:
+    """A fit with other chance differences between its runs; as given where that fails."""
+    if scatter == fitted.problem.scatter:
+        return fitted
+    names = fitted.problem.parameters.own_names
+    problem, point = with_deviations(*without_deviations(fitted), scatter)
+    for place, name in enumerate(problem.parameters.own_names):
+        if name in names:
+            point.release[:, place] = fitted.point.release[:, names.index(name)]
+    return try_fit(problem, point, tolerance=_TOLERANCE) or fitted
+
+
+def named(fitted: Fit) -> tuple[str, ...]:
+    """The chance differences of a fit that its runs show beyond what the campaign states."""
+    return tuple(one.name for one in fitted.problem.scatter if one.shown)
+
+
+def _evident(columns: RunColumns, prior: WidthPrior, which: Kept, chosen: ScatterSettings) -> bool:
+    """Whether the runs differ by more than the least widths."""
+    limit = chdtri(float(which.sum()), chosen.scatter_rate)
+    return bool(_gain(columns, prior, np.ones_like(which), which) >= limit)
+
+
+def _gain(columns: RunColumns, prior: WidthPrior, kept: Kept, lost: Kept) -> float:
+    """Fall of −2 ln L by some of the differences beside the others that are kept."""
+    whole = columns.likeliest(_held(prior, ~kept))
+    without = columns.likeliest(_held(prior, ~kept | lost))
+    return without.found.restricted - whole.found.restricted
+
+
+def _held(prior: WidthPrior, at_least: Kept) -> WidthPrior:
+    """The prior with some widths held at their least."""
+    usual, decades = np.where(at_least, prior.least, prior.usual), np.where(at_least, 0.0, prior.decades)
+    return replace(prior, usual=usual, decades=decades)
+
+
+def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
+    """A fit whose widths are the likeliest for what it leaves; as given where it has no such differences."""
+    for _ in range(rounds):
+        between = fitted.between
+        if between is None:
+            return fitted
+        prior = width_prior(fitted.problem)
+        now = np.array([one.width for one in fitted.problem.scatter])
+        here = fitted.columns.at(now, prior)
+        if here.restricted - between.restricted < fitted.settings.scatter.widths_settled:
+            return fitted
+        again = try_fit(with_widths(fitted.problem, between), fitted.point, base=fitted)
+        if again is None:
+            return fitted
+        fitted = again
+    return fitted
+
+
+def with_widths(problem: Problem, between: Between) -> Problem:
+    """A problem with other widths of the same differences."""
+    wider = (one.as_wide_as(width) for one, width in zip(problem.scatter, between.widths, strict=True))
+    return replace(problem, scatter=tuple(wider))

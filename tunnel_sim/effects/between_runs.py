@@ -1,0 +1,127 @@
+"""Chance differences between runs: of the wind speed, the spring and the mechanical damping.
+
+Each run draws a deviation of its own. A single run shows none of them, and no fit of a motion finds them: their
+distribution over the runs is to be found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tunnel_sim.effects.base import Drawn, Effect
+from tunnel_sim.effects.parameters import parameter
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.between_runs import WIDEST_SCATTER
+
+
+def _spread(meaning: str, scale: float) -> Any:
+    """The standard deviation between runs, relative."""
+    return parameter("σ", "1", meaning, scale=scale, lower=0.0, upper=WIDEST_SCATTER)
+
+
+@dataclass(frozen=True)
+class BetweenRuns(Effect):
+    """A number of the run that is (1 + σ e) times as great as stated, with e drawn from the unit normal."""
+
+    fitted = False
+
+    def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
+        """Draw the run's deviation, in standard deviations."""
+        del stated
+        return float(rng.standard_normal())
+
+    def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
+        """Scale the number by the run's own factor."""
+        del stated
+        return run if self.is_null else run.with_deviations({self.scatters: self.deviation(drawn)})
+
+    def deviation(self, drawn: Drawn) -> float:
+        """The run's own deviation, relative."""
+        return self.severity * self.drawn_number(drawn)
+
+
+@dataclass(frozen=True)
+class WindSpeedScatter(BetweenRuns):
+    """A wind speed that differs from run to run by chance."""
+
+    name = "wind_speed_scatter"
+    place = 27
+    channel = "calibration"
+    condition = "wind_on"
+    scatters = "wind_speed"
+    advice = "Log the wind speed of every run, or hold it closer"
+    equation = "true speed of run i = (1 + εi) V, εi normal with standard deviation σ, drawn for every run"
+    signature = (
+        "The wind-on runs lie off the model by chance: their stiffness by the change of the speed squared, their "
+        "damping by that of the speed. The wind-off runs repeat."
+    )
+    references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
+    example = (0.05,)
+
+    spread: float = _spread("standard deviation of the speed between runs, relative", 0.003)
+
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """Ka grows with V², and Ca with V."""
+        del spring, damping
+        return -2.0 * air_stiffness, -air_damping
+
+
+@dataclass(frozen=True)
+class StiffnessScatter(BetweenRuns):
+    """A spring whose stiffness differs from run to run by chance, as it is clamped again."""
+
+    name = "stiffness_scatter"
+    place = 28
+    channel = "calibration"
+    condition = "always"
+    on_spring = True
+    scatters = "spring_stiffness"
+    advice = "Clamp the spring in the same way before every run, or leave it in place"
+    equation = "(1 + εi) Kr in run i, εi normal with standard deviation σ, drawn for every run"
+    signature = (
+        "The frequencies of runs of one spring differ by chance, wind off as well; their damping repeats."
+    )
+    references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
+    example = (0.02,)
+
+    spread: float = _spread("standard deviation of the stiffness between runs, relative", 0.0005)
+
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """The spring's own."""
+        del damping, air_stiffness, air_damping
+        return spring, 0.0
+
+
+@dataclass(frozen=True)
+class DampingScatter(BetweenRuns):
+    """A mechanical damping that differs from run to run by chance."""
+
+    name = "damping_scatter"
+    place = 29
+    channel = "damping"
+    condition = "always"
+    scatters = "mechanical_damping"
+    advice = "Run the bearing in before every run, and lay the cable in the same way"
+    equation = "(1 + εi) Cr in run i, εi normal with standard deviation σ, drawn for every run"
+    signature = "The damping of equal runs differs by chance, wind off as well; their frequencies repeat."
+    references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
+    example = (0.2,)
+
+    spread: float = _spread("standard deviation of the mechanical damping between runs, relative", 0.01)
+
+    @classmethod
+    def departure(
+        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
+    ) -> tuple[float, float]:
+        """The mechanical one's own."""
+        del spring, air_stiffness, air_damping
+        return 0.0, damping
