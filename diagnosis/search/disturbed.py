@@ -68,7 +68,7 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     for name, p_value in beyond_the_others(list(seen.values()), chosen):
         one = seen[name]
         most = int(np.argmax(one.drop))
-        # a large jump is seen before it happens, in fits that include it; it may begin a cycle earlier than it seems
+        # fits that include a large jump show it before it happens; it may begin a cycle earlier than it seems
         first, frequency = most, resonance(nominal, index[name])
         while first > 0 and _clear(float(one.chance[first - 1]), chosen):
             first -= 1
