@@ -20,6 +20,8 @@ from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from diagnosis.where.jumps import Jumps, jumps
 from diagnosis.words.verdict import headline, next_steps
+from identification.examination.examine import examine
+from identification.status import Outcome
 from tests.unit.diagnosis_document import document
 from tests.unit.gap_campaigns import campaign, nominal, with_blow
 from tunnel_reference.disturbance import FORMS
@@ -169,6 +171,15 @@ def test_the_causes_beside_a_blow_are_those_planted() -> None:
     for name, value in truth.items():
         given = found["candidates"][0]["parameters"][name]
         assert given["value"] == pytest.approx(value, abs=3.0 * given["std"])
+
+
+def test_a_blow_is_not_taken_for_a_clock_that_drifts() -> None:
+    """The phase over the run is as well fitted by a parabola in time as by a jump."""
+    conditions = [(spring, speed) for spring in (16.12, 21.02, 44.84) for speed in (0.0, 15.0, 25.0)]
+    struck = with_blow(campaign(seed=0, conditions=conditions), 8e-3, 2.1, "r1")
+    assert not any(remark.outcome is Outcome.REFUSED for remark in examine(struck).remarks)
+    chosen = choose(struck, known_effects(), CHOSEN)
+    assert [one.run for one in nominal_study(chosen.campaign, chosen.kinds).disturbed] == ["r1"]
 
 
 def test_without_a_cause_there_is_no_gap_beside_the_blow() -> None:
