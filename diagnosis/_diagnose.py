@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +29,7 @@ from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.study import Study
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import Settings
+from identification.status import left_out_as_asked
 from tunnel_sim.effects import Effect, effect_class, known_effects
 from tunnel_sim.effects.registry import answering_with
 from tunnel_sim.files.campaign_folder import as_campaign
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 def diagnose(
     campaign: Campaign | Path | str,
     *,
+    leave_out: Collection[str] = (),
     kinds: Sequence[type[Effect]] | None = None,
     progress: Progress | None = None,
     model: JointModel | NominalModel | None = None,
@@ -52,6 +54,7 @@ def diagnose(
 
     Args:
         campaign: the runs; or their folder, or one file of a data logger.
+        leave_out: ids of runs to leave out; a remark and ``provenance`` name them.
         kinds: the effects to answer with, registered or not; None: all known ones.
         progress: called with the name of each step.
         model: a model of one's own, from `read_model`, whose joint is then the nominal model; or a nominal model
@@ -64,10 +67,10 @@ def diagnose(
         The answer, for the runs that one model can be fitted to; its cautions name the others.
 
     Raises:
-        TunnelError: when the examination refuses the records, a run shows no decaying motion, or the nominal model
-            cannot be fitted to them.
+        TunnelError: when the examination refuses the records, a run shows no decaying motion, the nominal model
+            cannot be fitted to them, or no run has an id in ``leave_out``.
     """
-    campaign = as_campaign(campaign)
+    campaign = as_campaign(campaign).without(leave_out)
     joint, own = (None, model) if isinstance(model, NominalModel) else (model, None)
     if joint is not None:
         campaign, own = with_law(campaign, joint.law)
@@ -84,7 +87,13 @@ def diagnose(
             answer = limit_cycle_answer(answer, chosen.remarks)
         else:
             answer = _with_remainder(answer, study, chosen, say)
-        return answer.in_words()
+        return _without(answer, leave_out).in_words()
+
+
+def _without(answer: Diagnosis, left_out: Collection[str]) -> Diagnosis:
+    """The answer with the runs that were left out as asked."""
+    provenance = {**answer.provenance, "left_out": list(left_out)}
+    return replace(answer, remarks=(*left_out_as_asked(left_out), *answer.remarks), provenance=provenance)
 
 
 def _studied(chosen: Chosen, progress: Progress | None, settings: Settings, rivals: Sequence[Rival]) -> Study:

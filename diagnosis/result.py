@@ -12,6 +12,7 @@ import polars as pl
 
 from diagnosis.facts.closure import Confirmation, Misfit, NoiseSummary, Waterfall
 from diagnosis.facts.decision import Decision, decision
+from diagnosis.facts.disturbance import Disturbance
 from diagnosis.facts.found import Found
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Closable, Remainder
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 1
 _LAST = (
     "sizes", "rest", "model", "closable", "ambiguous_with", "next_run", "coefficients", "confirmation", "noise",
-    "hidden", "blind_spots", "cautions", "repeatability", "remarks", "found", "seconds", "maps", "provenance",
+    "hidden", "blind_spots", "cautions", "repeatability", "disturbed", "remarks", "found", "seconds", "maps",
+    "provenance",
 )  # fmt: skip
 
 
@@ -250,6 +252,7 @@ class Diagnosis:
         blind_spots: what these runs cannot show, in sentences.
         seconds: wall time by step, s.
         maps: data of the figures, in JSON's types.
+        disturbed: runs that were disturbed; the answer is that without them from then on.
         remarks: of the examination before the diagnosis, on runs left out, cut or to look at.
         inclusion: by effect of the vocabulary, the probability that it is among the causes.
         rest: what remains after the causes.
@@ -278,6 +281,7 @@ class Diagnosis:
     cautions: tuple[str, ...] = ()
     maps: Mapping[str, Any] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    disturbed: tuple[Disturbance, ...] = ()
     remarks: tuple[Remark, ...] = ()
     inclusion: Mapping[str, float] = field(default_factory=dict)
     waterfall: Waterfall = field(default_factory=Waterfall)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
 from identification.statistics import widened_by_contradictions
+from identification.status import left_out_as_asked
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import checked_drive, refuse_untreated
@@ -22,6 +24,7 @@ def identify(
     campaign: Campaign | Path | str,
     estimator: str | Estimator = "output_error",
     *,
+    leave_out: Collection[str] = (),
     throw: bool = True,
     progress: Progress | None = None,
 ) -> Estimate:
@@ -35,6 +38,7 @@ def identify(
             of a data logger.
         estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
             settings, such as ``OutputError(cycles_per_window=5)``.
+        leave_out: ids of runs to leave out, which a remark names.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
         progress: called with the number of runs that are identified, and of all; None: nothing is reported.
 
@@ -42,10 +46,11 @@ def identify(
         The estimate. Values that could not be identified are None; the statuses say why and what to do.
 
     Raises:
-        TunnelError: for an unknown estimator, a campaign without runs, a wind-on run without air density,
-            records that the examination refuses, and, with ``throw``, when no run could be identified.
+        TunnelError: for an unknown estimator, a campaign without runs, an id in ``leave_out`` that no run has, a
+            wind-on run without air density, records that the examination refuses, and, with ``throw``, when no run
+            could be identified.
     """
-    campaign = as_campaign(campaign)
+    campaign = as_campaign(campaign).without(leave_out)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
     if not campaign.runs:
         raise TunnelError("campaign without runs", where=campaign.name, remedy="add at least one run")
@@ -86,6 +91,7 @@ def identify(
     contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # which names the springs
     if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
+    estimate = replace(estimate, remarks=(*left_out_as_asked(leave_out), *estimate.remarks))
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)

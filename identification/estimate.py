@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -178,6 +178,45 @@ class RunEstimate:
         return {"id": self.id, **_statuses_json(self.statuses), **_fields_json(self, "statuses")}
 
 
+@dataclass(frozen=True)
+class RunScatter:
+    """How runs of equal conditions differ by chance, beyond their noise. It is in the coefficients' intervals.
+
+    Args:
+        frequency: of the natural frequency, relative standard deviation, root mean square over the runs.
+        damping: of the decay rate, the same.
+        wind_speed: of the runs' own speeds, relative standard deviation; None where it is not counted.
+        spring_stiffness: of the runs' own springs, the same.
+        mechanical_damping: of the runs' own mechanical damping, the same.
+        stated: those of these three that the campaign states; the others are estimated.
+        covariances: what each of the three that is not None adds to the covariance of the parameters, in the
+            products of their units; shape (k, p, p).
+    """
+
+    __pydantic_config__ = _FINITE
+
+    frequency: float
+    damping: float
+    wind_speed: Quantity | None = None
+    spring_stiffness: Quantity | None = None
+    mechanical_damping: Quantity | None = None
+    stated: tuple[str, ...] = ()
+    covariances: tuple[tuple[tuple[float, ...], ...], ...] = ()
+
+    @property
+    def widths(self) -> dict[str, Quantity]:
+        """The deviations that are counted, by name."""
+        every = {
+            name: getattr(self, name) for name in ("wind_speed", "spring_stiffness", "mechanical_damping")
+        }
+        return {name: width for name, width in every.items() if width is not None}
+
+    def among(self, kept: Sequence[int]) -> RunScatter:
+        """The same for some of the parameters, by their places."""
+        chosen = [tuple(tuple(rows[i][j] for j in kept) for i in kept) for rows in self.covariances]
+        return replace(self, covariances=tuple(chosen))
+
+
 _CAMPAIGN_QUANTITIES = (*PARAMETERS, "sensor_zero", "wind_off_inertia", "wind_off_intercept")
 
 
@@ -201,6 +240,8 @@ class Estimate:
         covariance: of the parameters, in the products of their units; shape (p, p).
         noise: the noise level behind the covariance; None where the method does not use it.
         remarks: of the examination before the estimation, on runs left out, cut or to look at.
+        repeatability: the scatter between runs, which the covariance includes; None where the runs show none beyond
+            their noise, and none is stated.
     """
 
     __pydantic_config__ = _FINITE
@@ -220,6 +261,7 @@ class Estimate:
     covariance: tuple[tuple[float, ...], ...] = ()
     noise: NoiseLevel | None = None
     remarks: tuple[Remark, ...] = ()
+    repeatability: RunScatter | None = None
 
     @property
     def status(self) -> Status:

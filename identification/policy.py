@@ -202,11 +202,8 @@ LEAST_CORNER_DROP = 4.0
 
 # --- When the scatter of the runs is believed, and when two scores differ. ---
 
-LEAST_SCATTER_FREEDOM = 0.5
-"""Degrees of freedom of a scatter: below half of one it says nothing."""
-
-LEAST_FREE_SHARE = 0.1
-"""One minus the leverage of a run: below it the other runs cannot judge this one."""
+LEAST_WIDTH_FREEDOM = 1.0
+"""Degrees of freedom of a variance with estimated widths, at least: two runs show one difference."""
 
 LEAST_CHANGE = 0.02
 """Change of a bias or of a spread that matters, over the spread, where both trials use the same records."""

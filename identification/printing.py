@@ -280,7 +280,52 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
     notes += status_lines(document)
     left = len(document["runs"]) - SHOWN_RUNS
     more = f"and {left} more runs, which runs_frame() lists" if left > 0 else ""
-    return [coefficients_table(document), runs_table(document), more, *(f"Note: {note}" for note in notes)]
+    tables = [coefficients_table(document), runs_table(document), more]
+    return [*tables, *repeatability_lines(document), *(f"Note: {note}" for note in notes)]
+
+
+DEVIATIONS: Mapping[str, str] = {
+    "wind_speed": "wind speed",
+    "spring_stiffness": "spring stiffness",
+    "mechanical_damping": "mechanical damping",
+}
+"""How the deviations of runs are written, by their name in an estimate's JSON."""
+
+
+def repeatability_lines(document: Document) -> list[str]:
+    """How the runs of an estimate repeat: nothing where they show no scatter beyond their noise.
+
+    Runs that are no more than the coefficients need cannot show any, which is said.
+    """
+    found, coefficients = document["repeatability"], document["parameters"]
+    shown = [run for run in document["runs"] if run["omega_n"] is not None]
+    if found is None:
+        if not coefficients or 2 * len(shown) > len(coefficients):
+            return []
+        return [
+            f"Between runs: {'one run' if len(shown) == 1 else 'runs of which none repeats another'} cannot show a "
+            "scatter, so the intervals hold the noise only; repeat a run, or state [repeatability]"
+        ]
+    parts = []
+    for name, words in DEVIATIONS.items():
+        width = found[name]
+        if width is None:
+            continue
+        size = f"{words} ± {percent(width['value'])}"
+        if name in found["stated"]:
+            parts.append(f"{size} as stated")
+        else:
+            low, high = width["interval"]
+            parts.append(f"{size} ({percent(low)} to {percent(high)})")
+    return [
+        f"Between runs: frequency ± {percent(found['frequency'])}, damping ± {percent(found['damping'])}; "
+        f"{', '.join(parts)}. The intervals include it"
+    ]
+
+
+def percent(share: float) -> str:
+    """A share in per cent with two significant digits, such as ``0.021 %``."""
+    return f"{significant(100.0 * share, 2)} %"
 
 
 def estimate_brief(document: Document) -> str:

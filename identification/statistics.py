@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri, stdtrit
 
 from identification.estimate import Estimate, NoiseLevel, Quantity
-from identification.policy import MISFIT_RATE
+from identification.policy import LEAST_WIDTH_FREEDOM, MISFIT_RATE
 from identification.status import Remark
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.record import Array
@@ -239,6 +239,16 @@ def scatter_of_runs(influences: Array, informative_runs: NDArray[np.int64]) -> A
     free = np.maximum(informative_runs - 2, 1)
     spread = np.sqrt(np.sum(influences**2, axis=0) * informative_runs / free)
     return np.asarray(spread * stdtrit(free, 0.975) / ndtri(0.975))
+
+
+def student_factor(relative: Array) -> Array:
+    """Factor on standard deviations whose variances are estimated, so that 1.96 of them are a 95 % interval.
+
+    Args:
+        relative: variance of each variance over its square, shape (q,); its degrees of freedom are 2 over it.
+    """
+    freedom = np.maximum(2.0 / np.maximum(relative, 1e-9), LEAST_WIDTH_FREEDOM)
+    return np.asarray(stdtrit(freedom, 0.975) / ndtri(0.975))
 
 
 def widened_by_contradictions(estimate: Estimate, campaign: Campaign, remarks: Sequence[Remark]) -> Estimate:

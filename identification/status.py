@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
@@ -136,6 +136,14 @@ class Remark:
             data.get("figures", {}),
         )
         return cls(outcome, runs, str(data["what"]), str(data["remedy"]), dict(figures))
+
+
+def left_out_as_asked(ids: Collection[str]) -> tuple[Remark, ...]:
+    """The remark on runs that the user asked to leave out; none where there are none."""
+    if not ids:
+        return ()
+    it = "it" if len(ids) == 1 else "them"
+    return (Remark(Outcome.LEFT_OUT, tuple(ids), "left out, as asked", f"repeat {it} and diagnose again"),)
 
 
 @dataclass(frozen=True)

@@ -123,6 +123,7 @@ def assemble(
         },
         inclusion=inclusion(weighed, study.beside, settings.gap),
         waterfall=closes.steps,
+        disturbed=study.disturbed,
         rest=_remains(study, found, answers, closes.steps),
         repeatability=repeatability(chosen),
         model=patched,

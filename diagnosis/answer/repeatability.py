@@ -14,7 +14,7 @@ from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivit
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.model.chance import Scatter
 from diagnosis.search.scatter import may_scatter, usual, with_deviations, without_deviations
-from identification.uncertainty.between_runs import (
+from identification.campaign.between_runs import (
     RunProducts,
     WidthPrior,
     likeliest_widths,

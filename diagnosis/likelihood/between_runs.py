@@ -2,7 +2,7 @@
 
 The columns of a fit are what its residuals would change with each parameter. What else a run has of its own, such
 as its release, is projected out of them run by run, and the deviations of the runs are integrated out
-(`identification.uncertainty.between_runs`).
+(`identification.campaign.between_runs`).
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ import numpy as np
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
-from identification.uncertainty.between_runs import (
+from identification.campaign.between_runs import (
     Marginal,
     RunProducts,
+    UsualWidths,
     WidthPrior,
     likeliest_widths,
     marginal,
@@ -27,19 +28,18 @@ from tunnel_sim.vocabulary.record import Array
 #: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
 #: differences, which would pin a parameter that the runs do not determine.
 _APART = 1e-4
+_USUAL = UsualWidths()
 _NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
 
 
 def width_prior(problem: Problem) -> WidthPrior:
     """What is known of the widths before the runs; where the campaign states them, they are at least that."""
-    chosen, known = problem.data.settings.scatter, problem.data.repeatability
-    usual = np.array([one.usual for one in problem.scatter])
+    known = problem.data.repeatability
+    usual = np.array([getattr(_USUAL, one.kind.scatters) for one in problem.scatter])
     given = np.array([known.get(one.kind.scatters, 0.0) for one in problem.scatter])
-    least = np.maximum(chosen.least_scatter * usual, given)
-    decades = np.full(usual.size, chosen.scatter_decades)
-    return WidthPrior(
-        np.maximum(usual, given), decades, least, np.maximum(chosen.greatest_scatter * usual, least)
-    )
+    least = np.maximum(_USUAL.least * usual, given)
+    decades = np.full(usual.size, _USUAL.decades)
+    return WidthPrior(np.maximum(usual, given), decades, least, np.maximum(_USUAL.most * usual, least))
 
 
 @dataclass(frozen=True, eq=False)

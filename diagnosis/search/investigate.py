@@ -12,7 +12,7 @@ from diagnosis.model.choose import nominal_model
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.parameters import Point
 from diagnosis.search.clock import Clock, Progress
-from diagnosis.search.prepared import prepared_and_tested
+from diagnosis.search.disturbed import prepared_undisturbed
 from diagnosis.search.rivals import RIVALS
 from diagnosis.search.rivals.rival import Rival
 from diagnosis.search.sets import Sets, compared
@@ -47,7 +47,8 @@ def investigate(
         views: in which sets of effects are found, in the order in which they are asked whether they apply.
 
     Returns:
-        The study; with the lead of the motion over its input where it explains more with no more causes.
+        The study, in which disturbed runs end at their disturbance; with the lead of the motion over its input
+        where it explains more with no more causes.
 
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
@@ -56,9 +57,9 @@ def investigate(
 
     def study(model: NominalModel) -> Study:
         clock = Clock(progress)
-        prepared, test = prepared_and_tested(campaign, model, kinds, clock, settings)
+        prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
         if not test.detected:
-            return Study(prepared, Gap(test), seconds=clock.seconds)
+            return Study(prepared, Gap(test), disturbed=disturbed, seconds=clock.seconds)
         with clock.step("where"):
             gap = Gap(test, prepared.place())
         sets: Sets | None = None
@@ -68,7 +69,7 @@ def investigate(
                 sets = compared(view.sets(clock), rivals, clock)
         if sets is None:
             raise ValueError("no view of the runs applies")
-        return Study.of_sets(sets, gap, clock)
+        return replace(Study.of_sets(sets, gap, clock), disturbed=disturbed)
 
     found = study(model)
     lead = likeliest_lead(found)
@@ -88,8 +89,9 @@ def nominal_study(
     Raises:
         TunnelError: when the nominal model cannot be fitted to the runs.
     """
-    prepared, test = prepared_and_tested(campaign, nominal_model(campaign), kinds, Clock(), settings)
-    return Study(prepared, Gap(test))
+    model, clock = nominal_model(campaign), Clock()
+    prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
+    return Study(prepared, Gap(test), disturbed=disturbed)
 
 
 def explains_more(again: Study, found: Study) -> bool:

@@ -21,7 +21,7 @@ from diagnosis.model.chance import Chance, Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data
 from diagnosis.settings import ScatterSettings
-from identification.uncertainty.between_runs import WidthPrior
+from identification.campaign.between_runs import WidthPrior
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of widths and fits

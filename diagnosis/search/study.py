@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from diagnosis.facts.disturbance import Disturbance
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.nominal import NominalModel
@@ -83,6 +84,7 @@ class Study:
         answers: the answer first, then the most probable ones; empty where there is no gap.
         refused: by names of refused answers, their effects that no half of the records shows.
         rivals: what was weighed from outside the vocabulary.
+        disturbed: runs that were disturbed, which are left out from then on.
         caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
         seconds: wall time by step, s.
     """
@@ -92,6 +94,7 @@ class Study:
     answers: tuple[Answer, ...] = ()
     refused: Mapping[Names, Names] = field(default_factory=dict)
     rivals: tuple[FoundRival, ...] = ()
+    disturbed: tuple[Disturbance, ...] = ()
     caution: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 
@@ -196,7 +199,9 @@ class Study:
             left = misfit(prepared.nominal)
             answers = [replace(one, choices=_choices(one, prepared.nominal, left)) for one in answers]
         caution, refused = sets.view.caution, sets.refused
-        return cls(prepared, gap, tuple(answers), refused, sets.rivals, caution, clock.seconds)
+        return cls(
+            prepared, gap, tuple(answers), refused, sets.rivals, caution=caution, seconds=clock.seconds
+        )
 
 
 def _answer(weighed: Weighed, sets: Sets, whole: Mapping[Names, Hypothesis | None]) -> Answer:

@@ -35,6 +35,45 @@ class SelectionSettings:
         "convention",
         unit="std of a block mean",
     )
+    disturbed_rate: float = setting(
+        0.001,
+        "Rate at which a campaign without a disturbance has a run that is said to be disturbed.",
+        "convention",
+        ONE_IN_1000,
+    )
+    disturbed_fewest: int = setting(
+        3,
+        "Fewest free decays among which a disturbed one is sought.",
+        "judgement",
+        "What is in one of two runs may as well be in all.",
+        unit="runs",
+    )
+    disturbed_share: float = setting(
+        0.25,
+        "Share of the runs that may be disturbed, at least one.",
+        "judgement",
+        "The others show what all do.",
+    )
+    disturbed_scatter: float = setting(
+        0.5,
+        "Expected standard deviation between runs of the logarithm of the greatest jump in χ².",
+        "judgement",
+        "By chance alone it is 0.25; causes act more in some runs than in others.",
+    )
+    disturbed_prior: float = setting(
+        4.0,
+        "Runs by whose scatter this expectation counts.",
+        "judgement",
+        "Few runs do not show how much they scatter.",
+        unit="runs",
+    )
+    disturbed_kept: float = setting(
+        6.0,
+        "Cycles before a disturbance from which that part of a run is kept; with fewer the run is left out.",
+        "judgement",
+        "A record needs three cycles, and its damping twice as many.",
+        unit="cycles",
+    )
     gross_misfit: float = setting(
         0.01,
         "Share of the readings' power in the residual beyond which a fit misses the motion itself.",

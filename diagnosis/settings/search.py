@@ -230,17 +230,6 @@ class RandomMomentSettings:
 class ScatterSettings:
     """Chance differences between runs."""
 
-    scatter_decades: float = setting(
-        1.0,
-        "Standard deviation of the decimal logarithm of a width about the usual one.",
-        "judgement",
-        "Rigs repeat ten times better or worse than usual.",
-        decision="0036",
-    )
-    least_scatter: float = setting(
-        1e-3, "Least width, as a share of the usual one.", "judgement", "No run shows so little."
-    )
-    greatest_scatter: float = setting(30.0, "Greatest width, over the usual one.", "judgement")
     scatter_rate: float = setting(
         0.001,
         "Rate at which runs that repeat are said to differ by chance.",

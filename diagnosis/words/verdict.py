@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import settings_of
@@ -37,6 +37,17 @@ _UNKNOWN = ["unknown"]
 
 def headline(document: Document) -> tuple[str, str]:
     """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
+    words, kind = _answer_in_words(document)
+    disturbed = [one["run"] for one in document.get("disturbed", ())]
+    return words + (f"; {_runs(disturbed)} disturbed" if disturbed else ""), kind
+
+
+def _runs(names: Sequence[str]) -> str:
+    """Runs by their ids."""
+    return f"run{'s' if len(names) > 1 else ''} {', '.join(names)}"
+
+
+def _answer_in_words(document: Document) -> tuple[str, str]:
     causes = document["causes"]
     if not causes:
         return "No gap", "none"
@@ -65,6 +76,7 @@ def verdict(document: Document, rest: str) -> str:
         said = ". ".join(f"{remark['runs'][0]}: {remark['what']}" for remark in cycling)
         return f"No run is a free decay, so no cause is named. {said}."
     parts = [
+        *map(_disturbed, document.get("disturbed", ())),
         *map(_second_mode, found["second_modes"]),
         _answer(document, rest),
         _choices(found["choices"]),
@@ -174,6 +186,13 @@ def _immaterial(changes: Mapping[str, float]) -> str:
         for name, change in changes.items()
     )
     return f"The gap is immaterial: its causes change {' and '.join(said)}."
+
+
+def _disturbed(found: Mapping[str, Any]) -> str:
+    """A run that was disturbed, and how much of it is used."""
+    kept = found["kept_until_s"]
+    without = "without this run" if kept is None else f"without what it recorded from {kept:.4g} s on"
+    return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
 
 
 def _second_mode(found: Mapping[str, Any]) -> str:
@@ -317,6 +336,10 @@ def next_steps(document: Document) -> list[str]:
     """What to do next, in the order in which to do it."""
     causes = document["causes"]
     steps = [
+        f"Repeat run {one['run']}, which was disturbed at {one['at_s']:.4g} s."
+        for one in document.get("disturbed", ())
+    ]
+    steps += [
         f"{', '.join(remark['runs']) or 'The campaign'}: {remark['remedy']}."
         for remark in document.get("remarks", ())
         if remark["outcome"] != "noted"

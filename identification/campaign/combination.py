@@ -21,7 +21,8 @@ from identification.campaign.derivatives import (
     noise_statuses,
     statuses_of_runs,
 )
-from identification.estimate import Estimate, RunEstimate, Status, WindowEstimate, by_severity
+from identification.campaign.repeatability import MeasuredRuns, scatter_between
+from identification.estimate import Estimate, Quantity, RunEstimate, Status, WindowEstimate, by_severity
 from identification.policy import MISFIT_RATE
 from identification.printing import with_std
 from identification.progress import counted
@@ -31,6 +32,7 @@ from identification.signal.free_decay import Decay
 from identification.signal.noise import noise_level
 from identification.signal.run_fit import (
     FittedRun,
+    decay_covariance_of,
     describe_run,
     noise_and_failure,
     residual_check,
@@ -41,6 +43,7 @@ from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
+_RUN_UNKNOWNS = 5  # of a run's own fit: decay, stiffness, initial state, zero
 Combination = Callable[[Design, list[int], Array, Array], tuple[Array, Array]]
 """The design, the places of its runs, φ and its covariance to φ and its covariance."""
 
@@ -65,9 +68,9 @@ def combined_estimate(
 ) -> Estimate:
     """The campaign's coefficients from runs identified one by one: generalised least squares on their (a, k).
 
-    Where the runs contradict each other beyond chance, the covariance is widened by their scatter, the ratio of
-    Birge, Phys. Rev. 40 (1932) 207–227, doi 10.1103/PhysRev.40.207. Runs without a result or a spring stiffness
-    are left out.
+    Scatter between the runs is in the covariance (`identification.campaign.repeatability`). Where they contradict
+    each other beyond it, the covariance is widened by the ratio of Birge, Phys. Rev. 40 (1932) 207–227, doi
+    10.1103/PhysRev.40.207. Runs without a result or a spring stiffness are left out.
 
     Args:
         together: a method's own combination of the runs, which starts from that of least squares.
@@ -114,24 +117,64 @@ def combined_estimate(
     if combined is None:
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     parameters, covariance = combined
-    ratio, freedom = 1.0, sum(np.count_nonzero(weight.diagonal()) for weight in informations) - linked.size
-    if freedom > 0:
-        away = [decay - link @ parameters for decay, link in zip(decays, linked.links, strict=True)]
-        scatter = sum(float(d @ weight @ d) for d, weight in zip(away, informations, strict=True))
-        ratio = scatter / freedom if scatter > float(chdtri(freedom, MISFIT_RATE)) else 1.0
-    if together is not None:
-        parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
-    size = design.size
+    measured = MeasuredRuns.of(runs, linked, decays, informations, parameters)
+    scatter = scatter_between(measured, parameters, campaign.repeatability)
+    if scatter is not None:
+        misfit, parameters, covariance = scatter.quadratic, scatter.parameters, scatter.covariance
+    else:
+        misfit = measured.misfit(parameters)
+        if together is not None:
+            parameters, covariance = together(design, [place for place, *_ in pairs], parameters, covariance)
+    freedom = sum(np.count_nonzero(weight.diagonal()) for weight in informations) - linked.size
+    beyond = freedom > 0 and misfit > float(chdtri(freedom, MISFIT_RATE))
+    ratio = misfit / freedom if beyond else 1.0
+    size, repeatability = design.size, None
     values = derivatives(design, parameters[:size])
-    own = values.jacobian @ (covariance[:size, :size] * ratio) @ values.jacobian.T
+    own = values.jacobian @ covariance[:size, :size] @ values.jacobian.T
+    if scatter is not None and values.names:
+        own, repeatability = scatter.of(values.jacobian)
+    own = own * ratio
     if values.names and not determined(own):
         return replace(estimate, statuses=by_severity(statuses | {Status.NOT_DETERMINED}))
     if linked.size > size:
         gain = gain_remark(runs, parameters, covariance * ratio, values.get("yaw_inertia"))
         estimate = replace(estimate, remarks=(gain, *remarks))
-    return filled_estimate(
-        campaign, estimate, runs, design, values, own, statuses | design_statuses(design, parameters[:size])
+    statuses |= design_statuses(design, parameters[:size])
+    return filled_estimate(campaign, estimate, runs, design, values, own, statuses, repeatability)
+
+
+def fitted_decay(item: FittedRun) -> RunDecay:
+    """The least-squares fit of a run, as the combination of the runs takes it."""
+    if item.fit is None or item.noise is None:
+        return RunDecay(item.estimate)
+    covariance = decay_covariance_of(item.fit) * (item.noise.std**2 * item.noise.slow_ratio)
+    return RunDecay(
+        item.estimate, item.fit.decay, covariance, item.gained if isinstance(item, DrivenRun) else None
     )
+
+
+def scattering_estimate(campaign: Campaign, name: str, fitted: Sequence[FittedRun]) -> Estimate | None:
+    """The estimate from the runs' own least-squares fits where scatter between them counts, otherwise None.
+
+    A joint fit, for which all runs repeat exactly, would take the scatter for a misfit of the model. The sensor's
+    zero is the mean of the runs' own, weighted by their variances.
+    """
+    found = combined_estimate(campaign, name, [fitted_decay(item) for item in fitted])
+    if found.repeatability is None:
+        return None
+    shown = [item for item in fitted if item.fit is not None and item.estimate.sensor_zero is not None]
+    zeros = [item.estimate.sensor_zero for item in shown if item.estimate.sensor_zero is not None]
+    weights = np.array([one.std**-2 for one in zeros])
+    mean = float(weights @ np.array([one.value for one in zeros]) / weights.sum())
+    common = campaign.sensor.zero != "per_run" and not any(run.unrestrained for run in campaign.runs)
+    residuals = [
+        one
+        for item, zero in zip(shown, zeros, strict=True)
+        for one in residuals_of([item.reading], [_fit_of(item)], zero.value, _RUN_UNKNOWNS)
+    ]
+    noise = noise_level(residuals, campaign.sensor)
+    zero = Quantity(mean, float(weights.sum() ** -0.5), "rad") if common else None
+    return replace(found, noise=noise, sensor_zero=zero)
 
 
 Found: TypeAlias = RunDecay | Status

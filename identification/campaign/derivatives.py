@@ -22,11 +22,12 @@ from identification.estimate import (
     NoiseLevel,
     Quantity,
     RunEstimate,
+    RunScatter,
     Status,
     by_severity,
 )
 from identification.policy import LEAST_SPRING_SPREAD
-from identification.statistics import determined, inverse, scaled_solve
+from identification.statistics import determined, inverse, scaled_solve, student_factor
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, needs_density
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
@@ -220,6 +221,7 @@ def filled_estimate(
     found: Derivatives,
     covariance: Array,
     statuses: set[Status],
+    repeatability: RunScatter | None = None,
 ) -> Estimate:
     """The estimate with coefficients, the air of its runs and the wind-off line.
 
@@ -228,6 +230,7 @@ def filled_estimate(
 
     Args:
         covariance: of the values found, shape (p, p).
+        repeatability: how the runs repeat, where that is in the covariance.
     """
     air: dict[str, dict[str, Any]] = {}  # stiffness and damping of the air in every wind-on run
     for name, target, load, unit in (
@@ -253,7 +256,8 @@ def filled_estimate(
         estimate,
         statuses=by_severity(statuses),
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
-        **wind_off(estimate.runs, campaign.runs),
+        repeatability=None if repeatability is None else repeatability.among(kept),
+        **wind_off(estimate.runs, campaign.runs, repeatability),
         parameters=tuple(found.names[i] for i in kept),
         covariance=tuple(map(tuple, covariance[np.ix_(kept, kept)].tolist())),
         **coefficients,
@@ -308,14 +312,27 @@ def design_statuses(design: Design, parameters: Array) -> set[Status]:
     return statuses
 
 
-def wind_off(estimates: Sequence[RunEstimate], runs: Sequence[Run]) -> dict[str, Any]:
+def wind_off(
+    estimates: Sequence[RunEstimate], runs: Sequence[Run], repeatability: RunScatter | None = None
+) -> dict[str, Any]:
     """Izz and intercept of the line of Kr against ωn² of the wind-off runs (paper, eq. 1).
+
+    Args:
+        repeatability: where it counts, the scatter of the springs is in the deviations of the frequencies.
 
     Returns:
         Keyword arguments of `Estimate`; none without wind-off runs.
     """
+    spring, between = None if repeatability is None else repeatability.spring_stiffness, 0.0
+    if spring is not None:
+        widened = student_factor(np.array([4.0 * (spring.std / spring.value) ** 2]))
+        between = 0.5 * spring.value * float(widened[0])
     rows = [
-        (run.spring_stiffness, found.omega_n.value, found.omega_n.std)
+        (
+            run.spring_stiffness,
+            found.omega_n.value,
+            float(np.hypot(found.omega_n.std, between * found.omega_n.value)),
+        )
         for run, found in zip(runs, estimates, strict=True)
         if not run.wind_on and run.spring_stiffness is not None and found.omega_n is not None
     ]

@@ -11,20 +11,25 @@ has the signs reversed) eqs 17 and 18 give Cnβ and Cnr, averaged over the wind-
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from identification.campaign.derivatives import has_size, loads, wind_off
+from identification.campaign.derivatives import build_design, combine, has_size, loads, wind_off
+from identification.campaign.repeatability import (
+    MeasuredRuns,
+    Scatter,
+    scatter_between,
+)
 from identification.campaign.springs import inertia_of_springs
 from identification.estimate import PARAMETERS, UNITS, Estimate, Quantity, RunEstimate, Status, by_severity
 from identification.policy import LEAST_FOR_SCATTER
 from identification.progress import counted
-from identification.statistics import widened_covariance
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from identification.statistics import decay_covariance, determined, inverse, widened_covariance
+from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Array
 
 LN2 = float(np.log(2.0))
@@ -103,12 +108,52 @@ def _mean_std(values: Array) -> float:
     return float(values.std(ddof=1)) / float(np.sqrt(values.size))
 
 
-def _filled(estimate: Estimate, pairing: _Pairing, seen: Sequence[PairedRun], rig: RigProperties) -> Estimate:
+def _scatter(campaign: Campaign, seen: Sequence[PairedRun]) -> Scatter | None:
+    """The scatter between the runs, as for every method; None where none counts."""
+    design = build_design([one.run for one in seen], campaign.rig)
+    values, weights = [], []
+    for one in seen:
+        omega, stds = 2.0 * np.pi * one.frequency, (one.rate_std, 2.0 * np.pi * one.frequency_std)
+        covariance = decay_covariance(one.rate, omega, stds[0] ** 2, stds[1] ** 2)
+        if not determined(covariance):
+            return None
+        values.append(np.array([one.rate, omega**2 + one.rate**2]))
+        weights.append(inverse(covariance))
+    start = combine(design, np.array(values), weights)
+    if start is None:
+        return None
+    runs = [one.run for one in seen]
+    measured = MeasuredRuns.of(runs, design, values, weights, start[0])
+    return scatter_between(measured, start[0], campaign.repeatability)
+
+
+def _moved(outcome: Callable[[Array, Array], Array], centre: Array, scatter: Scatter) -> list[Array]:
+    """What one standard deviation of each kind of scatter does to the outcome, by kind, shape (q, runs)."""
+    every = []
+    values = np.array([seen[:2] for seen in scatter.seen])
+    for kind in range(len(scatter.names)):
+        columns = []
+        for place, move in enumerate(scatter.moves):
+            rate, stiffness = (values + np.eye(len(values))[:, place, None] * move[:2, kind]).T
+            columns.append(outcome(np.sqrt(stiffness - rate**2) / (2.0 * np.pi), rate) - centre)
+        every.append(np.array(columns).T)
+    return every
+
+
+def _filled(
+    estimate: Estimate,
+    pairing: _Pairing,
+    seen: Sequence[PairedRun],
+    campaign: Campaign,
+    scatter: Scatter | None,
+) -> Estimate:
     """The estimate, with its wind-off line, with the coefficients and the air of its runs.
 
     The deviations of f and σ are propagated one input at a time (Kragten, Analyst 119 (1994) 2161–2165, doi
-    10.1039/AN9941902161). The scatter over the wind-on runs, or of the springs, is used where it is larger.
+    10.1039/AN9941902161), and so are those of the runs, where scatter between them counts. Where none does, the
+    scatter over the wind-on runs, or of the springs, is used where it is larger.
     """
+    rig = campaign.rig
     inertia, count = estimate.wind_off_inertia, len(pairing.on)
     assert inertia is not None
     frequency = np.array([one.frequency for one in seen])
@@ -125,23 +170,32 @@ def _filled(estimate: Estimate, pairing: _Pairing, seen: Sequence[PairedRun], ri
         "mechanical_damping": np.eye(centre.size)[1],
     }
     damping = 2.0 * float(centre[0]) * np.array([seen[i].rate for i in pairing.off])
-    scatter = {"yaw_inertia": inertia.std, "mechanical_damping": _mean_std(damping)}
+    spread = {"yaw_inertia": inertia.std, "mechanical_damping": _mean_std(damping)}
     if count and has_size(rig):
         for name, offset, column in (("cn_beta", 2, 0), ("cn_r", 2 + count, 1)):
             per_run = np.zeros((count, centre.size))
             per_run[np.arange(count), offset + np.arange(count)] = 1.0 / pairing.loads[pairing.on, column]
             rows[name] = per_run.mean(axis=0)
-            scatter[name] = _mean_std(per_run @ centre)
+            spread[name] = _mean_std(per_run @ centre)
     names = tuple(name for name in PARAMETERS if name in rows)
     jacobian = np.array([rows[name] for name in names])
-    propagated = jacobian @ moves @ moves.T @ jacobian.T
-    covariance = widened_covariance(propagated, np.array([scatter[name] for name in names]))
+    propagated, repeatability = moves @ moves.T, None
+    if scatter is None:
+        least = np.array([spread[name] for name in names])
+        covariance = widened_covariance(jacobian @ propagated @ jacobian.T, least)
+        own = np.sqrt(np.diag(propagated))
+    else:
+        between = _moved(outcome, centre, scatter)
+        own = np.sqrt(np.diag(scatter.counted(propagated, between)[0]))
+        noise = jacobian @ propagated @ jacobian.T
+        covariance, added = scatter.counted(noise, [jacobian @ one for one in between])
+        repeatability = scatter.described(added)
     stds = np.sqrt(np.diag(covariance))
     quantities: dict[str, Any] = {
         name: Quantity(float(value), float(std), UNITS[name])
         for name, value, std in zip(names, jacobian @ centre, stds, strict=True)
     }
-    values, stds = centre.tolist(), np.linalg.norm(moves, axis=1).tolist()
+    values, stds = centre.tolist(), own.tolist()
     air: dict[str, dict[str, Any]] = {
         seen[i].run.id: {
             "aerodynamic_stiffness": Quantity(values[2 + k], stds[2 + k], "N m/rad"),
@@ -154,6 +208,7 @@ def _filled(estimate: Estimate, pairing: _Pairing, seen: Sequence[PairedRun], ri
         runs=tuple(replace(run, **air.get(run.id, {})) for run in estimate.runs),
         parameters=names,
         covariance=tuple(map(tuple, covariance.tolist())),
+        repeatability=repeatability,
         **quantities,
     )
 
@@ -194,13 +249,16 @@ class Paired(ABC):
             statuses.add(Status.NO_WIND_OFF_PAIR)
         if windy and not has_size(campaign.rig):
             statuses.add(Status.NO_REFERENCE_SIZE)
-        line = wind_off(estimate.runs, campaign.runs)
+        seen = [one for one, _ in sprung]
+        scatter = _scatter(campaign, seen) if pairing.off else None
+        between = None if scatter is None else scatter.described()
+        line = wind_off(estimate.runs, campaign.runs, between)
         if pairing.off and line["wind_off_inertia"] is None:
             statuses.add(Status.INERTIA_NOT_POSITIVE)
         estimate = replace(estimate, statuses=by_severity(statuses))
         if not pairing.off or line["wind_off_inertia"] is None:
             return estimate
-        return _filled(replace(estimate, **line), pairing, [one for one, _ in sprung], campaign.rig)
+        return _filled(replace(estimate, **line), pairing, seen, campaign, scatter)
 
     @abstractmethod
     def _run(self, run: Run, sensor: SensorProperties) -> tuple[RunEstimate, PairedRun | None]:

@@ -21,12 +21,14 @@ from identification.campaign.derivatives import (
     Design,
     build_design,
     combine,
+    derivatives,
     design_statuses,
     filled_estimate,
     loads,
     noise_statuses,
     statuses_of_runs,
 )
+from identification.campaign.repeatability import MeasuredRuns, scatter_between
 from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, Status, by_severity
 from identification.neural.demodulated import Demodulated, demodulate
 from identification.neural.posterior import (
@@ -41,6 +43,7 @@ from identification.policy import MISFIT_DEVIATIONS, MISFIT_RATE, NOISE_TOLERANC
 from identification.signal.noise import stated_noise
 from identification.statistics import inverse
 from tunnel_sim.vocabulary.campaign import Campaign, Run, SensorProperties
+from tunnel_sim.vocabulary.record import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +97,11 @@ class NeuralPosterior:
             return replace(estimate, statuses=by_severity(statuses))
         known_runs = [one.run for one in linked]
         design = build_design(known_runs, campaign.rig)
-        decays, informations = [], []  # (a, k) of the runs by their nominal fits
+        decays: list[Array] = []  # (a, k) of the runs by their nominal fits
+        informations = []
         for one in linked:
             rate, omega = np.array([one.windows.rate, one.windows.omega]) + one.alone.parameters
-            decays.append([rate, omega**2 + rate**2])
+            decays.append(np.array([rate, omega**2 + rate**2]))
             slopes = np.array([[1.0, 0.0], [2.0 * rate, 2.0 * omega]])
             informations.append(inverse(slopes @ one.alone.covariances[0] @ slopes.T))
         combined = combine(design, np.array(decays), informations)
@@ -116,13 +120,26 @@ class NeuralPosterior:
         known = np.flatnonzero(features.known)
         names = tuple(CAMPAIGN_NAMES[place] for place in known)
         values = Derivatives(names, posterior.values[known], np.eye(known.size))
-        covariance = posterior.covariance[np.ix_(known, known)]
-        result = filled_estimate(campaign, estimate, known_runs, design, values, covariance, statuses)
-        intervals = {
-            name: replace(quantity, interval=posterior.quantity(int(place), "").interval)
-            for name, place in zip(names, known, strict=True)
-            if (quantity := getattr(result, name)) is not None
-        }
+        covariance, repeatability = posterior.covariance[np.ix_(known, known)], None
+        measured = MeasuredRuns.of(known_runs, design, decays, informations, combined[0])
+        scatter = scatter_between(measured, combined[0], campaign.repeatability)
+        linear = derivatives(design, combined[0] if scatter is None else scatter.parameters)
+        if scatter is not None and set(names) <= set(linear.names):
+            # the network knows the noise only; the scatter comes on top, as for a linear combination of the runs
+            rows = linear.jacobian[[linear.names.index(name) for name in names]]
+            covariance, added = scatter.counted(covariance, scatter.moved(rows))
+            repeatability = scatter.described(added)
+        result = filled_estimate(
+            campaign, estimate, known_runs, design, values, covariance, statuses, repeatability
+        )
+        intervals = {}
+        for name, place in zip(names, known, strict=True):
+            quantity, own = getattr(result, name), posterior.quantity(int(place), "")
+            if quantity is None or own.interval is None:
+                continue
+            wider = quantity.std / own.std  # 1 where no scatter counts
+            ends = [own.value + wider * (end - own.value) for end in own.interval]
+            intervals[name] = replace(quantity, interval=(ends[0], ends[1]))
         return replace(result, **intervals)
 
     def effects(self, campaign: Campaign) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """Output error: maximum likelihood of the motion, for each run and jointly for the campaign.
 
 The fits of the runs (ωn, ζ, initial state, zero) start the joint fit, in which Izz, Cr, Cnβ, Cnr and the sensor's
-zero are common. Sources: the equation of motion (2)–(6) of the paper; Jategaonkar, Flight Vehicle System
-Identification, 2nd ed. (2015), ch. 4, doi 10.2514/4.102790.
+zero are common. Runs that scatter are combined with their scatter instead. Sources: the equation of motion (2)–(6)
+of the paper; Jategaonkar, Flight Vehicle System Identification, 2nd ed. (2015), ch. 4, doi 10.2514/4.102790.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.campaign.combination import driven_estimate
+from identification.campaign.combination import driven_estimate, scattering_estimate
 from identification.campaign.derivatives import (
     build_design,
     combine,
@@ -72,6 +72,9 @@ class OutputError:
         statuses = statuses_of_runs(campaign, estimate.runs)
         if Status.NO_RUN_IDENTIFIED in statuses:
             return replace(estimate, statuses=by_severity(statuses))
+        scattering = scattering_estimate(campaign, self.name, fitted)
+        if scattering is not None:
+            return scattering
         if campaign.driven:
             pairs = list(zip(campaign.runs, fitted, strict=True))
             return driven_estimate(campaign, estimate, pairs, statuses)

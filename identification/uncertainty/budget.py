@@ -1,8 +1,10 @@
 """The uncertainty budget: from noise, stated inputs, scatter of the runs and choice of model to one covariance.
 
 First order after JCGM 100:2008 (GUM), correlated inputs after its 5.2: U = U_noise + Σ_ij ρ_ij uᵢ cᵢ (u_j c_j)ᵀ +
-U_scatter + U_model. How well the stated inputs are known comes from a TOML (docs/how-to/state-uncertainties.md).
-Errors that neither repeats nor other methods with the same model show are not included: run the diagnosis.
+U_scatter + U_model. Noise and scatter between runs are in the estimate itself, the latter by
+`identification.campaign.repeatability`. How well the stated inputs are known comes from a TOML
+(docs/how-to/state-uncertainties.md). Errors that neither repeats nor other methods with the same model show are not
+included: run the diagnosis.
 """
 
 from __future__ import annotations
@@ -15,13 +17,10 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
-from scipy.linalg import block_diag
-from scipy.special import chdtri
 
 from identification import policy
-from identification.campaign.derivatives import build_design, combine, derivatives
-from identification.estimate import PARAMETERS, Estimate, Quantity, RunEstimate
-from identification.statistics import inverse
+from identification.campaign.derivatives import build_design
+from identification.estimate import PARAMETERS, Estimate, Quantity
 from tunnel_sim.files.toml_input import StrictModel, read_document, shown
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
@@ -233,7 +232,8 @@ def make_budget(
     covariance = np.diag([getattr(estimate, name).std ** 2 for name in budget.names])
     places = [budget.names.index(name) for name in estimate.parameters]
     covariance[np.ix_(places, places)] = estimate.covariance_matrix
-    noise = Component("noise of the readings", "A", covariance)
+    scatter, whole = _scatter(campaign, estimate, budget, inputs.individual)
+    noise = Component("noise of the readings", "A", covariance - whole)
     # an error common to all runs scales the coefficients in closed form, whatever the method
     given = tuple(name for name in _POWERS if inputs.common.get(name, 0.0) > 0.0)
     columns = [_NAMES.index(name) for name in budget.names]
@@ -251,16 +251,6 @@ def make_budget(
     if np.any(correlation != 0.0):
         common.append(Component("correlations of these", "B", moves.T @ correlation @ moves))
     individual = _individual(campaign, budget, identify, inputs, progress)
-    scatter = []  # of the wind-off and the wind-on runs, as far as the components above do not explain it
-    sides = side_scatter(campaign, estimate.runs, inputs.individual)
-    for side, label in zip(sides, ("wind-off", "wind-on"), strict=True):
-        of_side = np.zeros((len(budget.names),) * 2)
-        shared = [name for name in side.names if name in budget.names]
-        mine, theirs = [budget.names.index(n) for n in shared], [side.names.index(n) for n in shared]
-        of_side[np.ix_(mine, mine)] = side.covariance[np.ix_(theirs, theirs)]
-        note = "" if of_side.any() else "explained by the components above"
-        note = note if side.known else "unknown, because the campaign has no redundant runs"
-        scatter.append(Component(f"scatter of the {label} runs", "A", of_side, note, known=side.known))
     progress("choice of model")
     rivals = {name: other(campaign) for name, other in (others or {}).items()}
     halves = []
@@ -284,7 +274,7 @@ def make_budget(
     note = f"moved by {', '.join(blamed)}" if blamed else f"{', '.join(rivals)}: within chance"
     # The largest change beyond chance is the half-width of a rectangular distribution (GUM 4.3.7).
     model = Component("choice of model", "B", np.diag(largest**2 / 3.0), note)
-    return replace(budget, components=(noise, *common, *individual, *scatter, model))
+    return replace(budget, components=(noise, *common, *individual, scatter, model))
 
 
 def with_budget(estimate: Estimate, budget: Budget) -> Estimate:
@@ -330,95 +320,38 @@ def _individual(
     return found
 
 
+def _scatter(
+    campaign: Campaign, estimate: Estimate, budget: Budget, individual: Mapping[str, float]
+) -> tuple[Component, Array]:
+    """What the scatter between runs adds, beyond the stated errors of single springs and runs; and all of it.
+
+    A stated error of its own of every run is scatter between them, and is in the budget already.
+    """
+    size, name = len(budget.names), "scatter between runs"
+    whole, beyond = np.zeros((2, size, size))
+    found = estimate.repeatability
+    if found is None:
+        shown = [
+            run
+            for run, one in zip(campaign.runs, estimate.runs, strict=True)
+            if run.spring_stiffness is not None and one.omega_n is not None and one.zeta is not None
+        ]
+        spare = bool(shown) and 2 * len(shown) > build_design(shown, campaign.rig).size
+        note = "none beyond the noise" if spare else "unknown, because the campaign has no redundant runs"
+        return Component(name, "A", beyond, note, known=spare), whole
+    places = np.ix_(*[[budget.names.index(one) for one in estimate.parameters]] * 2)
+    for (kind, width), added in zip(found.widths.items(), found.covariances, strict=True):
+        explained = (individual.get(kind, 0.0) / width.value) ** 2
+        whole[places] += added
+        beyond[places] += max(1.0 - explained, 0.0) * np.array(added)
+    return Component(name, "A", beyond, "" if beyond.any() else "explained by the components above"), whole
+
+
 def _values(estimate: Estimate, budget: Budget) -> Array | None:
     """The budget's quantities of another estimate; None where one is missing."""
     found: list[Quantity | None] = [getattr(estimate, name) for name in budget.names]
     given = [quantity.value for quantity in found if quantity is not None]
     return np.array(given) if len(given) == len(found) else None
-
-
-@dataclass(frozen=True, eq=False)
-class SideScatter:
-    """The scatter of the wind-off or of the wind-on runs.
-
-    Args:
-        known: whether the runs leave a degree of freedom to determine it.
-        covariance: what the excess adds to that of the named parameters, shape (p, p); zero within chance.
-    """
-
-    known: bool
-    names: tuple[str, ...]
-    covariance: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _SideFit:
-    """The runs' (a, k), stacked as one vector of length 2n."""
-
-    residual: Array
-    weight: Array
-    hat: Array
-    noise: Array
-    influence: Array
-    names: tuple[str, ...]
-
-
-def side_scatter(
-    campaign: Campaign, estimates: Sequence[RunEstimate], individual: Mapping[str, float]
-) -> tuple[SideScatter, SideScatter]:
-    """The scatter of wind-off and of wind-on runs about the coefficients they share.
-
-    The residuals of decay rate a and stiffness k about the generalised least-squares fit are squared, weighted by
-    the runs' variances and summed, separately for both sides and for a and k. If a sum exceeds its expectation
-    from noise and the stated individual errors of the inputs by more than chance, every run in it gets the
-    variance of its own residual: a linearised jackknife (J. G. MacKinnon & H. White, J. Econometrics 29 (1985)
-    305–325, doi 10.1016/0304-4076(85)90158-7). A weighted sum of squares is distributed as by Satterthwaite,
-    Biometrics Bull. 2 (1946) 110–114, doi 10.2307/3002019.
-
-    Args:
-        estimates: one per run, with ωn and ζ where they were identified.
-        individual: relative standard uncertainties of inputs with separate errors by run or by spring.
-    """
-    runs, decays, blocks = [], [], []
-    for run, found in zip(campaign.runs, estimates, strict=True):
-        if run.spring_stiffness is None or found.omega_n is None or found.zeta is None:
-            continue
-        omega, zeta = found.omega_n, found.zeta
-        runs.append(run)
-        decays.append([zeta.value * omega.value, omega.value**2])
-        # ωn and ζ of a decay are uncorrelated to first order in the damping.
-        jacobian = np.array([[zeta.value, omega.value], [2.0 * omega.value, 0.0]])
-        blocks.append(jacobian @ np.diag([omega.std**2, zeta.std**2]) @ jacobian.T)
-    nothing = SideScatter(False, (), np.zeros((0, 0)))
-    if not runs:
-        return nothing, nothing
-    design = build_design(runs, campaign.rig)
-    informations = [inverse(block) for block in blocks]
-    combined = combine(design, np.array(decays), informations)
-    values = None if combined is None else derivatives(design, combined[0])
-    if combined is None or values is None or not values.names:
-        return nothing, nothing
-    shared, inverse_normal = combined
-    links, weight, noise = np.concatenate(design.links), block_diag(*informations), block_diag(*blocks)
-    gain = inverse_normal @ links.T @ weight
-    residual = np.concatenate(decays) - links @ shared
-    fit = _SideFit(residual, weight, links @ gain, noise, values.jacobian @ gain, values.names)
-    # The covariance of the runs' (a, k) due to the errors of their stated inputs.
-    of_inputs = np.zeros((2 * len(runs),) * 2)
-    before = np.concatenate(design.links) @ shared
-    for name, size in individual.items():
-        for group in error_groups(runs, name):
-            moved = [
-                with_scaled_input(run, name, 1.0 + _STEP) if i in group else run for i, run in enumerate(runs)
-            ]
-            others = build_design(moved, campaign.rig).links
-            if others[0].shape != design.links[0].shape:
-                continue
-            move = (np.concatenate(others) @ shared - before) * (size / _STEP)
-            of_inputs += np.outer(move, move)
-    covariance = fit.noise + of_inputs
-    windy = np.repeat([run.wind_on for run in runs], 2)
-    return _side(fit, covariance, ~windy), _side(fit, covariance, windy)
 
 
 def error_groups(runs: Sequence[Run], name: str) -> list[list[int]]:
@@ -441,27 +374,3 @@ def with_scaled_input(run: Run, name: str, factor: float) -> Run:
     value = getattr(run, name)
     changed: dict[str, Any] = {} if value is None else {name: value * factor}
     return replace(run, **changed)
-
-
-def _side(fit: _SideFit, covariance: Array, mine: Array) -> SideScatter:
-    size = fit.residual.size
-    added = np.zeros((len(fit.names),) * 2)
-    seen = False
-    for row in (0, 1):  # decay rates, then stiffnesses
-        chosen = (mine & (np.arange(size) % 2 == row)).astype(np.float64)
-        root = np.sqrt(chosen * np.diag(fit.weight))
-        # The weighted residuals of these rows are a linear map of errors with this covariance.
-        residual_map = root[:, None] * (np.eye(size) - fit.hat)
-        spread = residual_map @ covariance @ residual_map.T
-        if float(np.trace(residual_map @ fit.noise @ residual_map.T)) < policy.LEAST_SCATTER_FREEDOM:
-            continue
-        seen = True
-        expected = float(np.trace(spread))
-        degrees = expected**2 / float(np.sum(spread**2))
-        ratio = float(np.sum((root * fit.residual) ** 2)) / expected
-        if ratio > float(chdtri(degrees, policy.DIFFERENCE_RATE)) / degrees:
-            # As in the jackknife, every run gets the variance of its own residual, corrected for its leverage.
-            freed = fit.residual / np.maximum(1.0 - np.diag(fit.hat), policy.LEAST_FREE_SHARE)
-            excess = np.maximum(freed**2 - np.diag(covariance), 0.0)
-            added += (fit.influence * (chosen * excess)) @ fit.influence.T
-    return SideScatter(seen, fit.names, added)

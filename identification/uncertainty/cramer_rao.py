@@ -16,15 +16,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.campaign.between_runs import DEVIATIONS
 from identification.campaign.combination import with_gains
-from identification.campaign.derivatives import build_design, derivatives, has_size
+from identification.campaign.derivatives import Design, build_design, derivatives, has_size
+from identification.campaign.repeatability import moves_of
 from identification.estimate import PARAMETERS
 from identification.signal.decay_fit import information_at
 from identification.signal.driven_fit import normal_equations
 from identification.signal.filter import discretised, steady_filters
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
-from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, Run
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
@@ -136,6 +138,7 @@ def campaign_bound(
     drive_gain: float = 1.0,
     initial_states: Sequence[tuple[float, float]] | None = None,
     random_moments: Sequence[float] | None = None,
+    repeatability: Repeatability | None = None,
 ) -> CampaignBound:
     """The bound of Cnβ, Cnr, Izz and Cr together, of free and driven runs; an input is exact between its samples.
 
@@ -153,6 +156,8 @@ def campaign_bound(
             q δ(t − t′), rad²/s³; None where there is none. The bound is then that of the response to release and
             input in noise of known spectrum, by the steady Kalman filter (doi:10.1137/0141046); what the random
             motion itself says of the coefficients is left out. Samples must be even.
+        repeatability: true standard deviations of the runs' own deviations, normal and to first order; None is
+            zero. The bound is then that of the Gaussian mixed model of known widths.
 
     Raises:
         TunnelError: when a run states no spring stiffness, the rig states no size although the wind is on, or a
@@ -198,9 +203,32 @@ def campaign_bound(
         variance = noise_std**2
         steady = steady_filters(*discretised(dynamics, drive, interval), np.full(len(runs), variance))
         filters = [(numerator * np.sqrt(variance / spread), poles) for numerator, poles, spread in steady]
-    normal = normal_equations(runs, linked.links, parameters, own, own_zeros=drifting, filters=filters)[1]
+    links, priors = _with_deviations(runs, linked, parameters, repeatability)
+    values = np.concatenate((parameters, np.zeros(priors.size)))
+    normal = normal_equations(runs, links, values, own, own_zeros=drifting, filters=filters)[1]
+    places = linked.size + np.arange(priors.size)
+    normal[places, places] += noise_std**2 * priors
     information, _ = eliminate(normal, np.zeros(len(normal)), design.size)
     found = derivatives(design, parameters[: design.size])
     covariance = found.jacobian @ (inverse(information) * noise_std**2) @ found.jacobian.T
     names = tuple(name for name in PARAMETERS if name in found.names)
     return CampaignBound(names, tuple(map(tuple, covariance.tolist())))
+
+
+def _with_deviations(
+    runs: Sequence[Run], linked: Design, parameters: Array, repeatability: Repeatability | None
+) -> tuple[list[Array], Array]:
+    """The links with every run's own deviations behind φ, and the inverse variances of these, shape (d,).
+
+    With their prior as information they count as unknowns; eliminated, they leave the information of the marginal
+    distribution (Woodbury's identity).
+    """
+    stated = {} if repeatability is None else repeatability.stated
+    widths = np.array([stated.get(name, 0.0) for name in DEVIATIONS])
+    used = np.flatnonzero(widths)
+    links = []
+    for place, (link, move) in enumerate(zip(linked.links, moves_of(runs, linked, parameters), strict=True)):
+        own = np.zeros((len(link), used.size * len(runs)))
+        own[:, used.size * place : used.size * (place + 1)] = move[:, used]
+        links.append(np.hstack((link, own)))
+    return links, np.tile(widths[used] ** -2.0, len(runs))

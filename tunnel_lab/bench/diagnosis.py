@@ -17,6 +17,7 @@ from nicegui import ui
 
 from diagnosis.words.numbers import plain
 from tunnel_lab.bench import work
+from tunnel_lab.bench.left_out import build_choice, left_out_of, options
 from tunnel_lab.bench.parts import (
     Fault,
     Frame,
@@ -61,8 +62,9 @@ class DiagnosePage:
         self._log = session.log(WORK)
         self._shown: object = None
         self._before = ""
-        self._command = ["diagnose", str(session.campaign), "--json", str(session.diagnosis)]
-        show_command(" ".join(("tunnel", *self._command)))
+        build_choice(session, self._show_command)
+        self._place = ui.element("div")
+        self._show_command()
         self._fault = Fault()
         self._buttons = ui.element("p").classes("buttons")
         self._clock = ui.label().classes("soft")
@@ -71,6 +73,16 @@ class DiagnosePage:
         self._on = ui.element("p").classes("buttons")
         self._look()
         ui.timer(_POLL_S, self._look)
+
+    @property
+    def _command(self) -> tuple[str, ...]:
+        session = self._session
+        return "diagnose", str(session.campaign), *options(session), "--json", str(session.diagnosis)
+
+    def _show_command(self) -> None:
+        self._place.clear()
+        with self._place:
+            show_command(" ".join(("tunnel", *self._command)))
 
     def _look(self) -> None:
         state = work.work_of(self._log)
@@ -265,10 +277,10 @@ class ByHandPart:
             if shown == (effects, self._converged):
                 break
             shown = (effects, self._converged)
-            campaign, state = self._session.campaign, self._session.state()
+            runs = work.Runs(self._session.campaign, self._session.state(), left_out_of(self._document))
             closure, fault = None, ""
             try:
-                closure = await work.closure(campaign, state, effects, converged=self._converged)
+                closure = await work.closure(runs, effects, converged=self._converged)
             except TunnelError as error:
                 fault = str(error)
             if self._place.is_deleted:  # the page was left
@@ -329,7 +341,7 @@ class _Rivals:
         from diagnosis.words.numbers import windy
         from tunnel_sim.effects import known_effects
 
-        self._session = session
+        self._session, self._left_out = session, left_out_of(document)
         blown = windy(document)  # an effect of the wind cannot be fitted where none blew
         fitted = {
             kind.name: plain(kind.name)
@@ -366,7 +378,8 @@ class _Rivals:
             with self._place:
                 ui.label("Simulating runs …").classes("soft")
             try:
-                run = await work.next_run(self._session.campaign, self._session.state(), first, second)
+                runs = work.Runs(self._session.campaign, self._session.state(), self._left_out)
+                run = await work.next_run(runs, first, second)
             finally:
                 if not self._place.is_deleted:
                     self._place.clear()
@@ -425,9 +438,8 @@ class ReportPage:
             button("Download the report", self._download, main=True)
             ui.link("Open in a tab", address(session, "report.html"), new_tab=True).classes("button")
         ui.label(f"Written: {session.report}").classes("soft")
-        show_command(
-            f"tunnel diagnose {session.campaign} --report {session.report} --author NAME --notes TEXT"
-        )
+        words = " ".join(("tunnel", "diagnose", str(session.campaign), *options(session)))
+        show_command(f"{words} --report {session.report} --author NAME --notes TEXT")
         self._place = ui.element("div").classes("preview")
         ui.timer(0.0, self._write, once=True)
 
@@ -456,5 +468,6 @@ def write_session_report(session: Session, author: str, notes: str) -> None:
     document = read_diagnosis(session)
     assert document is not None  # else the stage is closed
     made = datetime.fromtimestamp(session.diagnosis.stat().st_mtime).astimezone().date().isoformat()
-    campaign = diagnosable(read_campaign(session.campaign)).campaign
+    given = read_campaign(session.campaign).without(left_out_of(document))
+    campaign = diagnosable(given).campaign
     write_report(document, campaign, session.report, Byline(made, author, notes))

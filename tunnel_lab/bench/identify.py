@@ -14,9 +14,10 @@ from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
 from identification.estimators import ALL_ESTIMATORS, SUMMARIES
-from identification.printing import SYMBOLS, TextTable, status_lines, unit, with_std
+from identification.printing import SYMBOLS, TextTable, repeatability_lines, status_lines, unit, with_std
 from identification.status import Remark
 from tunnel_lab.bench import work
+from tunnel_lab.bench.left_out import build_choice, options
 from tunnel_lab.bench.parts import Fault, Frame, button, show_command, show_parts
 from tunnel_lab.bench.workspace import ESTIMATOR, Session, is_current, read_result
 from tunnel_lab.terminal.outputs import budget_lines, budget_table
@@ -53,11 +54,11 @@ class IdentifyPage:
                 for name in ALL_ESTIMATORS
             }
         self._fault = Fault()
+        build_choice(session, self._show_command)
         with ui.element("p").classes("buttons"):
             button("Identify", self._identify, main=True)
-        show_command(
-            f"tunnel identify {session.campaign} --estimator {ESTIMATOR} --json {session.estimate(ESTIMATOR)}"
-        )
+        self._command = ui.element("div")
+        self._show_command()
         self._progress = ui.element("ul").classes("progress").props("role=status aria-live=polite")
         self._result = ui.element("div")
         self._on = ui.element("p").classes("buttons")
@@ -77,6 +78,13 @@ class IdentifyPage:
                 button("Make the budget", self._make_budget)
         self._look()
         ui.timer(_POLL_S, self._look)
+
+    def _show_command(self) -> None:
+        session = self._session
+        words = " ".join(("tunnel", "identify", str(session.campaign), *options(session)))
+        self._command.clear()
+        with self._command:
+            show_command(f"{words} --estimator {ESTIMATOR} --json {session.estimate(ESTIMATOR)}")
 
     def _identify(self) -> None:
         names = [name for name, box in self._chosen.items() if box.value]
@@ -137,10 +145,11 @@ async def run_commands(session: Session, orders: Sequence[tuple[str, tuple[str, 
     """Run ``tunnel identify`` several times, each with the name of its log and options, one per processor."""
     free = asyncio.Semaphore(os.cpu_count() or 1)
 
-    async def one(name: str, options: tuple[str, ...]) -> None:
+    async def one(name: str, given: tuple[str, ...]) -> None:
         log: Path = session.log(name)
         async with free:
-            await asyncio.to_thread(work.start, ("identify", str(session.campaign), *options), log)
+            words = ("identify", str(session.campaign), *options(session), *given)
+            await asyncio.to_thread(work.start, words, log)
             while (await asyncio.to_thread(work.work_of, log)).running:
                 await asyncio.sleep(_POLL_S)
 
@@ -158,7 +167,7 @@ def side_by_side(documents: Sequence[Document]) -> list[str | TextTable]:
     notes: dict[str, list[str]] = {}
     for document in documents:
         remarks = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
-        for line in [*remarks, *status_lines(document)]:
+        for line in [*remarks, *repeatability_lines(document), *status_lines(document)]:
             notes.setdefault(line, []).append(document["estimator"])
     return [
         TextTable("Coefficients ± one standard deviation", ("quantity", *names), rows),

@@ -167,27 +167,39 @@ def _send(log: Path, name: str, mark: str = "") -> None:
     os.killpg(work.process, getattr(signal, name))  # the lock is held, so the number is still its own
 
 
-async def closure(campaign: Path, state: State, effects: Sequence[str], *, converged: bool) -> Closure:
+@dataclass(frozen=True)
+class Runs:
+    """The runs to which effects are fitted by hand.
+
+    Args:
+        campaign: its folder.
+        state: of the campaign's files; fits of another state are not used.
+        left_out: ids of the runs that are left out.
+    """
+
+    campaign: Path
+    state: State
+    left_out: tuple[str, ...] = ()
+
+
+async def closure(runs: Runs, effects: Sequence[str], *, converged: bool) -> Closure:
     """How far the gap closes with effects chosen by hand.
 
     Args:
-        state: of the campaign's files; fits of another state are not used.
         converged: whether the fit frees their forms and goes on until it has converged.
 
     Raises:
         TunnelError: when the campaign cannot be read, or an effect cannot be fitted to it.
     """
     words = tuple(sorted(effects))
-    found: Closure = await _in_fitter(_answered, campaign, state, "closure", words, converged=converged)
+    found: Closure = await _in_fitter(_answered, runs, "closure", words, converged=converged)
     return found
 
 
-async def next_run(
-    campaign: Path, state: State, first: Sequence[str], second: Sequence[str]
-) -> dict[str, Any] | None:
+async def next_run(runs: Runs, first: Sequence[str], second: Sequence[str]) -> dict[str, Any] | None:
     """The run that would distinguish two sets of effects; None in normalised form; errors as of `closure`."""
     answers = tuple(sorted(first)), tuple(sorted(second))
-    found: dict[str, Any] | None = await _in_fitter(_answered, campaign, state, "next_run", *answers)
+    found: dict[str, Any] | None = await _in_fitter(_answered, runs, "next_run", *answers)
     return found
 
 
@@ -211,14 +223,13 @@ def end_fits() -> None:
 
 
 @lru_cache(maxsize=2)
-def _by_hand(campaign: Path, state: State) -> ByHand:
+def _by_hand(runs: Runs) -> ByHand:
     from diagnosis.by_hand import ByHand
     from tunnel_sim.files.campaign_folder import read_campaign
 
-    del state  # part of the key only
-    return ByHand(read_campaign(campaign))
+    return ByHand(read_campaign(runs.campaign).without(runs.left_out))
 
 
-def _answered(campaign: Path, state: State, method: str, *given: object, **named: object) -> Any:
+def _answered(runs: Runs, method: str, *given: object, **named: object) -> Any:
     """What a method of `ByHand` gives, in the process that keeps the fits."""
-    return getattr(_by_hand(campaign, state), method)(*given, **named)
+    return getattr(_by_hand(runs), method)(*given, **named)

@@ -61,6 +61,11 @@ class Session:
         """Uncertainties of the inputs, as ``tunnel identify --uncertainties`` takes them."""
         return self._beside("uncertainties.toml")
 
+    @property
+    def left_out(self) -> Path:
+        """Ids of the runs that identify and diagnose leave out."""
+        return self._beside("left-out.json")
+
     def estimate(self, estimator: str) -> Path:
         """The estimate by an estimator, as ``tunnel identify --json`` writes it."""
         return self._beside(f"{estimator}.json")

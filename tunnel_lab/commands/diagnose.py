@@ -17,6 +17,7 @@ from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
+    LeaveOutOption,
     file_hashes,
     given_campaign,
     refuse_unwritable_files,
@@ -40,6 +41,7 @@ _model = partial(Option, rich_help_panel="A model of your own")
 
 def diagnose(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
+    leave_out: LeaveOutOption = None,
     json: Annotated[
         Path | None,
         _output("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
@@ -129,6 +131,7 @@ def diagnose(
       tunnel diagnose my-campaign
       tunnel diagnose my-campaign --json answer.json --report report.html --author "A. Smith"
       tunnel diagnose my-campaign --summary report.pdf
+      tunnel diagnose my-campaign --leave-out r07
       tunnel diagnose my-campaign --exclude buffeting,mains_hum
       tunnel diagnose my-campaign --json - | jq .causes
       tunnel diagnose my-campaign --effects-file my.toml
@@ -154,7 +157,8 @@ def diagnose(
     if (model is None) != (joint is None) or (model is None and (free or patch or asset_dir or actuator)):
         what = "--model and --joint belong together, and --free, --actuator, --patch and --asset-dir to them"
         raise TunnelError(what, remedy="give both")
-    data = given_campaign(campaign)
+    whole, left_out = given_campaign(campaign), split_names(leave_out)
+    data = whole.without(left_out)
     hashes = file_hashes(campaign)
     own_model = None
     if model is not None and joint is not None:
@@ -163,7 +167,7 @@ def diagnose(
         from diagnosis.patch.patched_model import refuse_unpatchable
 
         refuse_unpatchable(own_model, data, patch)
-    answer = diagnose_with_progress(data, kinds, own_model)
+    answer = diagnose_with_progress(whole, kinds, own_model, left_out)
     document = answer.to_json_dict()
     document["provenance"]["sha256"] = hashes
     # Files first: the reader of a pipe may close it early.
@@ -204,13 +208,16 @@ def write_proposal(path: Path, document: dict[str, Any]) -> Path | None:
 
 
 def diagnose_with_progress(
-    campaign: Campaign, kinds: tuple[type[Effect], ...], model: JointModel | None = None
+    campaign: Campaign,
+    kinds: tuple[type[Effect], ...],
+    model: JointModel | None = None,
+    leave_out: Sequence[str] = (),
 ) -> Diagnosis:
     """Diagnose, with step and effect on standard error where that is a terminal."""
     import diagnosis
 
     with step_display() as show_step:
-        return diagnosis.diagnose(campaign, kinds=kinds, progress=show_step, model=model)
+        return diagnosis.diagnose(campaign, leave_out=leave_out, kinds=kinds, progress=show_step, model=model)
 
 
 def write_patch(answer: Diagnosis, path: Path) -> None:

@@ -16,7 +16,13 @@ from typer import Argument, Option
 from identification.estimators import SUMMARIES, make_estimator
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
-from tunnel_lab.terminal.inputs import given_campaign, known_estimator, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import (
+    LeaveOutOption,
+    given_campaign,
+    known_estimator,
+    refuse_unwritable_files,
+    split_names,
+)
 from tunnel_lab.terminal.outputs import (
     bar,
     budget_lines,
@@ -43,6 +49,7 @@ WITH_WEIGHTS = ("neural_network", "neural_posterior")
 
 def run(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
+    leave_out: LeaveOutOption = None,
     estimator: Annotated[
         str, Option("--estimator", "-e", metavar="NAME", help="One of the estimators listed above.")
     ] = "output_error",
@@ -96,6 +103,7 @@ def run(
     [bold]Examples[/bold]
       tunnel identify my-campaign
       tunnel identify my-campaign --estimator conventional --json estimate.json
+      tunnel identify my-campaign --leave-out r07 --leave-out r09
       tunnel identify my-campaign --json - | jq .cn_beta
       tunnel identify my-campaign --uncertainties known.toml --model conventional
 
@@ -117,7 +125,8 @@ def run(
         raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json)
-    data = given_campaign(campaign)
+    whole, left_out = given_campaign(campaign), split_names(leave_out)
+    data = whole.without(left_out)
     chosen: str | Estimator = estimator
     if weights is not None:
         if estimator not in WITH_WEIGHTS:
@@ -125,7 +134,7 @@ def run(
             raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
     with bar("identifying runs", len(data.runs)) as progress:
-        estimate = identify(data, chosen, throw=False, progress=progress)
+        estimate = identify(whole, chosen, leave_out=left_out, throw=False, progress=progress)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
         from identification.uncertainty import budget as budgets

@@ -76,6 +76,10 @@ def simulate(
     speeds × amplitudes × repeats. Their files have an input column besides. Kinds
     are sine, stepped_sine, chirp, multisine, random, square and file.
 
+    A [scatter] makes the runs differ by chance, as real ones do: true wind speed,
+    spring and mechanical damping (relative standard deviations) and the sensor's
+    zero (rad). campaign.toml keeps what is stated; truth.json has every run's own.
+
     [bold]A plan[/bold]
       name = "two-speeds"
       seed = 1
@@ -86,6 +90,11 @@ def simulate(
       duration = 20.0              # s
       truth.cn_beta = 0.495        # 1/rad
       truth.cn_r = -0.114          # 1/rad
+
+    [bold]Scatter between runs[/bold]
+      scatter.wind_speed = 0.003
+      scatter.spring_stiffness = 0.0005
+      scatter.mechanical_damping = 0.01
 
     [bold]A drive[/bold]
       drive.kind = "multisine"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -28,6 +29,7 @@ from tunnel_lab.envs.session import (
 )
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Array
@@ -55,6 +57,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         probability: of one effect (a probability) at which a diagnosis ends.
         seconds_per_nat: rig time that a nat is worth, s.
         rig: path of a rig description; None takes the packaged rig.
+        scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: none.
 
     Raises:
         TunnelError: when an argument is out of range or a name is unknown.
@@ -80,6 +83,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         seconds_per_nat: float = 600.0,
         max_runs: int | None = None,
         rig: Path | str | None = None,
+        scatter: Scatter | Mapping[str, float] | None = None,
         expose_truth: bool = False,
         render_mode: str | None = None,
     ) -> None:
@@ -116,6 +120,8 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             costs=Costs() if costs is None else costs,
             effects=tuple(self.severities),
             linear=not self.severities and simulation != "full",
+            scatter=_checked_scatter(scatter),
+            max_runs=int(runs),
         )
         self.targets = (float(targets[0]), float(targets[1]))
         self.probability = float(probability)
@@ -229,6 +235,16 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         if self.expose_truth and self._session is not None:
             info["truth"] = self._session.truth.to_json_dict()
         return info
+
+
+def _checked_scatter(given: Scatter | Mapping[str, float] | None) -> Scatter:
+    if isinstance(given, Scatter):
+        return given
+    known = [one.name for one in dataclasses.fields(Scatter)]
+    for name in given or {}:
+        if name not in known:
+            raise refusal(f"scatter has no number {name!r}", did_you_mean(str(name), known))
+    return Scatter(**(given or {}))
 
 
 def _checked_severities(

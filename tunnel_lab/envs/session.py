@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import exp, isfinite, log
 from typing import Any
 
@@ -34,6 +34,7 @@ from tunnel_lab.envs.menu import Choice, Costs, Menu
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
+from tunnel_sim.vocabulary.between_runs import Scatter, between_runs
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel, Truth
@@ -59,6 +60,8 @@ class Conditions:
         sensor: its zero is not used, because each episode has its own.
         effects: the vocabulary of the diagnosis; empty where the campaign only identifies.
         linear: whether runs come from linear theory instead of MuJoCo and a fit; without effects only.
+        scatter: differences between the runs, unknown to the operator.
+        max_runs: the run at which their drift is complete, a count.
     """
 
     rig: Rig
@@ -67,6 +70,8 @@ class Conditions:
     costs: Costs
     effects: tuple[str, ...] = ()
     linear: bool = False
+    scatter: Scatter = field(default_factory=Scatter)
+    max_runs: int = 1
 
     @property
     def rig_properties(self) -> RigProperties:
@@ -181,6 +186,9 @@ class CampaignSession:
         self._conditions = conditions
         self.truth = truth
         self._rng = rng
+        seed = rng.bit_generator.seed_seq
+        assert isinstance(seed, np.random.SeedSequence)
+        self._between = between_runs(seed)
 
     def perform(self, known: Knowledge, choice: Choice) -> Knowledge:
         """Make a run and update the knowledge.
@@ -190,13 +198,14 @@ class CampaignSession:
         conditions, truth = self._conditions, self.truth
         costs = (*known.costs, known.cost(choice))
         known = replace(known, choices=(*known.choices, choice), costs=costs, status="ok")
-        rng = self._rng.spawn(1)[0]
+        rng, own = self._rng.spawn(1)[0], self._deviations(len(known.choices) - 1)
+        zero = truth.sensor_zero + own.pop("zero", 0.0)
         condition = choice.condition(f"r{len(known.choices):02d}", conditions.rig.air.density)
         if conditions.linear:
             # by the closed form of the linear model; the belief is updated to first order
-            zero = truth.sensor_zero
             link, time = conditions.link(choice), conditions.sample_times(choice.duration)
-            decay = Decay(*map(float, link @ shared_parameters(truth.values)))
+            true, values = _deviating(choice, truth.values, own)
+            decay = Decay(*map(float, conditions.link(true) @ shared_parameters(values)))
             if decay.stiffness <= 0.0 or decay.rate <= 0.0:
                 return replace(known, status="lost: the motion grows without bound")
             motion = free_decay(time, decay, choice.release_angle, 0.0)
@@ -210,9 +219,9 @@ class CampaignSession:
             belief = linear_belief(known.prior, runs, conditions.noise_std)
             return replace(known, learnt=runs, beliefs=(*known.beliefs, belief))
         settings = run_settings(truth.coefficients, condition)
-        sensor = replace(conditions.sensor, zero=truth.sensor_zero)
+        sensor = replace(conditions.sensor, zero=zero)
         try:
-            record = simulate(conditions.rig, settings, sensor, rng, effects=truth.effects)
+            record = simulate(conditions.rig, settings, sensor, rng, effects=truth.effects, deviations=own)
             known = replace(known, runs=(*known.runs, stated_run(condition, record)))
         except TunnelError as error:
             return replace(known, status=f"lost: {error.what}")
@@ -234,6 +243,27 @@ class CampaignSession:
             return replace(known, study=investigate(known.campaign, kinds))
         except TunnelError as error:
             return replace(known, status=f"not diagnosed: {error.what}")
+
+    def _deviations(self, number: int) -> dict[str, float]:
+        """Draw the deviations of the next run, whose number counts from 0: relative, and rad of ``zero``."""
+        share = np.array([number / max(1, self._conditions.max_runs - 1)])
+        (own,) = self._conditions.scatter.deviations(self._between, share)
+        if own:
+            self.truth = replace(self.truth, runs=(*self.truth.runs, dict(own)))
+        return own
+
+
+def _deviating(
+    choice: Choice, values: Mapping[str, float], own: Mapping[str, float]
+) -> tuple[Choice, dict[str, float]]:
+    """The conditions and coefficients of a run that deviates from what was chosen."""
+
+    def true(name: str, stated: float) -> float:
+        return stated * max(0.0, 1.0 + own.get(name, 0.0))
+
+    spring, speed = (true(name, getattr(choice, name)) for name in ("spring_stiffness", "wind_speed"))
+    damping = {name: true(name, value) for name, value in values.items()}
+    return replace(choice, spring_stiffness=spring, wind_speed=speed), damping
 
 
 def answers(effects: Sequence[str]) -> tuple[str, ...]:
@@ -278,11 +308,13 @@ class RigTruth:
 
     Args:
         sensor_zero: rad.
+        runs: deviations of the runs so far, relative, and rad of their zeros; empty where the runs repeat.
     """
 
     coefficients: Truth
     effects: tuple[Effect, ...] = ()
     sensor_zero: float = 0.0
+    runs: tuple[Mapping[str, float], ...] = ()
 
     @property
     def values(self) -> dict[str, float]:
@@ -295,6 +327,7 @@ class RigTruth:
             **self.values,
             "sensor_zero": self.sensor_zero,
             "effects": {effect.name: effect.to_json_dict()["parameters"] for effect in self.effects},
+            **({"runs": [dict(run) for run in self.runs]} if self.runs else {}),
         }
 
 

@@ -20,7 +20,7 @@ from pydantic import Field, TypeAdapter
 
 from identification.estimators import ALL_ESTIMATORS
 from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
-from tunnel_sim.effects import Effect, EffectChain, effect_from
+from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import read_motion
 from tunnel_sim.files.plan_file import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape
@@ -77,7 +77,8 @@ class CampaignsTable(_RecordsTable):
     effects: list[OneLine] = Field(
         default=[NO_EFFECT],
         min_length=1,
-        description='a list such as ["none", "coulomb_friction:friction_moment=0.004"]',
+        description='a list such as ["none", "coulomb_friction:friction_moment=0.004"], those that act at once '
+        "joined by ' + '",
     )
 
 
@@ -110,7 +111,7 @@ class Cell:
         frequency: natural frequency of a decay, Hz; 0 in a campaign.
         wind_speed: of a campaign's wind-on runs, m/s; 0 in a decay.
         springs: of a campaign, N m/rad; none in a decay.
-        effect: as ``tunnel simulate --effect`` takes it; ``none`` for the nominal model.
+        effect: as ``tunnel simulate --effect`` takes it, several joined by `` + ``; ``none`` for the nominal model.
     """
 
     kind: Literal["decay", "campaign"]
@@ -206,16 +207,7 @@ def load_grid(path: Path) -> Grid:
     document = read_document(GridDocument, path, missing=missing)
     where = shown(path)
     for text in dict.fromkeys(text for table in document.campaigns for text in table.effects):
-        if text == NO_EFFECT:
-            continue
-        try:
-            setting = parse_effect(text)
-            null = effect_from(setting.name, setting.parameters).is_null
-        except TunnelError as error:
-            raise TunnelError(error.what, where=f"{where}, effect {text!r}", remedy=error.remedy) from error
-        if null:
-            remedy = f'give its severity, or write "{NO_EFFECT}"'
-            raise TunnelError(f"effect {text!r} does nothing", where=where, remedy=remedy)
+        _check_effects(text, where)
     count = 0  # from the lengths of the lists, before any cell is made
     for decay in document.decays:
         count += len(decay.zeta) * len(decay.frequency) * len(decay.noise) * len(decay.duration)
@@ -249,6 +241,20 @@ def load_grid(path: Path) -> Grid:
             raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
     trials_of = tuple(document.trials_of.items())
     return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
+
+
+def _check_effects(text: str, where: str) -> None:
+    """Refuse an entry of ``effects`` that is not read, does nothing, or names an effect twice."""
+    try:
+        acting = effects_of(text)
+    except TunnelError as error:
+        raise TunnelError(error.what, where=f"{where}, effect {text!r}", remedy=error.remedy) from error
+    if any(effect.is_null for effect in acting):
+        remedy = f'give its severity, or write "{NO_EFFECT}"'
+        raise TunnelError(f"effect {text!r} does nothing", where=where, remedy=remedy)
+    twice = first_twice([effect.name for effect in acting])
+    if twice is not None:
+        raise TunnelError(f"{twice} is given twice", where=f"{where}, effect {text!r}", remedy="give it once")
 
 
 def packaged_grid() -> Grid:
@@ -312,6 +318,21 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
     return Trial(campaign, {"zeta": zeta, "omega_n": omega}, {"zeta": bound.zeta, "omega_n": bound.omega_n})
 
 
+def effects_of(text: str) -> tuple[Effect, ...]:
+    """The effects of a cell, in the order of the vocabulary; none for ``none``.
+
+    Args:
+        text: as `Cell` has it.
+
+    Raises:
+        TunnelError: when a name is unknown or a value out of range.
+    """
+    given = () if text == NO_EFFECT else map(parse_effect, text.split(" + "))
+    effects = [effect_from(setting.name, setting.parameters) for setting in given]
+    known = known_effects()
+    return tuple(sorted(effects, key=lambda effect: known.index(type(effect))))
+
+
 def _campaign(
     cell: Cell,
     truth: Truth,
@@ -320,10 +341,7 @@ def _campaign(
     rng: np.random.Generator,
 ) -> Campaign:
     """Runs of (spring, speed, release). A decay does not state its spring, which gives normalised form."""
-    effects: tuple[Effect, ...] = ()
-    if cell.effect != NO_EFFECT:
-        setting = parse_effect(cell.effect)
-        effects = (effect_from(setting.name, setting.parameters),)
+    effects = effects_of(cell.effect)
     sensor = SensorModel(
         cell.sample_rate, cell.noise * cell.amplitude, cell.resolution, _ZERO_STD * rng.standard_normal()
     )

@@ -374,7 +374,8 @@ def cell_labels(cells: Sequence[Cell]) -> tuple[list[str], str]:
     parts = []
     for cell in cells:
         noise, duration = f"noise {100 * cell.noise:g} %", f"{cell.duration:g} s"
-        effect = "" if cell.effect == NO_EFFECT else cell.effect.partition(":")[0].replace("_", " ")
+        names = () if cell.effect == NO_EFFECT else cell.effect.split(" + ")
+        effect = " + ".join(name.partition(":")[0].replace("_", " ") for name in names)
         if cell.kind == "decay":
             parts.append((f"ζ {cell.zeta:g}", f"{cell.frequency:g} Hz", noise, duration))
         else:

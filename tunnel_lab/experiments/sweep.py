@@ -15,7 +15,7 @@ import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache, lru_cache, partial
 from importlib.metadata import version
 from math import sqrt
@@ -34,6 +34,7 @@ from tunnel_sim.effects import effect_class
 from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
 
@@ -52,6 +53,8 @@ _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy", "polars")
 NOT_SIMULATED, SIMULATED, REFUSED, RAISED = "not_simulated", "simulated", "refused", "raised"
 RUN_QUANTITIES: Mapping[str, str] = {"omega_n": "rad/s", "zeta": "1"}
 CAMPAIGN_QUANTITIES: Mapping[str, str] = {**{name: UNITS[name] for name in PARAMETERS}, "sensor_zero": "rad"}
+SCATTER_COLUMNS: Mapping[str, str] = {f"scatter_{one.name}": one.name for one in fields(Scatter)}
+"""The column of each number of a scatter."""
 CASE_COLUMNS: Mapping[str, Any] = {
     **dict.fromkeys(("case", "replicate"), pl.UInt32),
     "seed": pl.Int64,
@@ -61,8 +64,9 @@ CASE_COLUMNS: Mapping[str, Any] = {
     "severity": pl.Float64,
     "effect_parameters": pl.String,
     **dict.fromkeys(("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping", "sensor_zero"), pl.Float64),
+    **dict.fromkeys(SCATTER_COLUMNS, pl.Float64),
 }
-"""The simulated case; coefficients and zero are the injected ones."""
+"""The simulated case; coefficients, zero and scatter are the injected ones."""
 RESULT_COLUMNS: Mapping[str, Any] = {
     **CASE_COLUMNS,
     **dict.fromkeys(("estimator", "run"), pl.String),
@@ -210,7 +214,7 @@ def estimate_rows(
         case.index, case.replicate, plan.seed, case.rig_name, case.conditions, case.duration, sensor.sample_rate,
         sensor.noise_std, sensor.resolution, " + ".join(effect.name for effect in plan.effects) or NO_EFFECT,
         severity, parameters, truth.cn_beta, truth.cn_r, truth.yaw_inertia, truth.mechanical_damping, sensor.zero,
-        estimator,
+        *(float(getattr(plan.scatter, name)) for name in SCATTER_COLUMNS.values()), estimator,
     )  # fmt: skip
     answer = None if isinstance(outcome, Failure) else outcome
     status, message = (outcome.status, outcome.message) if isinstance(outcome, Failure) else (SIMULATED, None)

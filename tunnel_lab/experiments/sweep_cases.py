@@ -40,6 +40,7 @@ from tunnel_sim.files.plan_file import (
 )
 from tunnel_sim.files.reading import as_described, check_count, parse_json
 from tunnel_sim.files.rig_file import parse_rig, rig_document
+from tunnel_sim.files.scatter_tables import Drift, Width, ZeroWidth
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -106,6 +107,23 @@ class SensorAxis(StrictModel):
     zero: Many[float] | None = Field(default=None, description="a number or a list of them, rad")
 
 
+_WIDTHS = "a relative standard deviation or a list of them, from 0 to 0.2"
+_DRIFTS = "a relative change from the first to the last run or a list of them, from -0.5 to 0.5"
+
+
+class ScatterAxis(StrictModel):
+    """``[scatter]`` or ``[[scatter]]``: differences between the runs, each key a number or a list."""
+
+    wind_speed: Many[Width] | None = Field(default=None, description=_WIDTHS)
+    spring_stiffness: Many[Width] | None = Field(default=None, description=_WIDTHS)
+    mechanical_damping: Many[Width] | None = Field(default=None, description=_WIDTHS)
+    zero: Many[ZeroWidth] | None = Field(
+        default=None, description="a standard deviation from 0 to 1 rad or a list of them"
+    )
+    spring_stiffness_drift: Many[Drift] | None = Field(default=None, description=_DRIFTS)
+    wind_speed_drift_between_runs: Many[Drift] | None = Field(default=None, description=_DRIFTS)
+
+
 class EffectAxis(StrictModel):
     """``[[effects]]``: one alternative, an effect with its severities; ``none`` is the nominal model."""
 
@@ -132,7 +150,7 @@ class ConditionsTable(StrictModel):
 
 
 class SweepDocument(StrictModel):
-    """The whole of a sweep file: rig × conditions × sensor × truth × effects × replicates, then estimators."""
+    """The whole of a sweep file: rig × conditions × sensor × truth × scatter × effects × replicates; estimators."""
 
     name: OneLine = Field(description="a short name in quotes")
     description: str = Field(default="", description="text in quotes, or leave it out")
@@ -149,6 +167,7 @@ class SweepDocument(StrictModel):
     )
     sensor: Many[SensorAxis] = Field(default=[SensorAxis()], description="a [sensor] table")
     truth: Many[TruthAxis] = Field(description="a [truth] table with cn_beta and cn_r")
+    scatter: Many[ScatterAxis] = Field(default=[ScatterAxis()], description="a [scatter] table")
     effects: Many[EffectAxis] = Field(default=[EffectAxis(name="none")], description="[[effects]] tables")
 
 
@@ -201,7 +220,7 @@ class Sweep:
 
     @cached_property
     def axes(self) -> tuple[Sequence[Any], ...]:
-        """Values of rig, conditions, sensor, truth and effects; the last varies fastest."""
+        """Values of rig, conditions, sensor, truth, scatter and effects; the last varies fastest."""
         file = self.document
         conditions: list[dict[str, Any]] = []
         for table in file.conditions:
@@ -221,6 +240,11 @@ class Sweep:
             conditions,
             [value for table in file.sensor for value in _spread(table.model_dump(exclude_none=True))],
             [value for table in file.truth for value in _spread(table.model_dump(exclude_none=True))],
+            [
+                {name: number for name, number in value.items() if number}  # zero is not stated
+                for table in file.scatter
+                for value in _spread(table.model_dump(exclude_none=True))
+            ],
             effects,
         )
 
@@ -255,7 +279,7 @@ class Sweep:
         """A case by its place in the product, from 0; it is the same in any sweep of its seed that has it."""
         point, replicate = divmod(index, self.document.replicates)
         places = np.unravel_index(point, tuple(map(len, self.axes)))
-        rig, conditions, sensor, truth, effects = (
+        rig, conditions, sensor, truth, scatter, effects = (
             axis[int(place)] for axis, place in zip(self.axes, places, strict=True)
         )
         physics = {
@@ -264,6 +288,8 @@ class Sweep:
             "truth": truth,
             "effects": effects,
         }
+        if scatter:  # a case without has the contents, and so the seed, of a file that knows none
+            physics["scatter"] = scatter
         # The seed depends on what the case holds, not on its place in the product; from 0 to 2⁶³ − 1.
         contents = json.dumps({"rig": self.rigs[rig], **physics}, sort_keys=True, allow_nan=False)
         words = np.frombuffer(hashlib.sha256(contents.encode()).digest(), dtype="<u4").tolist()
@@ -298,6 +324,7 @@ def axis_lengths(document: SweepDocument) -> dict[str, int]:
         "conditions": sum(len(table.duration) for table in document.conditions),
         "sensor": sum(points(table.model_dump(exclude_none=True)) for table in document.sensor),
         "truth": sum(points(table.model_dump(exclude_none=True)) for table in document.truth),
+        "scatter": sum(points(table.model_dump(exclude_none=True)) for table in document.scatter),
         "effects": sum(1 if one.name == NO_EFFECT else points(one.parameters) for one in document.effects),
     }
 
@@ -309,8 +336,9 @@ def check_sweep_size(document: SweepDocument, where: str) -> None:
         check_count(length, limits.SWEEP_AXIS, "values", f"{where}, {name}", "shorten a list")
     cases = prod(lengths.values()) * document.replicates
     check_count(cases, limits.SWEEP_CASES, "cases", where, "shorten a list, or make several sweeps")
-    checks = lengths["rig"] * lengths["conditions"] * (lengths["sensor"] + lengths["effects"])
-    combinations = "combinations of rig and conditions with a sensor or an effect"
+    beside = lengths["sensor"] + lengths["scatter"] * lengths["effects"]
+    checks = lengths["rig"] * lengths["conditions"] * beside
+    combinations = "combinations of rig and conditions with a sensor, or with an effect and a scatter"
     check_count(checks, limits.SWEEP_CHECKS, combinations, where, "shorten a list, or make several sweeps")
     rates = [rate for table in document.sensor for rate in table.sample_rate or [DEFAULT_SAMPLE_RATE]]
     for table in document.conditions:
@@ -411,15 +439,17 @@ def _check_cases(sweep: Sweep, where: str) -> None:
                 remedy = "remove one, and use replicates for more runs"
                 raise TunnelError(f"{name} holds a value twice", where=where, remedy=remedy)
             seen.add(text)
-    for axis in ("sensor", "effects"):  # each of their values with every rig and conditions
-        for rig, conditions, value in np.ndindex(lengths["rig"], lengths["conditions"], lengths[axis]):
-            places = {"rig": rig, "conditions": conditions, axis: value}
+    # each value of the sensor, and each pair of scatter and effects, with every rig and conditions
+    for beside in (("sensor",), ("scatter", "effects")):
+        axes_compared = ("rig", "conditions", *beside)
+        for place in np.ndindex(*(lengths[name] for name in axes_compared)):
+            places = dict(zip(axes_compared, place, strict=True))
             point = np.ravel_multi_index(
                 tuple(places.get(name, 0) for name in lengths), tuple(lengths.values())
             )
             with _in(where):
                 plan = sweep.case(int(point) * sweep.document.replicates).plan
-                if axis == "sensor":
+                if beside == ("sensor",):
                     sampling(run_settings(plan.truth, plan.conditions[0]), plan.sensor.sample_rate)
                 else:
                     plan_effects(plan)

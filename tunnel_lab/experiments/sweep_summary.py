@@ -1,8 +1,8 @@
 """Summary of a sweep: error against noise, speed, spring and severity, per estimator, with intervals.
 
 Errors are in % of the truth, or in the quantity's unit where a truth is zero. The values of the other axes are
-pooled. Lines along noise, speed and spring use the cases without effects where the sweep has such cases, which
-are also severity 0.
+pooled. Lines along noise, speed and spring use the cases without effects and without scatter where the sweep has
+such cases. Without effects is also severity 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from identification.printing import SYMBOLS, concise, significant, unit
 from identification.scoring import Score, Trials, score
 from identification.statistics import Proportion
-from tunnel_lab.experiments.sweep import Store
+from tunnel_lab.experiments.sweep import SCATTER_COLUMNS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.outputs import table
@@ -39,6 +39,13 @@ AXES = {
     "wind_speed": ("wind speed", "m/s"),
     "spring_stiffness": ("spring stiffness", "N m/rad"),
     "duration": ("duration", "s"),
+    **{
+        column: (
+            name.replace("_", " ") + " between runs" * ("between" not in name),
+            "rad" if name == "zero" else "1",
+        )
+        for column, name in SCATTER_COLUMNS.items()
+    },
 }
 """Columns that a summary uses as axes, each with its name and unit."""
 NOT_ASKED = (
@@ -140,15 +147,23 @@ def lines_of(data: pl.DataFrame, estimator: str, quantity: str) -> Iterator[Line
 
     plain = data.filter(pl.col("effect") == NO_EFFECT)
     base, effects = (plain, NO_EFFECT) if len(plain) else (data, "pooled")
-    yield Line(OVERALL, effects, None, "", estimator, quantity, _score(base))
+    yield Line(OVERALL, effects, None, "", estimator, quantity, _score(_repeating(base)))
     for axis, (_, at_unit) in AXES.items():
-        for at, part in _along(base, axis):
+        for at, part in _along(_repeating(base, but=axis), axis):
             yield Line(axis, effects, at, at_unit, estimator, quantity, _score(part))
     for effect in sorted(set(data["effect"]) - {NO_EFFECT}):
-        both = data.filter(pl.col("effect").is_in([effect, NO_EFFECT]))
+        both = _repeating(data.filter(pl.col("effect").is_in([effect, NO_EFFECT])))
         at_unit = effect_class(effect.partition(" + ")[0]).parameters()[0].unit
         for at, part in _along(both, SEVERITY):
             yield Line(SEVERITY, effect, at, at_unit, estimator, quantity, _score(part))
+
+
+def _repeating(data: pl.DataFrame, but: str = "") -> pl.DataFrame:
+    """The cases whose runs repeat exactly, but for one number that may scatter; all where there are none."""
+    found = data
+    for column in SCATTER_COLUMNS:
+        found = found if column == but else found.filter(found[column] == 0.0)
+    return found if len(found) else data
 
 
 def _along(data: pl.DataFrame, axis: str) -> list[tuple[float, pl.DataFrame]]:

@@ -126,9 +126,13 @@ class DiagnosisDocument(Document):
     )
     blind_spots: list[str] = Field(description="what these runs cannot show")
     cautions: list[str] = Field(description="caveats")
+    disturbed: list[Table] = Field(
+        default_factory=list,
+        description="runs that were disturbed: run, at_s, kept_until_s (null: left out), p_value",
+    )
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")
-    provenance: Table = Field(description="versions, and SHA-256 of the records")
+    provenance: Table = Field(description="versions, SHA-256 of the records, and runs left out as asked")
 
 
 def read_whole(path: Path) -> dict[str, Any]:

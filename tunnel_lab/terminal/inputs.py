@@ -131,6 +131,12 @@ EffectsFileOption = Annotated[
 ]
 
 
+LeaveOutOption = Annotated[
+    list[str] | None,
+    Option("--leave-out", metavar="RUN", help="Leave out the run of this id. May be repeated."),
+]
+
+
 def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
     """Names from repeated options, from lists with commas, or from both."""
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())

@@ -283,6 +283,8 @@ def show_estimate(
     if windows:
         show_tables(*map(windows_table, estimate.runs))
     say(BRACKETS)
+    for line in printing.repeatability_lines(document):
+        say(line)
     command = DIAGNOSE if source is None else f"run: tunnel diagnose {shlex.quote(str(source))}"
     for line in (*map(str, estimate.remarks), *printing.status_lines(document)):
         say(f"Note: {line.replace(DIAGNOSE, command)}")

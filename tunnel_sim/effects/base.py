@@ -9,7 +9,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
@@ -415,11 +415,13 @@ class EffectChain:
     Args:
         effects: in the order in which they act.
         drawn: the random part of each effect in this run.
+        deviations: of the true wind speed, spring and mechanical damping from what is stated, relative, by name.
     """
 
     stated: RunSettings
     effects: tuple[Effect, ...]
     drawn: tuple[Drawn, ...]
+    deviations: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
@@ -442,6 +444,8 @@ class EffectChain:
         run = self.stated
         for effect, drawn in zip(self.effects, self.drawn, strict=True):
             run = effect.on_run(run, self.stated, drawn)
+        if self.deviations:
+            run = run.with_deviations(self.deviations)
         if run.drive is None or run.drive.on_body:
             return run
         return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))

@@ -6,7 +6,6 @@ distribution over the runs is to be found.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +13,8 @@ import numpy as np
 
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import parameter
-from tunnel_sim.physics.run_settings import RunSettings, Series
-from tunnel_sim.vocabulary.plan import WIDEST_SCATTER
+from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary.between_runs import WIDEST_SCATTER
 
 
 def _spread(meaning: str, scale: float) -> Any:
@@ -37,23 +36,11 @@ class BetweenRuns(Effect):
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
         """Scale the number by the run's own factor."""
         del stated
-        return run if self.is_null else scaled(run, self.scatters, self.severity * self.drawn_number(drawn))
+        return run if self.is_null else run.with_deviations({self.scatters: self.deviation(drawn)})
 
-
-def scaled(run: RunSettings, number: str, deviation: float) -> RunSettings:
-    """A run, one number of which is (1 + deviation) times as great; never below zero.
-
-    Args:
-        number: ``wind_speed``, ``spring_stiffness`` or ``mechanical_damping``.
-        deviation: relative, dimensionless.
-    """
-    factor = max(0.0, 1.0 + deviation)
-    series = dict(run.series)
-    if number in series:  # a wind speed that changes during the run
-        given = series[number]
-        series[number] = Series(tuple(factor * value for value in given.values), given.interval)
-    changed: dict[str, Any] = {number: factor * getattr(run, number)}
-    return dataclasses.replace(run, series=series, **changed)
+    def deviation(self, drawn: Drawn) -> float:
+        """The run's own deviation, relative."""
+        return self.severity * self.drawn_number(drawn)
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import mujoco
@@ -58,13 +59,17 @@ def simulate(
     rng: np.random.Generator,
     *,
     effects: Sequence[Effect] = (),
+    deviations: Mapping[str, float] | None = None,
 ) -> Record:
     """Simulate one run as the sensor sees it.
+
+    Args:
+        deviations: of the true wind speed, spring and mechanical damping from the settings, relative, by name.
 
     Raises:
         TunnelError: when the motion grows without bound or the settings are refused.
     """
-    chain = EffectChain.draw(settings, effects, rng)
+    chain = replace(EffectChain.draw(settings, effects, rng), deviations=deviations or {})
     motion = simulate_motion(build_model(rig, follow_fastest(rig, chain.physics())), sensor.sample_rate)
     return read_motion(motion, sensor, rng, chain)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from math import isclose
 from typing import Any
@@ -12,12 +13,14 @@ import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import SPRING_TOLERANCE, read_motion
+from tunnel_sim.effects.between_runs import BetweenRuns
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.vocabulary.between_runs import along, between_runs, together
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, Truth
+from tunnel_sim.vocabulary.plan import AeroDerivatives, CampaignPlan, Condition, SensorModel, Truth
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -70,28 +73,56 @@ def simulate_campaigns(
     if len(rates) != 1:
         remedy = "simulate each rate separately"
         raise TunnelError(f"the plans have {len(rates)} different sample rates", remedy=remedy)
-    drawn = []  # of every run in the plans' order
-    for plan in plans:
-        effects = plan_effects(plan)
-        seeds = np.random.SeedSequence(plan.seed).spawn(len(plan.conditions))
-        for condition, seed in zip(plan.conditions, seeds, strict=True):
-            rng = np.random.default_rng(seed)
-            stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
-            drawn.append((rng, EffectChain.draw(stated, effects, rng)))
-    true = [chain.physics() for _, chain in drawn]
+    drawn = [run for plan in plans for run in _drawn(plan)]  # of every run in the plans' order
+    true = [run.chain.physics() for run in drawn]
     motions = simulate_motions(rig, true, *rates, nthread=nthread, progress=progress)
     simulated = zip(motions, drawn, strict=True)
     campaigns = []
     for plan in plans:
         runs = tuple(
-            stated_run(condition, read_motion(motion, plan.sensor, rng, chain))
-            for condition, (motion, (rng, chain)) in zip(
+            stated_run(condition, read_motion(motion, run.sensor, run.rng, run.chain))
+            for condition, (motion, run) in zip(
                 plan.conditions, islice(simulated, len(plan.conditions)), strict=True
             )
         )
-        sensor = SensorProperties.of(plan.sensor)
-        campaigns.append(Campaign(plan.name, RigProperties.of(rig), sensor, runs, plan.description))
+        stated = RigProperties.of(rig), SensorProperties.of(plan.sensor)
+        known = plan.repeatability
+        campaigns.append(Campaign(plan.name, *stated, runs, plan.description, repeatability=known))
     return campaigns
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """What a run has drawn: its generator, the effects in it, its own sensor, and its deviations from the plan."""
+
+    rng: np.random.Generator
+    chain: EffectChain
+    sensor: SensorModel
+
+    @property
+    def between_runs(self) -> dict[str, float]:
+        """The deviations of the run by name, of the effects and of the plan together: relative."""
+        found = dict(self.chain.deviations)
+        for effect, drawn in zip(self.chain.effects, self.chain.drawn, strict=True):
+            if isinstance(effect, BetweenRuns):
+                name = effect.scatters
+                found[name] = together(effect.deviation(drawn), found.get(name, 0.0))
+        return found
+
+
+def _drawn(plan: CampaignPlan) -> list[_Drawn]:
+    """What every run of a plan draws before it is simulated."""
+    effects = plan_effects(plan)
+    runs = len(plan.conditions)
+    seeds = np.random.SeedSequence(plan.seed).spawn(runs)
+    deviations = plan.scatter.deviations(between_runs(np.random.SeedSequence(plan.seed)), along(runs))
+    found = []
+    for condition, seed, own in zip(plan.conditions, seeds, deviations, strict=True):
+        rng, zero = np.random.default_rng(seed), own.pop("zero", 0.0)
+        stated = run_settings(plan.truth, condition, sample_rate=plan.sensor.sample_rate)
+        chain = replace(EffectChain.draw(stated, effects, rng), deviations=own)
+        found.append(_Drawn(rng, chain, replace(plan.sensor, zero=plan.sensor.zero + zero)))
+    return found
 
 
 def stated_run(condition: Condition, record: Record) -> Run:
@@ -150,6 +181,9 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
     drives = [condition.drive for condition in plan.conditions if condition.drive is not None]
     for effect in effects:
         where = f"effect {effect.name}"
+        if effect.scatters in plan.scatter.stated:
+            what = f"{effect.scatters} scatters twice, by this effect and in [scatter]"
+            raise TunnelError(what, where=where, remedy="give one of them")
         if names.count(effect.name) > 1:
             remedy = "give it once, with all its parameters"
             raise TunnelError("is given twice", where=where, remedy=remedy)
@@ -173,8 +207,13 @@ def plan_effects(plan: CampaignPlan) -> tuple[Effect, ...]:
 
 
 def truth_document(plan: CampaignPlan) -> dict[str, Any]:
-    """The content of ``truth.json``, as plain JSON values, which estimators and diagnosis never read."""
+    """The content of ``truth.json``, as plain JSON values, which estimators and diagnosis never read.
+
+    Scatter between runs stands beside the effects: its widths, and the deviations of every run.
+    """
     effects = [effect for effect in plan_effects(plan) if not effect.is_null]
+    scattering = [effect for effect in effects if effect.scatters]
+    effects = [effect for effect in effects if not effect.scatters]
     return {
         "schema_version": 1,
         "cn_beta": plan.truth.cn_beta,
@@ -185,6 +224,19 @@ def truth_document(plan: CampaignPlan) -> dict[str, Any]:
         "sensor_zero": plan.sensor.zero,
         "effects": sorted(effect.name for effect in effects),
         "parameters": {effect.name: effect.to_json_dict()["parameters"] for effect in effects},
+        **_scatter_truth(plan, scattering),
         "seed": plan.seed,
         "versions": {"mujoco": mujoco.__version__, "numpy": np.__version__},
     }
+
+
+def _scatter_truth(plan: CampaignPlan, scattering: Sequence[Effect]) -> dict[str, Any]:
+    """How wide the scatter between the runs is, and every run's own deviations; empty where the runs repeat."""
+    widths = plan.scatter.stated | {effect.scatters: effect.severity for effect in scattering}
+    if not widths:
+        return {}
+    runs = {}
+    for condition, run in zip(plan.conditions, _drawn(plan), strict=True):
+        zero = {"zero": run.sensor.zero - plan.sensor.zero} if plan.scatter.zero else {}
+        runs[condition.id] = run.between_runs | zero
+    return {"scatter": widths, "runs": runs}

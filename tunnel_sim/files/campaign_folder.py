@@ -6,7 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import tomli_w
@@ -15,6 +15,7 @@ from pydantic import Field
 from tunnel_sim.files.plausible import checked_record, plausible_values
 from tunnel_sim.files.readers import RUN_FORMATS, read_table, table_bytes
 from tunnel_sim.files.reading import check_count, nearest, nearest_campaign
+from tunnel_sim.files.scatter_tables import RepeatabilityTable
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -32,7 +33,6 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
     Quantity,
-    Repeatability,
     RigProperties,
     Run,
     SensorProperties,
@@ -71,18 +71,6 @@ class SensorTable(StrictModel):
     plausible: bool | None = optional("false to accept values that look like a wrong unit, or leave it out")
     quantity: Quantity | None = optional("'angle', 'rate' or 'acceleration'")
     zero: Zero | None = optional("'common', 'per_run' or 'auto'")
-
-
-_Spread = Annotated[float, Field(ge=0.0, lt=1.0)]
-_SPREAD = "a relative standard deviation from 0 to below 1, such as 0.003"
-
-
-class RepeatabilityTable(StrictModel):
-    """``[repeatability]``."""
-
-    wind_speed: _Spread | None = optional(_SPREAD)
-    spring_stiffness: _Spread | None = optional(_SPREAD)
-    mechanical_damping: _Spread | None = optional(_SPREAD)
 
 
 class RunTable(StrictModel):
@@ -252,14 +240,13 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
         samples += record.time_s.size
         remedy = "put the runs into several campaigns"
         check_count(samples, limits.CAMPAIGN_SAMPLES, "samples in the campaign", shown(folder), remedy)
-    repeatability = Repeatability(**document.repeatability.model_dump())
     return Campaign(
         name=document.campaign.name,
         description=document.campaign.description,
         rig=RigProperties(**document.rig.model_dump()),
         sensor=sensor,
         runs=tuple(runs),
-        repeatability=repeatability if repeatability.stated else None,
+        repeatability=document.repeatability.value,
     )
 
 

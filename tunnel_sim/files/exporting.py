@@ -9,6 +9,7 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 import polars as pl
 
+from tunnel_sim.files.importing.conditions import OF_REPEATABILITY
 from tunnel_sim.files.readers import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded
@@ -38,6 +39,14 @@ def _stated(values: object, keys: tuple[str, ...]) -> dict[str, float]:
     return {key: value for key in keys if (value := getattr(values, key)) is not None}
 
 
+def _of_campaign(campaign: Campaign) -> dict[str, float]:
+    """The stated sizes of the rig, and the stated scatter between runs."""
+    spread = {} if campaign.repeatability is None else campaign.repeatability.stated
+    return _stated(campaign.rig, _RIG) | {
+        f"{OF_REPEATABILITY}{name}": value for name, value in spread.items()
+    }
+
+
 def _as_csv(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     """One row for each sample, with the run's id and conditions and the rig's sizes."""
     frames = [
@@ -64,8 +73,14 @@ def _as_mat(campaign: Campaign, stream: BinaryIO, _where: str) -> None:
     for place, run in enumerate(campaign.runs):
         known = {"id": run.id, **_conditions(run), **_record(campaign, run)}
         runs[place] = tuple(known.get(key, np.empty((0, 0))) for key in keys)
-    rig: Mapping[str, Any] = {"name": campaign.name, **_stated(campaign.rig, _RIG)}
-    savemat(cast(Any, stream), {"runs": runs, "rig": rig}, do_compression=True, oned_as="column")
+    rig: Mapping[str, Any] = {"name": campaign.name, **_of_campaign(campaign)}
+    savemat(
+        cast(Any, stream),
+        {"runs": runs, "rig": rig},
+        do_compression=True,
+        oned_as="column",
+        long_field_names=True,
+    )
 
 
 def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
@@ -73,9 +88,9 @@ def _condition_keys(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _cells(campaign: Campaign, run: Run) -> dict[str, float | str | None]:
-    """The conditions of a run, None where they are not stated, and the stated sizes of the rig."""
+    """The conditions of a run, None where they are not stated, and the stated sizes and scatter."""
     stated = _conditions(run)
-    return {key: stated.get(key) for key in _condition_keys(campaign)} | _stated(campaign.rig, _RIG)
+    return {key: stated.get(key) for key in _condition_keys(campaign)} | _of_campaign(campaign)
 
 
 def _record(campaign: Campaign, run: Run) -> dict[str, Any]:
@@ -101,7 +116,7 @@ def _as_hdf5(campaign: Campaign, stream: BinaryIO, where: str) -> None:
     """A group for each run, with its id and conditions as attributes; an id may hold any character."""
     h5py = library("h5py", "HDF5", "import", where)
     with h5py.File(stream, "w") as file:
-        file.attrs.update({"name": campaign.name, **_stated(campaign.rig, _RIG)})
+        file.attrs.update({"name": campaign.name, **_of_campaign(campaign)})
         width = len(str(len(campaign.runs)))  # programs sort groups by name
         for number, run in enumerate(campaign.runs, 1):
             group = file.create_group(f"run-{number:0{width}d}")
@@ -125,7 +140,7 @@ def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
     with xlsxwriter.Workbook(stream, options) as book:
         names = [f"run {place}" for place in range(1, len(campaign.runs) + 1)]
         sheet = book.add_worksheet("conditions")
-        sheet.write_row(0, 0, ["sheet", "run", *_condition_keys(campaign), *_stated(campaign.rig, _RIG)])
+        sheet.write_row(0, 0, ["sheet", "run", *_condition_keys(campaign), *_of_campaign(campaign)])
         for row, (name, run) in enumerate(zip(names, campaign.runs, strict=True), 1):
             sheet.write_row(row, 0, [name, run.id, *_cells(campaign, run).values()])
         for name, run in zip(names, campaign.runs, strict=True):

@@ -18,6 +18,7 @@ from pydantic import AfterValidator, Field
 from tunnel_sim.files.plan_drive import DriveTable, check_drive, drive_of_file, drive_of_run
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.files.scatter_tables import RepeatabilityTable, ScatterTable
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -113,6 +114,10 @@ class PlanDocument(StrictModel):
     air_density: Positive | None = optional("a positive number in kg/m3")
     truth: TruthTable = Field(description="a [truth] table with cn_beta and cn_r")
     sensor: SensorModelTable = Field(default=SensorModelTable(), description="a [sensor] table")
+    scatter: ScatterTable = Field(default=ScatterTable(), description="a [scatter] table")
+    repeatability: RepeatabilityTable = Field(
+        default=RepeatabilityTable(), description="a [repeatability] table"
+    )
     drive: DriveTable | None = optional("a [drive] table with kind and amplitudes")
     effects: list[EffectTable] = Field(default=[], description="[[effects]] tables")
 
@@ -267,6 +272,8 @@ def plan_from(document: PlanDocument, rig: Rig, where: str, folder: Path = Path(
         ),
         sensor=SensorModel(**document.sensor.model_dump(exclude_none=True)),
         effects=tuple(EffectSetting(effect.name, dict(effect.parameters)) for effect in document.effects),
+        scatter=document.scatter.value,
+        repeatability=document.repeatability.value,
     )
 
 

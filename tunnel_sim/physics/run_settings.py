@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf, isfinite, sqrt
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -289,6 +290,20 @@ class RunSettings:
         copy = object.__new__(RunSettings)  # its other fields were checked
         copy.__dict__.update(self.__dict__, parameters=parameters)
         return copy
+
+    def with_deviations(self, deviations: Mapping[str, float]) -> RunSettings:
+        """A copy whose wind speed, spring or mechanical damping differ from what is stated; never below zero.
+
+        Args:
+            deviations: relative, by name, dimensionless.
+        """
+        factors = {name: max(0.0, 1.0 + value) for name, value in deviations.items()}
+        series = {
+            name: replace(given, values=tuple(factors.get(name, 1.0) * value for value in given.values))
+            for name, given in self.series.items()
+        }
+        changed: dict[str, Any] = {name: factor * getattr(self, name) for name, factor in factors.items()}
+        return replace(self, series=series, **changed)
 
     def layout(self) -> tuple[object, ...]:
         """What runs must have in common to share one compiled model.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
@@ -76,37 +78,6 @@ class SensorProperties:
     def derivative(self) -> int:
         """Which derivative of the angle the readings are: 0, 1 or 2."""
         return 0 if self.quantity is None else ("angle", "rate", "acceleration").index(self.quantity)
-
-
-@dataclass(frozen=True)
-class Repeatability:
-    """What the experimenter knows of the scatter between runs, as one standard deviation; None where not stated.
-
-    Args:
-        wind_speed: of the true speed about the stated one, a fraction of it.
-        spring_stiffness: of the true stiffness about the stated one, a fraction of it.
-        mechanical_damping: of the mechanical damping about its mean, a fraction of it.
-    """
-
-    wind_speed: float | None = None
-    spring_stiffness: float | None = None
-    mechanical_damping: float | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse a number that is not a standard deviation of a positive quantity."""
-        for name, value in vars(self).items():
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if value is not None and not (number and 0.0 <= value < 1.0):
-                raise TunnelError(
-                    f"{name} = {value!r} is not a relative standard deviation",
-                    where="repeatability",
-                    remedy="give a number from 0 to below 1, such as 0.003 for 0.3 %",
-                )
-
-    @property
-    def stated(self) -> dict[str, float]:
-        """The numbers that are stated, by name, dimensionless."""
-        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -208,6 +179,25 @@ class Campaign:
     def unrestrained(self) -> bool:
         """Whether nothing holds the body in any run (`Run.unrestrained`)."""
         return all(run.unrestrained for run in self.runs)
+
+    def without(self, ids: Collection[str]) -> Campaign:
+        """The other runs; the campaign itself where none is named.
+
+        Args:
+            ids: of the runs to leave out.
+
+        Raises:
+            TunnelError: for an id that no run has, and where no run would remain.
+        """
+        known = [run.id for run in self.runs]
+        for name in ids:
+            if name not in known:
+                remedy = did_you_mean(name, known)
+                raise TunnelError(f"there is no run {name!r} to leave out", where=self.name, remedy=remedy)
+        kept = tuple(run for run in self.runs if run.id not in ids)
+        if not kept:
+            raise TunnelError("every run is left out", where=self.name, remedy="leave out fewer runs")
+        return replace(self, runs=kept) if ids else self
 
     def __repr__(self) -> str:
         """The runs, their conditions, and where to go from here, in three lines."""

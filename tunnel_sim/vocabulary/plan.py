@@ -14,6 +14,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from tunnel_sim.vocabulary.between_runs import Repeatability, Scatter
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
 
@@ -121,10 +122,6 @@ class SensorModel:
     zero: float = 0.0
 
 
-WIDEST_SCATTER = 0.2
-"""Greatest standard deviation between runs, relative: a deviation that reverses the sign has five of them."""
-
-
 @dataclass(frozen=True)
 class EffectSetting:
     """One effect to inject, by name; ``tunnel_sim.effects`` validates it.
@@ -144,6 +141,8 @@ class CampaignPlan:
     Args:
         conditions: the runs, at least one, with unique ids.
         effects: effects added to the nominal model.
+        scatter: differences between the runs, which the campaign does not state.
+        repeatability: what the campaign states of them.
     """
 
     name: str
@@ -153,6 +152,8 @@ class CampaignPlan:
     sensor: SensorModel = SensorModel()
     effects: tuple[EffectSetting, ...] = ()
     description: str = ""
+    scatter: Scatter = field(default_factory=Scatter)
+    repeatability: Repeatability | None = None
 
 
 # Waveforms of peak value 1 at the times of the samples.

@@ -225,3 +225,23 @@ def test_the_files_are_hashed(
     shown = page.read_text(encoding="utf-8")
     assert author in shown
     assert all(digest in shown for digest in hashes.values())
+
+
+@pytest.mark.parametrize("command", ["identify", "diagnose"])
+def test_runs_are_left_out(tunnel: Tunnel, gap_free: Path, tmp_path: Path, command: str) -> None:
+    options = ("--effects", CAUSE) if command == "diagnose" else ()
+    file = tmp_path / "answer.json"
+    words = ("--leave-out", "r02", "--leave-out", "r04", "--json", file)
+    status, out, _ = tunnel(command, gap_free, *words, *options)
+    assert status == 0
+    assert "r02, r04: left out, as asked" in out
+    (asked,) = [one for one in json.loads(file.read_text())["remarks"] if one["outcome"] == "left out"]
+    assert asked["runs"] == ["r02", "r04"]
+    file.unlink()
+    ids = [word for number in range(1, 5) for word in ("--leave-out", f"r{number:02}")]
+    for given, said in ((ids, "every run is left out"), (["--leave-out", "r9"], "there is no run 'r9'")):
+        status, out, err = tunnel(command, gap_free, *given, "--json", file, *options)
+        assert (status, out) == (2, "")
+        assert said in err
+        assert err.count("\n") == 1
+        assert not file.exists()

@@ -350,3 +350,62 @@ def test_a_video_can_be_recorded(tmp_path):
     env.close()
     (film,) = (tmp_path / "films").glob("*.mp4")
     assert film.stat().st_size > 1000
+
+
+WIDE = {"wind_speed": 0.02, "spring_stiffness": 0.01, "mechanical_damping": 0.1, "zero": 0.003}
+DRIFTS = {"spring_stiffness_drift": 0.05, "wind_speed_drift_between_runs": -0.04}
+
+
+def records(actions=(OFF, ON, ON), **arguments):
+    env = make(**SHORT, expose_truth=True, max_runs=5, **arguments)
+    env.reset(seed=11, options={"truth": TRUTH})
+    for action in actions:
+        info = env.step(action)[4]
+    return [run.record.yaw_rad for run in env.unwrapped.campaign.runs], env.unwrapped.campaign, info["truth"]
+
+
+def test_scatter_is_hidden_and_leaves_the_noise_of_every_run():
+    bare, stated, truth = records()
+    assert "runs" not in truth
+    still, _, _ = records(scatter={"wind_speed": 0.02})
+    np.testing.assert_array_equal(still[0], bare[0])  # wind off
+    assert np.max(np.abs(still[1] - bare[1])) > 1e-4
+    moved, labelled, truth = records(scatter={"zero": 0.003})
+    zeros = [run["zero"] for run in truth["runs"]]
+    for one, other, zero in zip(moved, bare, zeros, strict=True):
+        np.testing.assert_allclose(one - other, zero, rtol=0.0, atol=1e-12)
+    assert len(set(zeros)) == 3
+    assert [(r.wind_speed, r.spring_stiffness) for r in labelled.runs] == [
+        (r.wind_speed, r.spring_stiffness) for r in stated.runs
+    ]
+
+
+def test_scattering_runs_of_linear_theory_are_those_of_the_full_simulation():
+    scatter = {**WIDE, **DRIFTS}
+    (linear, _, truth), (full, _, same) = (
+        records(scatter=scatter, simulation=how) for how in ("linear", "full")
+    )
+    assert truth["runs"] == same["runs"]
+    for one, other in zip(linear, full, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-7)
+    bare, _, _ = records()
+    assert all(np.max(np.abs(one - other)) > 1e-3 for one, other in zip(linear, bare, strict=True))
+
+
+def test_a_drift_is_complete_at_the_last_run():
+    _, _, truth = records((OFF,) * 5, scatter=DRIFTS)
+    shares = np.arange(5) / 4.0
+    for run, share in zip(truth["runs"], shares, strict=True):
+        assert run == {"wind_speed": -0.04 * share, "spring_stiffness": 0.05 * share}
+
+
+@pytest.mark.parametrize(
+    ("scatter", "said"),
+    [
+        ({"wind": 0.1}, "scatter has no number 'wind'"),
+        ({"wind_speed": 2.0}, "wind_speed = 2.0 is out of range"),
+    ],
+)
+def test_a_bad_scatter_is_refused(scatter, said):
+    with pytest.raises(TunnelError, match=said):
+        make(scatter=scatter)

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification import identify
 from identification.scoring import score
 from tests.reference.free_decays import damped_cosine
 from tunnel_lab.experiments import score_trials
-from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, load_grid, packaged_grid
+from tunnel_lab.experiments.score_grid import Cell, Grid, draw_trial, effects_of, load_grid, packaged_grid
 from tunnel_lab.experiments.score_trials import Results, read_trials, write_trials
 from tunnel_lab.experiments.score_view import scores_frame
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -51,6 +52,8 @@ def test_every_combination_is_a_cell(small):
         (HEAD + "trials_of = { conventionl = 3 }\n" + DECAYS, ["conventionl", "did you mean 'conventional'"]),
         (HEAD + CAMPAIGNS + 'effects = ["coulomb_frction:x=1"]\n', ["did you mean 'coulomb_friction'"]),
         (HEAD + CAMPAIGNS + 'effects = ["coulomb_friction"]\n', ["does nothing", "severity"]),
+        (HEAD + CAMPAIGNS + 'effects = ["damping_scatter:spread=0.1 + damping_scatter:spread=0.1"]\n',
+         ["damping_scatter is given twice", "give it once"]),
         (DECAYS, ["schema_version"]),
     ],
 )  # fmt: skip
@@ -164,3 +167,29 @@ def test_a_file_that_is_no_baseline_is_refused(tmp_path, content):
         read_trials(path)
     with pytest.raises(TunnelError, match="no such file"):
         read_trials(tmp_path / "none.parquet")
+
+
+def test_runs_of_a_cell_may_scatter_in_several_numbers(tmp_path):
+    """Truth: the order of the vocabulary, and that ωn scatters half as much as the spring."""
+    text = "damping_scatter:spread=0.1 + stiffness_scatter:spread=0.01"
+    path = tmp_path / "grid.toml"
+    path.write_text(HEAD + CAMPAIGNS + f'effects = ["none", "{text}"]\n')
+    grid = load_grid(path)
+    plain, scattering = (cell for cell in grid.cells if cell.noise == grid.cells[0].noise)
+    assert [effect.name for effect in effects_of(scattering.effect)] == [
+        "stiffness_scatter",
+        "damping_scatter",
+    ]
+    assert effects_of(plain.effect) == ()
+    assert Grid.from_json_dict(grid.to_json_dict()) == grid
+
+    def spread(cell):
+        """Of ωn with the wind off about that of the stated spring, relative."""
+        found = []
+        for trial in (draw_trial(cell, 1, number) for number in range(12)):
+            omega = identify(replace(trial.campaign, runs=trial.campaign.runs[:1])).runs[0].omega_n
+            found.append(omega.value / np.sqrt(16.12 / trial.truth["yaw_inertia"]) - 1.0)
+        return float(np.std(found))
+
+    assert spread(plain) < 1e-4
+    assert 0.2 < spread(scattering) / 0.005 < 2.0  # half of the spring's 1 %; 99.9 % of chi squared of 11

@@ -9,8 +9,14 @@ import polars as pl
 import pytest
 
 from tests.unit.importing.import_files import decay, written
-from tunnel_sim import TunnelError
-from tunnel_sim.files.importing.conditions import Conditions, ImportChoices, condition_of, in_si
+from tunnel_sim import Repeatability, TunnelError
+from tunnel_sim.files.importing.conditions import (
+    Conditions,
+    ImportChoices,
+    condition_of,
+    in_si,
+    parse_setting,
+)
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.importing.units import split_unit
 
@@ -176,6 +182,18 @@ def test_numbers_above_the_table_have_their_units(tmp_path: Path) -> None:
     assert (run.wind_speed, run.spring_stiffness, run.air_density) == pytest.approx((15.0, 16.12, 1.21))
     with pytest.raises(TunnelError, match="density"):
         imported(tmp_path, [], [], head="Wind speed: 54 km/h, Kr = 16120 N mm/rad")
+
+
+def test_the_scatter_between_runs_may_be_stated(tmp_path: Path) -> None:
+    path = table(tmp_path, ["Kr"], [16.12])
+    conditions = parse_setting(
+        "repeatability_wind_speed=0.003, repeatability_mechanical_damping=0.01", "--set"
+    )
+    found = read_records([path], ImportChoices(conditions=conditions)).campaign
+    assert found.repeatability == Repeatability(wind_speed=0.003, mechanical_damping=0.01)
+    assert read_records([path]).campaign.repeatability is None
+    with pytest.raises(TunnelError, match="give repeatability_wind_speed as a relative standard deviation"):
+        parse_setting("repeatability_wind_speed=1", "--set")
 
 
 def test_files_that_state_different_rigs_are_refused(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from tests.unit.gone_reader import unheard
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.cli import main
 from tunnel_lab.experiments import runner, sweep_summary
-from tunnel_lab.experiments.sweep import RESULT_COLUMNS, run_sweep
+from tunnel_lab.experiments.sweep import RESULT_COLUMNS, SCATTER_COLUMNS, run_sweep
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_lab.experiments.sweep_summary import Line, lines_of, summarise
 from tunnel_lab.plotting.style import styled
@@ -148,6 +148,7 @@ def hand_made(values: list[float | None], status: str = "ok") -> pl.DataFrame:
             "wind_speed": [0.0] * len(values),
             "spring_stiffness": [None] * len(values),
             "duration": [1.0] * len(values),
+            **{column: [0.0] * len(values) for column in SCATTER_COLUMNS},
             "truth": [2.0] * len(values),
             "value": values,
             "std": [None if value is None else 0.05 for value in values],

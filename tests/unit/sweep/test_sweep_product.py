@@ -14,9 +14,12 @@ import tomli_w
 from tests.unit.sweep.small_sweep import SMALL
 from tunnel_lab.experiments.sweep import run_shard
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
+from tunnel_lab.experiments.sweep_summary import lines_of
 from tunnel_sim.engine.virtual_campaign import simulate_campaign
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary.between_runs import Scatter
+from tunnel_sim.vocabulary.errors import TunnelError
 
 
 def variant(folder: Path, *changes: tuple[str, str]) -> Sweep:
@@ -119,3 +122,45 @@ def test_the_truth_of_a_run_is_the_nominal_models(sweep: Sweep, speed: float, na
     truths = dict(rows.select("quantity", "truth").iter_rows())
     assert truths["omega_n"] == pytest.approx(omega_n, rel=1e-12)
     assert truths["zeta"] == pytest.approx(damping / (2.0 * rig.dynamics.yaw_inertia * omega_n), rel=1e-12)
+
+
+SCATTER = (
+    '[scatter]\nwind_speed = [0.0, 0.003, 0.01]\nspring_stiffness_drift = -0.02\n[[effects]]\nname = "none"'
+)
+
+
+def test_scatter_is_an_axis_whose_absence_keeps_the_seeds(sweep: Sweep, tmp_path: Path) -> None:
+    scattering = variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER))
+    assert scattering.size == 3 * sweep.size
+    found = Counter(case.plan.scatter for case in map(scattering.case, range(scattering.size)))
+    assert found == {
+        Scatter(wind_speed=width, spring_stiffness_drift=-0.02): sweep.size for width in (0.0, 0.003, 0.01)
+    }
+    assert not set(seeds(sweep)) & set(seeds(scattering))
+    alone = variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER.replace("= -0.02", "= 0.0")))
+    assert set(seeds(sweep)) < set(seeds(alone))
+    case = scattering.case(scattering.size - 1)
+    (tmp_path / "plan.toml").write_text(tomli_w.dumps(dict(case.document)), encoding="utf-8")
+    assert load_plan(tmp_path / "plan.toml").scatter == case.plan.scatter
+
+
+def test_scatter_is_in_the_results_and_an_axis_of_the_summary(tmp_path: Path) -> None:
+    text = SMALL.replace('[[effects]]\nname = "none"', SCATTER).replace("records = true", "records = false")
+    (tmp_path / "scatter.toml").write_text(text.replace("cases_per_shard = 1", "cases_per_shard = 50"))
+    sweep = read_sweep(tmp_path / "scatter.toml")
+    rows = pl.read_parquet(run_shard(sweep.to_json(), 0).results)
+    assert set(rows["scatter_wind_speed"]) == {0.0, 0.003, 0.01}
+    assert set(rows["scatter_spring_stiffness_drift"]) == {-0.02}
+    assert set(rows["scatter_zero"]) == {0.0}
+    lines = lines_of(rows.filter(pl.col("quantity") == "cn_r"), "conventional", "cn_r")
+    along = [line for line in lines if line.axis == "scatter_wind_speed"]
+    assert [(line.at, line.score.count) for line in along] == [(0.0, 4), (0.003, 4), (0.01, 4)]
+    again = lines_of(rows.filter(pl.col("quantity") == "cn_r"), "conventional", "cn_r")
+    assert [line.score.count for line in again if line.axis == "noise_std"] == [6, 6]
+
+
+def test_a_number_that_scatters_twice_is_refused(tmp_path: Path) -> None:
+    twice = ('name = "coulomb_friction"\nparameters = { friction_moment = [0.002, 0.02] }',
+             'name = "wind_speed_scatter"\nparameters = { spread = 0.01 }')  # fmt: skip
+    with pytest.raises(TunnelError, match="wind_speed scatters twice"):
+        variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER), twice)

@@ -16,6 +16,7 @@ from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
 from tunnel_sim.files.importing.tables import Channel
 from tunnel_sim.files.importing.text import read_cells
 from tunnel_sim.files.importing.units import UNITS, kind_of, split_unit
+from tunnel_sim.files.scatter_tables import SPREAD, Spread
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -31,7 +32,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, sh
 
 
 class Conditions(StrictModel):
-    """Conditions of runs, and sizes of the rig, as in ``campaign.toml``."""
+    """Conditions of runs, sizes of the rig and the scatter between runs, as in ``campaign.toml``."""
 
     wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
     spring_stiffness: NotNegative | None = optional(
@@ -43,10 +44,19 @@ class Conditions(StrictModel):
     frontal_area: Positive | None = optional("a positive number in m2")
     reference_length: Positive | None = optional("a positive number in m")
     width: Positive | None = optional("a positive number in m")
+    repeatability_wind_speed: Spread | None = optional(SPREAD)
+    repeatability_spring_stiffness: Spread | None = optional(SPREAD)
+    repeatability_mechanical_damping: Spread | None = optional(SPREAD)
 
 
 RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
 RUN_KEYS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
+OF_REPEATABILITY = "repeatability_"
+"""Begins the keys of ``[repeatability]`` where they stand beside conditions of the same names."""
+
+SPREAD_KEYS = tuple(key for key in Conditions.model_fields if key.startswith(OF_REPEATABILITY))
+OF_CAMPAIGN = (*RIG_KEYS, *SPREAD_KEYS)
+"""The keys that are the same in all runs."""
 
 
 class Stretch(StrictModel):
@@ -162,7 +172,7 @@ _EVEN = 1e-9  # of a value: a column that varies less is constant
 
 def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
     """The condition or size, a key of `Conditions`, that a column states, or a number ``alone``."""
-    if name in RIG_KEYS and unit == "":
+    if name in OF_CAMPAIGN and unit == "":
         return name
     name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
     plain = re.sub(r"[\s_.-]+", " ", name).strip()

@@ -22,8 +22,11 @@ from tunnel_sim.files.importing.cleaning import (
 )
 from tunnel_sim.files.importing.columns import read_calibration, stem
 from tunnel_sim.files.importing.conditions import (
+    OF_CAMPAIGN,
+    OF_REPEATABILITY,
     RIG_KEYS,
     RUN_KEYS,
+    SPREAD_KEYS,
     Conditions,
     ConditionTable,
     ImportChoices,
@@ -39,6 +42,7 @@ from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
     Quantity,
+    Repeatability,
     RigProperties,
     Run,
     SensorProperties,
@@ -181,7 +185,7 @@ def _part(
     # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
     measured = raw.measured(float(time[0]), float(time[-1]), said)
     stated = raw.stated | measured | raw.named | in_table | given
-    sizes = {key: stated.pop(key) for key in RIG_KEYS if key in stated}
+    sizes = {key: stated.pop(key) for key in OF_CAMPAIGN if key in stated}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
     validate(Conditions, stated | sizes, raw.source)
     plausible_values(stated | sizes, where)
@@ -232,20 +236,21 @@ def _campaign(
         what = f"no run can be used; the first one is {part.said[-1]}"
         remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
         raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
-    # The sizes of the rig, as stated or else from the files.
-    rig = choices.conditions.model_dump(include=set(RIG_KEYS), exclude_none=True)
-    plausible_values(rig, "--set")
+    # The sizes of the rig and the scatter between runs, as stated or else from the files.
+    common = choices.conditions.model_dump(include=set(OF_CAMPAIGN), exclude_none=True)
+    plausible_values(common, "--set")
     for part in parts:
         for key, value in part.sizes.items():
-            if rig.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
-                what = f"{key} = {value:g}, and {rig[key]:g} in another run"
+            if common.setdefault(key, value) != value and getattr(choices.conditions, key) is None:
+                what = f"{key} = {value:g}, and {common[key]:g} in another run"
                 remedy = f"give --set {key}=NUMBER, or import them separately"
                 raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
     files = list(dict.fromkeys(part.raw.source.name for part in parts))
     used = [part for part in parts if part.run is not None]
+    spread = {key.removeprefix(OF_REPEATABILITY): common[key] for key in SPREAD_KEYS if key in common}
     return Campaign(
         name,
-        RigProperties(**rig),
+        RigProperties(**{key: common[key] for key in RIG_KEYS if key in common}),
         SensorProperties(
             # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
             resolution=resolution([part.reading for part in used]),
@@ -255,6 +260,7 @@ def _campaign(
         ),
         runs,
         one_line(f"Imported from {', '.join(files[:3])}{' and others' if len(files) > 3 else ''}"),
+        repeatability=Repeatability(**spread) if spread else None,
     )
 
 

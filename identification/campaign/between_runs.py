@@ -9,7 +9,7 @@ Mixed-Effects Models in S and S-PLUS, Springer 2000, chapter 2; Harville, J. Am.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -191,6 +191,45 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
     found = minimize(at, np.log(widths[free]), jac=True, method="L-BFGS-B", bounds=bounds)
     widths[free] = np.exp(found.x)
     return widths
+
+
+DEVIATIONS = ("wind_speed", "spring_stiffness", "mechanical_damping")
+"""What differs between runs, by the key of ``[repeatability]``; each relative to the run's own value."""
+
+
+@dataclass(frozen=True)
+class UsualWidths:
+    """What is known of the widths of runs that nobody has stated: judgements on rigs in general.
+
+    Args:
+        wind_speed: a good tunnel holds its speed to some tenths of a per cent; relative, one standard deviation.
+        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; the same.
+        mechanical_damping: bearings and cables come back to a per cent; the same.
+        decades: standard deviation of log10(width): a rig ten times as good or as bad is not unusual.
+        least: least width that is considered, over the usual one.
+        most: greatest width that is considered, over the usual one.
+    """
+
+    wind_speed: float = 0.003
+    spring_stiffness: float = 0.0005
+    mechanical_damping: float = 0.01
+    decades: float = 1.0
+    least: float = 1e-3
+    most: float = 30.0
+
+    def prior(self, names: Sequence[str], stated: Mapping[str, float]) -> WidthPrior:
+        """What is known of the widths of some deviations.
+
+        Args:
+            names: of `DEVIATIONS`.
+            stated: relative standard deviations that the campaign states, by name; they are used as they are.
+        """
+        usual = np.array([getattr(self, name) for name in names], np.float64)
+        least = self.least * usual
+        known = np.array([stated.get(name, 0.0) for name in names])
+        free = np.array([name not in stated for name in names], bool)
+        middle = np.where(free, usual, np.maximum(known, 1e-6 * usual))  # of a width of zero nothing is seen
+        return WidthPrior(middle, np.where(free, self.decades, 0.0), least, self.most * usual)
 
 
 _GRID = 15  # widths in each direction

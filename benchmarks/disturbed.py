@@ -1,0 +1,111 @@
+"""How often a disturbed run is named, and the causes beside it are exactly right.
+
+Run as ``python -m benchmarks.disturbed FOLDER --seed N --count C``. Campaigns of the reference simulator have none,
+one or two causes; in one run each of them there is a blow, a push or a bump of the reading, or in none with
+``--undisturbed``. Every answer is appended to ``answers.jsonl`` in the folder; a second call goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagnosis import diagnose
+from tunnel_reference.disturbance import DISTURBANCE, with_disturbances
+from tunnel_reference.draw import Mixture
+from tunnel_reference.make import as_campaign, draw_set, truth_of
+from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
+from tunnel_sim.vocabulary.errors import TunnelError
+
+KINDS = {"none": 1.0, "single": 2.0, "pair": 2.0}
+ALIKE_S = 0.3
+"""Distance within which the instant named is that of the disturbance."""
+
+
+def simulated(count: int, seed: int, variety: float, *, disturbed: bool) -> list[Simulated]:
+    """Campaigns, each with a disturbed run unless ``disturbed`` is false."""
+    mixture = Mixture(variety=variety, small=0.0)
+    draws = size_separably(draw_set(count, seed, KINDS, mixture))
+    if disturbed:
+        draws = with_disturbances(draws, np.random.default_rng(seed + 1))
+    return [read_and_fit(draw, motion) for draw, motion in zip(draws, simulate_motions(draws), strict=True)]
+
+
+def answered(one: Simulated, name: str) -> dict[str, Any]:
+    """The truth of a campaign beside its answer."""
+    hit = next((e for e in one.draw.effects if e.form.family == DISTURBANCE), None)
+    scale = one.draw.conditions.time_scale
+    truth = {
+        "effects": truth_of(one)["effects"],
+        "severity": one.excess,
+        "form": hit and hit.form.name,
+        "run": hit and f"r{int(hit.extra['run']) + 1:02d}",
+        "at_s": hit and hit.extra["at"] * scale,
+        "size": hit and hit.target,
+    }
+    begun = time.process_time()
+    try:
+        found = diagnose(as_campaign(one, name)).to_json_dict()
+    except TunnelError as error:
+        return {"name": name, "truth": truth, "error": str(error)}
+    return {
+        "name": name,
+        "truth": truth,
+        "causes": found["causes"],
+        "decided": found["decided"],
+        "probability": found["candidates"][0]["probability"],
+        "disturbed": found["disturbed"],
+        "seconds": time.process_time() - begun,
+    }
+
+
+def named(one: Mapping[str, Any]) -> bool:
+    """Whether the disturbed run, and no other, is named; of a campaign without one, that none is."""
+    return [d["run"] for d in one.get("disturbed", ())] == (
+        [one["truth"]["run"]] if one["truth"]["run"] else []
+    )
+
+
+def exact(one: Mapping[str, Any]) -> bool:
+    """Whether the causes are decided and exactly right."""
+    return bool(one.get("decided")) and one.get("causes") == one["truth"]["effects"]
+
+
+def main() -> None:
+    """Answer the campaigns, and print the counts."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.disturbed", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--variety", type=float, default=0.0)
+    parser.add_argument("--undisturbed", action="store_true")
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    file = given.folder / "answers.jsonl"
+    known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    done = {one["name"] for one in known}
+    for number, one in enumerate(
+        simulated(given.count, given.seed, given.variety, disturbed=not given.undisturbed)
+    ):
+        name = f"c{number:04}"
+        if name not in done:
+            known.append(answered(one, name))
+            with file.open("a") as stream:
+                stream.write(json.dumps(known[-1]) + "\n")
+    for kind in range(3):
+        some = [one for one in known if len(one["truth"]["effects"]) == kind]
+        both = sum(named(one) and exact(one) for one in some)
+        print(
+            f"{kind} causes: {len(some)} campaigns, {sum(map(named, some))} with the run right, "
+            f"{sum(map(exact, some))} with the causes right, {both} with both"
+        )
+
+
+if __name__ == "__main__":
+    main()

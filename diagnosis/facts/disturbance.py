@@ -1,0 +1,23 @@
+"""A run that was disturbed, as a fact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """A run whose motion jumps at an instant at which no other run's does.
+
+    Args:
+        run: id of the run.
+        at_s: the instant, by the time stamps of the run, s.
+        kept_until_s: up to when the run is used, by the same stamps, s; None where the run is left out.
+        p_value: probability of as large a jump among all runs and instants, if chance and what acts in all runs
+            were all, a fraction.
+    """
+
+    run: str
+    at_s: float
+    kept_until_s: float | None
+    p_value: float

@@ -1,0 +1,132 @@
+"""Runs that were disturbed: which they are, and the campaign without what follows the disturbance.
+
+What acts in all runs is a cause. A run counts as disturbed where its greatest jump is beyond chance in the run
+itself and beyond the greatest jumps of the other runs, so that dropped samples, turbulence or a ringing rod accuse
+none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.facts.disturbance import Disturbance
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import resonance
+from diagnosis.model.nominal import NominalModel
+from diagnosis.noise.gap import GapTest
+from diagnosis.search.clock import Clock
+from diagnosis.search.prepared import Prepared, prepared_and_tested
+from diagnosis.settings import SelectionSettings, Settings
+from diagnosis.where.jumps import Jumps, jumps
+from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Record
+
+
+def prepared_undisturbed(
+    measured: Campaign,
+    model: NominalModel,
+    kinds: Sequence[type[Effect]],
+    clock: Clock,
+    settings: Settings,
+) -> tuple[Prepared, GapTest, tuple[Disturbance, ...]]:
+    """As `prepared_and_tested`, without disturbances where there is a gap.
+
+    Raises:
+        TunnelError: when the nominal model cannot be fitted to the runs.
+    """
+    prepared, test = prepared_and_tested(measured, model, kinds, clock, settings)
+    if not test.detected:
+        return prepared, test, ()
+    with clock.step("where"):
+        disturbed = disturbances(measured, prepared.nominal)
+    if disturbed:
+        with suppress(TunnelError):  # the others do not determine the model
+            kept = undisturbed(measured, disturbed)
+            return *prepared_and_tested(kept, model.of(kept), kinds, clock, settings), disturbed
+    return prepared, test, ()
+
+
+def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
+    """The runs that were disturbed, at one rate of false alarms.
+
+    Args:
+        measured: the campaign in its own units.
+        nominal: fit of the nominal model to the similar campaign.
+    """
+    similarity, chosen = nominal.problem.data.similarity, nominal.settings.selection
+    runs = {run.id: run for run in nominal.problem.data.runs}
+    index = {run.id: place for place, run in enumerate(nominal.problem.data.runs)}
+    stamps = {run.id: run.record.time_s for run in measured.runs}
+    seen = {one.id: one for one in jumps(nominal)}
+    found = []
+    for name, p_value in beyond_the_others(list(seen.values()), chosen):
+        one = seen[name]
+        most = int(np.argmax(one.drop))
+        # a jump is seen before it happens, in fits that include it
+        first = most
+        while first > 0 and _clear(float(one.chance[first - 1]), chosen):
+            first -= 1
+        begun = float(stamps[name][0]) + similarity.own(runs[name].start, "s")
+        at, until = (begun + similarity.own(float(one.time[place]), "s") for place in (most, first))
+        cycles = one.time[first] * resonance(nominal, index[name])
+        kept = until if cycles >= chosen.disturbed_kept else None
+        found.append(Disturbance(name, at, kept, p_value))
+    return tuple(sorted(found, key=lambda one: one.run))
+
+
+def beyond_the_others(runs: Sequence[Jumps], chosen: SelectionSettings) -> list[tuple[str, float]]:
+    """The runs whose greatest jump is beyond chance and beyond those of the others, with the larger p-value.
+
+    The logarithms of the greatest jumps are tested for up to a given share of outliers from the outside inwards
+    (generalised ESD; Rosner, Technometrics 25 (1983) 165, doi 10.1080/00401706.1983.10487848), by Student's t of a
+    run among the runs that jump less. Their scatter is estimated with a prior, since few runs do not show it.
+    """
+    if len(runs) < chosen.disturbed_fewest:
+        return []
+    from scipy.special import stdtr  # only here: slow to load
+
+    instants = sum(one.drop.size for one in runs)
+    # what is below the greatest of as many values of χ² by chance is no jump, and not a small one
+    sizes = np.log([max(float(one.drop.max()), 2.0 * np.log(one.drop.size), 1.0) for one in runs])
+    order = np.argsort(-sizes)
+    most = min(max(1, int(chosen.disturbed_share * len(runs))), len(runs) - 2)
+    p_values = []
+    for place in range(most):
+        one, others = order[place], sizes[order[place + 1 :]]
+        prior, count = chosen.disturbed_prior, others.size
+        freedom = prior + count - 1
+        scatter = prior * chosen.disturbed_scatter**2 + (count - 1) * float(np.var(others, ddof=1))
+        std = np.sqrt(scatter / freedom * (1.0 + 1.0 / count))
+        apart = (count + 1) * float(stdtr(freedom, -(sizes[one] - others.mean()) / std))
+        by_chance = instants * float(runs[one].chance.min())
+        p_values.append(min(1.0, max(apart, by_chance)))
+    clear = [place for place, p in enumerate(p_values) if _clear(p, chosen)]
+    return [(runs[order[place]].id, p_values[place]) for place in range(clear[-1] + 1 if clear else 0)]
+
+
+def _clear(p_value: float, chosen: SelectionSettings) -> bool:
+    return p_value < chosen.disturbed_rate
+
+
+def undisturbed(campaign: Campaign, disturbed: Sequence[Disturbance]) -> Campaign:
+    """The campaign with disturbed runs up to their disturbance, or without them.
+
+    Raises:
+        TunnelError: where no run would remain.
+    """
+    until = {one.run: one.kept_until_s for one in disturbed}
+    kept = campaign.without([name for name, end in until.items() if end is None])
+    runs = []
+    for run in kept.runs:
+        end = until.get(run.id)
+        if end is not None:
+            inside = run.record.time_s < end
+            run = replace(run, record=Record(run.record.time_s[inside], run.record.yaw_rad[inside]))
+        runs.append(run)
+    return replace(kept, runs=tuple(runs))

@@ -1,0 +1,170 @@
+"""Whether the oscillation of a run jumps at an instant, by its reading alone.
+
+A blow changes angle and rate of a free decay at once. Causes change its amplitude, frequency and harmonics along
+the decay, but smoothly. Around every instant, the reading over a few cycles is therefore fitted by smooth harmonics
+of the run's own oscillation, whose slope may change there, and then with a jump of the oscillation as well. No
+model of the rig is needed, so that a large gap from any cause does not hide a blow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.residuals import linear_coefficients, resonance
+from tunnel_sim.vocabulary.record import Array
+
+_ROWS = 24  # per cycle, to which readings are averaged: nothing above the third harmonic is fitted
+_HALF = 2.0  # cycles on either side of an instant that are fitted
+_EDGE = 1.5  # cycles at either end of a record in which a jump cannot be distinguished from the release
+_APART = 0.25  # cycles between the instants
+_FEWEST = 6.0  # cycles of a run in which jumps are sought
+_SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
+_ROUNDS = 3  # of finding that change, each from the one before
+_CLEAR = 4.0  # noise standard deviations of an amplitude that shows it
+_QUARTILE = 0.575  # the lower quartile of χ² with two degrees of freedom
+
+
+@dataclass(frozen=True, eq=False)
+class Jumps:
+    """How clearly the oscillation of a run jumps, by instant.
+
+    Args:
+        id: of the run.
+        time: the instants since the start of what is fitted, shape (n,), s.
+        drop: of χ² by a jump of amplitude and phase, shape (n,), in the variance of the noise, of what departs from
+            smooth harmonics around the instant, or of the run's other jumps, whichever is largest.
+        chance: probability of as large a drop at that instant by chance, shape (n,).
+    """
+
+    id: str
+    time: Array
+    drop: Array
+    chance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Oscillation:
+    """A run's reading in rows, in noise standard deviations, and the slow change of its oscillation.
+
+    Args:
+        time: of every row, shape (n,), s.
+        reading: shape (n,).
+        phase: shape (n,), rad.
+        size: logarithm of the amplitude, shape (n,).
+    """
+
+    time: Array
+    reading: Array
+    phase: Array
+    size: Array
+
+    @property
+    def cycles(self) -> Array:
+        """Since the first row, shape (n,)."""
+        return np.asarray((self.phase - self.phase[0]) / (2.0 * np.pi))
+
+    @classmethod
+    def of(cls, fit: Fit, index: int) -> _Oscillation:
+        """The oscillation of a run, whose frequency and decay are at first those of a fit."""
+        run, frequency = fit.problem.data.runs[index], resonance(fit, index)
+        inertia, damping, _ = linear_coefficients(fit, index)
+        group = max(1, round(1.0 / (frequency * run.interval * _ROWS)))
+        count = run.reading.size // group
+        time = np.asarray((np.arange(count) + 0.5) * group * run.interval)
+        rows = run.reading[: count * group].reshape(count, group).mean(axis=1)
+        rows *= np.sqrt(group) / float(run.noise_at(frequency))
+        found = cls(time, rows, 2.0 * np.pi * frequency * time, -0.5 * damping / inertia * time)
+        for turn in range(_ROUNDS):
+            found = found._followed(_SLOW if turn == 0 else _SMOOTH)
+        return found
+
+    def _followed(self, order: int) -> _Oscillation:
+        """With phase and amplitude that follow the reading, as polynomials of time."""
+        cycles = self.cycles
+        places, sizes, phases, amplitudes = [], [], [], []
+        for centre in np.arange(0.5, cycles[-1] - 0.4, 0.5):
+            inside = np.abs(cycles - centre) <= 1.0
+            mean, since = float(self.size[inside].mean()), cycles[inside] - centre
+            wave = np.exp(self.size[inside] - mean + 1j * self.phase[inside])
+            columns = np.column_stack(
+                [np.ones(since.size), since, wave.real, -wave.imag, wave.real * since, -wave.imag * since]
+            )
+            found = np.linalg.lstsq(columns, self.reading[inside], rcond=None)[0]
+            own = complex(found[2], found[3])
+            places.append(centre)
+            amplitudes.append(abs(own))
+            sizes.append(np.log(max(abs(own), 1e-300)) - mean)
+            phases.append(np.angle(own))
+        amplitude = np.array(amplitudes)
+        clear = amplitude > max(_CLEAR, 0.01 * amplitude.max(initial=0.0))
+        if np.count_nonzero(clear) < 3 * order:
+            return self
+        weights = np.minimum(amplitude[clear] / amplitude[clear].max(), 0.3)
+        at = 2.0 * np.array(places)[clear] / cycles[-1] - 1.0
+        everywhere = np.clip(2.0 * cycles / cycles[-1] - 1.0, -1.0, at[-1])
+        change = [
+            chebyshev.chebval(everywhere, chebyshev.chebfit(at, values, order, w=weights))
+            for values in (np.unwrap(np.array(phases)[clear]), np.array(sizes)[clear])
+        ]
+        return _Oscillation(self.time, self.reading, self.phase + change[0], self.size + change[1])
+
+    def around(self, instant: float) -> tuple[Array, Array, Array]:
+        """The rows around an instant (cycles), their smooth harmonics, and the jump, in columns."""
+        inside = np.flatnonzero(np.abs(self.cycles - instant) <= _HALF)
+        since, phase = (self.cycles[inside] - instant) / _HALF, self.phase[inside]
+        size = np.exp(self.size[inside] - self.size[inside].mean())
+        smooth, waves = [np.ones(since.size), since], [size * np.cos(phase), size * np.sin(phase)]
+        for wave in waves:
+            smooth += [wave * since**power for power in range(4)]
+            smooth.append(wave * np.maximum(since, 0.0))
+        for harmonic in (2, 3):
+            for turn in (np.cos, np.sin):
+                wave = size**harmonic * turn(harmonic * phase)
+                smooth += [wave, wave * since]
+        jump = np.column_stack(waves) * (since > 0.0)[:, None]
+        return self.reading[inside], np.column_stack(smooth), jump
+
+
+def jumps(fit: Fit) -> list[Jumps]:
+    """The jumps of every free decay that is long enough.
+
+    Args:
+        fit: of the nominal model, whose frequencies are close to those of the runs.
+    """
+    return [found for index in range(len(fit.problem.data.runs)) if (found := _of_run(fit, index))]
+
+
+def _of_run(fit: Fit, index: int) -> Jumps | None:
+    run, frequency = fit.problem.data.runs[index], resonance(fit, index)
+    if run.drive is not None or run.reading.size * run.interval * frequency < _FEWEST:
+        return None
+    if run.interval * frequency * _ROWS > 2.0:  # too few readings in a cycle for its harmonics
+        return None
+    motion = _Oscillation.of(fit, index)
+    cycles = motion.cycles
+    if not cycles[-1] > _FEWEST or not np.all(np.diff(cycles) > 0.0):
+        return None
+    instants = np.arange(_EDGE, cycles[-1] - _EDGE, _APART)
+    drop, left, freedom = np.array(list(_compared(motion, instants))).T
+    everywhere = float(np.quantile(drop, 0.25)) / _QUARTILE
+    scaled = drop / np.maximum(np.maximum(left, everywhere), 1.0)
+    # the tail of F with two degrees of freedom
+    chance = (1.0 + scaled / freedom) ** (-0.5 * freedom)
+    return Jumps(run.id, np.interp(instants, cycles, motion.time), scaled, chance)
+
+
+def _compared(motion: _Oscillation, instants: Array) -> Iterator[tuple[float, float, float]]:
+    """By instant, the drop of χ², what is left over its degrees of freedom, and these."""
+    for instant in instants:
+        reading, smooth, jump = motion.around(float(instant))
+        basis = np.linalg.qr(smooth)[0]
+        rest = reading - basis @ (basis.T @ reading)
+        own = np.linalg.qr(jump - basis @ (basis.T @ jump))[0]
+        drop = float(np.sum((own.T @ rest) ** 2))
+        freedom = float(max(reading.size - smooth.shape[1] - 2, 1))
+        yield drop, (float(rest @ rest) - drop) / freedom, freedom

@@ -1,0 +1,348 @@
+"""How runs repeat: the scatter between runs, and what it makes of the campaign's coefficients.
+
+Run i has its own deviations e of wind speed V, spring stiffness Kr and mechanical damping Cr, relative and normal.
+With Ka ~ V² and Ca ~ V they move its decay rate a and its stiffness k, per unit inertia, by
+
+    δk = Kr g e_K − 2 Ka g e_V,    2 δa = Cr g e_C + Ca g e_V.
+
+The deviations are integrated out (`identification.campaign.between_runs`). Where no repeatability is stated, the
+widths are those of greatest restricted likelihood and prior, and they count only where a likelihood ratio says that
+the runs scatter beyond their noise. Zero is at the end of their range, so that the ratio is at most a mixture of
+two χ² (Self and Liang, J. Am. Stat. Assoc. 82 (1987) 605, doi 10.1080/01621459.1987.10478472). Stated widths are
+used as they are.
+
+Variances with estimated widths have the degrees of freedom of Satterthwaite, Biometrics Bull. 2 (1946) 110–114, doi
+10.2307/3002019, by which Student's t widens them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc, chdtri, ndtri
+
+from identification import policy
+from identification.campaign.between_runs import (
+    DEVIATIONS,
+    Marginal,
+    RunProducts,
+    UsualWidths,
+    WidthPrior,
+    likeliest_widths,
+    marginal,
+)
+from identification.campaign.derivatives import Design
+from identification.estimate import Quantity, RunScatter
+from identification.statistics import inverse, student_factor
+from tunnel_sim.vocabulary.campaign import Repeatability, Run
+from tunnel_sim.vocabulary.record import Array
+
+_STEP = 0.02  # of ln(width), by which the curvature is taken
+_ZERO = 1e-9  # width, relative to the usual one, that counts as none
+
+
+def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Array]:
+    """What each of `DEVIATIONS` does to every run's values by its relative size, shape (m, 3).
+
+    Args:
+        design: of the runs, with the gains of inputs where there are driven ones.
+        parameters: φ, shape (p,).
+    """
+    columns = {name: float(parameters[place]) for name, place in design.columns.items()}
+    stiff, aero = columns.get("g", 0.0), columns.get("n", 0.0)
+    still, air = columns.get("d", 0.0), columns.get("m", 0.0)
+    moves = []
+    for run, link, load, damping in zip(
+        runs, design.links, design.stiffness_loads, design.damping_loads, strict=True
+    ):
+        spring = (run.spring_stiffness or 0.0) * stiff
+        move = np.zeros((len(link), len(DEVIATIONS)))
+        move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
+        move[1, 1] = spring
+        move[0, 2] = 0.5 * still
+        if run.driven_by_stiffness and len(link) > 2:
+            move[2, 1] = spring
+        moves.append(move)
+    return moves
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRuns:
+    """Decay rates and stiffnesses of runs, as a method has them, and how deviations of the runs move them.
+
+    Args:
+        links: by run, shape (m, p): what common parameters φ make of (a, k), or of (a, k, g) with driven runs.
+        seen: by run, shape (m,).
+        weights: inverse covariance of its noise by run, shape (m, m).
+        moves: by run, what each of `DEVIATIONS` moves by its relative size, shape (m, 3).
+    """
+
+    links: Sequence[Array]
+    seen: Sequence[Array]
+    weights: Sequence[Array]
+    moves: Sequence[Array]
+
+    @classmethod
+    def of(
+        cls,
+        runs: Sequence[Run],
+        design: Design,
+        seen: Sequence[Array],
+        weights: Sequence[Array],
+        start: Array,
+    ) -> MeasuredRuns:
+        """Runs about common parameters.
+
+        Args:
+            design: of the runs, with the gains of inputs where there are driven ones.
+            start: φ, shape (p,).
+        """
+        return cls(design.links, seen, weights, moves_of(runs, design, start))
+
+    def misfit(self, parameters: Array) -> float:
+        """χ² of common parameters, shape (p,), without scatter."""
+        away = [seen - link @ parameters for seen, link in zip(self.seen, self.links, strict=True)]
+        return sum(float(one @ weight @ one) for one, weight in zip(away, self.weights, strict=True))
+
+    def floored(self, least: Array) -> MeasuredRuns:
+        """The runs with a noise of at least what the least widths do, so that no width exceeds it by all digits.
+
+        Args:
+            least: relative, of each of `DEVIATIONS`, shape (3,).
+        """
+        weights = []
+        for weight, move in zip(self.weights, self.moves, strict=True):
+            known = np.flatnonzero(weight.diagonal() > 0.0)
+            inside = np.ix_(known, known)
+            moved = move[known] * least
+            floored = np.zeros_like(weight)
+            floored[inside] = inverse(inverse(weight[inside]) + moved @ moved.T)
+            weights.append(floored)
+        return replace(self, weights=weights)
+
+    def about(self, start: Array, used: Array) -> RunProducts:
+        """The products of their columns, for corrections of φ and the used deviations."""
+        rows = zip(self.links, self.seen, self.weights, self.moves, strict=True)
+        of_runs = [(j, z - j @ start, w, d[:, used]) for j, z, w, d in rows]
+        return RunProducts(
+            np.stack([d.T @ w @ d for _, _, w, d in of_runs]),
+            np.stack([d.T @ w @ j for j, _, w, d in of_runs]),
+            np.stack([j.T @ w @ j for j, _, w, _ in of_runs]),
+            np.stack([d.T @ w @ z for _, z, w, d in of_runs]),
+            np.stack([j.T @ w @ z for j, z, w, _ in of_runs]),
+            np.array([float(z @ w @ z) for _, z, w, _ in of_runs]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Scatter between runs, and the common parameters of greatest likelihood under it.
+
+    Args:
+        names: of `DEVIATIONS`, those that the runs show.
+        widths: relative standard deviations, shape (k,).
+        uncertain: covariance of ln(widths), shape (k, k); zero of a stated one.
+        stated: those that the campaign states.
+        parameters: φ, shape (p,).
+        noise: covariance of φ by the noise of the runs alone, shape (p, p).
+        quadratic: χ² with the deviations at their likeliest.
+        gains: by run, how φ depends on its values, shape (p, m).
+        moves: by run, of one standard deviation of each, shape (m, k).
+        seen: by run, its values, shape (m,).
+    """
+
+    names: tuple[str, ...]
+    widths: Array
+    uncertain: Array
+    stated: tuple[str, ...]
+    parameters: Array
+    noise: Array
+    quadratic: float
+    gains: Sequence[Array]
+    moves: Sequence[Array]
+    seen: Sequence[Array]
+
+    @property
+    def covariance(self) -> Array:
+        """Of φ, by noise and scatter, not yet widened for estimated widths, shape (p, p)."""
+        moved = self.moved(np.eye(self.parameters.size))
+        return np.asarray(self.noise + sum((one @ one.T for one in moved), np.zeros_like(self.noise)))
+
+    def moved(self, jacobian: Array) -> list[Array]:
+        """What one standard deviation of each kind does to functions of φ, run by run.
+
+        Args:
+            jacobian: of the functions to φ, shape (q, p).
+
+        Returns:
+            By kind, shape (q, runs).
+        """
+        every = [jacobian @ gain @ move for gain, move in zip(self.gains, self.moves, strict=True)]
+        return [np.stack([one[:, kind] for one in every], axis=1) for kind in range(len(self.names))]
+
+    def counted(self, noise: Array, moved: Sequence[Array]) -> tuple[Array, list[Array]]:
+        """The covariance of noise and scatter together, widened by Student's t where widths are estimated.
+
+        1.96 of the standard deviations on either side are a 95 % interval.
+
+        Args:
+            noise: covariance without scatter, shape (q, q).
+            moved: as of `moved`.
+
+        Returns:
+            The covariance, shape (q, q), and what each kind of scatter adds to it.
+        """
+        total = noise + sum((one @ one.T for one in moved), np.zeros_like(noise))
+        variance = np.diag(total)
+        slopes = np.stack([2.0 * np.sum(one**2, axis=1) for one in moved], axis=1) / variance[:, None]
+        factor = student_factor(np.einsum("qk,kl,ql->q", slopes, self.uncertain, slopes))
+        wider = np.outer(factor, factor)
+        return np.asarray(total * wider), [one @ one.T * wider for one in moved]
+
+    def of(self, jacobian: Array) -> tuple[Array, RunScatter]:
+        """The covariance of functions of φ, and how the runs repeat.
+
+        Args:
+            jacobian: of the functions to the first numbers of φ, shape (q, n).
+        """
+        size = jacobian.shape[1]
+        whole = np.zeros((len(jacobian), self.parameters.size))
+        whole[:, :size] = jacobian
+        noise = whole @ self.noise @ whole.T
+        covariance, added = self.counted(noise, self.moved(whole))
+        return covariance, self.described(added)
+
+    def described(self, added: Sequence[Array] = ()) -> RunScatter:
+        """How the runs repeat, for an estimate.
+
+        Args:
+            added: what each kind of scatter adds to the covariance of its parameters, shape (q, q).
+        """
+        reach = float(ndtri(0.975))
+        widths: dict[str, Quantity] = {}
+        for name, width, variance in zip(
+            self.names, self.widths.tolist(), np.diag(self.uncertain), strict=True
+        ):
+            deviation = float(np.sqrt(variance))
+            ends = width * float(np.exp(-reach * deviation)), width * float(np.exp(reach * deviation))
+            std = 0.0 if name in self.stated else width * deviation
+            widths[name] = Quantity(width, std, "1", None if name in self.stated else ends)
+        spread = np.array([np.sum(move[:2] ** 2, axis=1) for move in self.moves])  # of (a, k)
+        sizes = np.array([seen[:2] for seen in self.seen]) ** 2
+        shares = np.divide(spread, sizes, out=np.zeros_like(spread), where=sizes > 0.0)
+        relative = np.sqrt(shares.sum(axis=0) / np.maximum((sizes > 0.0).sum(axis=0), 1))
+        return RunScatter(
+            frequency=0.5 * float(relative[1]),
+            damping=float(relative[0]),
+            stated=self.stated,
+            covariances=tuple(tuple(map(tuple, one.tolist())) for one in added),
+            **widths,
+        )
+
+
+def scatter_between(
+    measured: MeasuredRuns,
+    start: Array,
+    repeatability: Repeatability | None,
+    usual: UsualWidths | None = None,
+) -> Scatter | None:
+    """The scatter between runs; None where none is stated, and the runs show none beyond their noise.
+
+    Args:
+        start: φ of generalised least squares without scatter, shape (p,).
+        repeatability: as the campaign states it; it is used as it is.
+        usual: what is known of the widths that are not stated.
+    """
+    stated = {} if repeatability is None else repeatability.stated
+    usual = usual or UsualWidths()
+    measured = measured.floored(usual.prior(DEVIATIONS, {}).least)
+    pairs = list(zip(measured.moves, measured.weights, strict=True))
+    power = np.sum([np.einsum("mk,mn,nk->k", move, weight, move) for move, weight in pairs], axis=0)
+    shown = [place for place, name in enumerate(DEVIATIONS) if power[place] > 0.0]
+    if not shown:
+        return None
+    names = [DEVIATIONS[place] for place in shown]
+    prior = usual.prior(names, stated)
+    runs = measured.about(start, np.array(shown))
+    kept = np.arange(len(names))
+    widths = prior.usual
+    if prior.free.any():
+        widths = likeliest_widths(runs, prior)
+        none = np.where(prior.free, _ZERO * prior.usual, prior.usual)
+        gained = marginal(runs, none).restricted - marginal(runs, widths).restricted
+        if gained < ratio_limit(int(prior.free.sum())):
+            kept = np.flatnonzero(~prior.free)
+    if not kept.size:
+        return None
+    used = np.array(shown)[kept]
+    runs, widths = measured.about(start, used), widths[kept]
+    prior = WidthPrior(prior.usual[kept], prior.decades[kept], prior.least[kept], prior.most[kept])
+    found = marginal(runs, widths)
+    moves = [move[:, used] * widths for move in measured.moves]
+    gains, noise = _gains(measured, moves, found)
+    return Scatter(
+        tuple(names[place] for place in kept),
+        widths,
+        _uncertainty(runs, widths, prior),
+        tuple(names[place] for place in kept if names[place] in stated),
+        start + found.common,
+        noise,
+        found.quadratic,
+        gains,
+        moves,
+        measured.seen,
+    )
+
+
+def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
+    """The likelihood ratio, −2 ln, beyond which widths count.
+
+    Args:
+        free: number of widths that are estimated, 1 or more.
+    """
+    low, high = 0.0, float(chdtri(free, rate))
+    while high - low > 1e-6:  # the mixture lies between χ² of one less and of all of them
+        middle = 0.5 * (low + high)
+        fewer = float(chdtrc(free - 1, middle)) if free > 1 else 0.0
+        beyond = 0.5 * (fewer + float(chdtrc(free, middle)))
+        low, high = (middle, high) if beyond > rate else (low, middle)
+    return high
+
+
+def _gains(measured: MeasuredRuns, moves: Sequence[Array], found: Marginal) -> tuple[list[Array], Array]:
+    """How φ depends on the values of every run, and its covariance by their noise.
+
+    The first is H⁻¹ Jᵀ V⁻¹ with V = W⁻¹ + D S² Dᵀ.
+    """
+    gains, noise = [], np.zeros_like(found.covariance)
+    for link, weight, move in zip(measured.links, measured.weights, moves, strict=True):
+        inner = np.linalg.inv(np.eye(move.shape[1]) + move.T @ weight @ move)
+        unweighted = found.covariance @ (link.T - link.T @ weight @ move @ inner @ move.T)
+        gains.append(unweighted @ weight)
+        noise += unweighted @ weight @ unweighted.T
+    return gains, noise
+
+
+def _uncertainty(runs: RunProducts, widths: Array, prior: WidthPrior) -> Array:
+    """Covariance of ln(widths), from the curvature of the restricted likelihood and the prior, shape (k, k)."""
+    free = np.flatnonzero(prior.free)
+    covariance = np.zeros((widths.size,) * 2)
+    if not free.size:
+        return covariance
+    rows = []
+    for place in free:
+        slopes = []
+        for sign in (1.0, -1.0):
+            moved = widths.copy()
+            moved[place] *= np.exp(sign * _STEP)
+            slopes.append((marginal(runs, moved).slope + prior.slope(moved))[free])
+        rows.append((slopes[0] - slopes[1]) / (2.0 * _STEP))
+    curvature = np.array(rows)
+    values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+    # No direction is known worse than the prior says.
+    least = 2.0 / (float(np.max(prior.decades[free])) * np.log(10.0)) ** 2
+    inverse = vectors @ np.diag(2.0 / np.maximum(values, least)) @ vectors.T
+    covariance[np.ix_(free, free)] = inverse
+    return covariance
