@@ -280,7 +280,7 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
     notes += status_lines(document)
     left = len(document["runs"]) - SHOWN_RUNS
     more = f"and {left} more runs, which runs_frame() lists" if left > 0 else ""
-    tables = [coefficients_table(document), runs_table(document), more]
+    tables: list[str | TextTable] = [coefficients_table(document), runs_table(document), more]
     return [*tables, *repeatability_lines(document), *(f"Note: {note}" for note in notes)]
 
 

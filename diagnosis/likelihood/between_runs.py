@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtrc
 
 from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
@@ -107,6 +108,11 @@ class RunColumns:
         """The likeliest widths and what they make of the runs."""
         widths = likeliest_widths(self.products, prior, start)
         return self.at(widths, prior)
+
+    def wider(self, prior: WidthPrior, widths: Array) -> float:
+        """Probability that runs of given widths seem to differ as much more as they do, by the likelihood ratio."""
+        gain = self.at(widths, prior).found.restricted - self.likeliest(prior, widths).found.restricted
+        return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
     def at(self, widths: Array, prior: WidthPrior) -> Between:
         """What given widths make of the runs."""

@@ -212,13 +212,17 @@ class Fit:
         """The columns of a fit with chance differences between the runs."""
         return RunColumns.of(self.problem, self.point, self.residuals, self.jacobian)
 
+    @property
+    def widths(self) -> Array:
+        """Of the chance differences between the runs in the fit, relative, shape (kinds,)."""
+        return np.array([one.width for one in self.problem.scatter])
+
     @cached_property
     def between(self) -> Between | None:
         """The likeliest widths of chance differences between the runs; None in a fit without any."""
         if not self.problem.scatter:
             return None
-        widths = np.array([one.width for one in self.problem.scatter])
-        return self.columns.likeliest(width_prior(self.problem), widths)
+        return self.columns.likeliest(width_prior(self.problem), self.widths)
 
     @property
     def scatter_cost(self) -> float:

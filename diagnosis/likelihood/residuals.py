@@ -189,14 +189,13 @@ class ChannelMisfit:
         chi2: by channel, shape (6,), dimensionless.
         count: of independent values by channel, which is what noise alone gives, shape (6,).
         motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
-        scatter_cost: −2 ln of the evidence of the chance differences between runs that it takes; infinite where the
-            runs repeat.
+        scatter_cost: −2 ln of the evidence of the chance differences between runs that it takes; 0 where they repeat.
     """
 
     chi2: Array
     count: Array
     motion: float
-    scatter_cost: float = np.inf
+    scatter_cost: float = 0.0
 
     @property
     def excess(self) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import bdtrc, chdtrc, stdtr
 
 from diagnosis.facts.found import Fact, Noted
+from diagnosis.likelihood.between_runs import width_prior
 from diagnosis.likelihood.least_squares import Fit, FitError, try_fit
 from diagnosis.likelihood.least_squares import fit as refit
 from diagnosis.likelihood.per_run import excited
@@ -79,7 +80,8 @@ class GapTest:
 
     Args:
         p_value: the smallest p-value, times the number of tests (at most 1).
-        tests: p-value by name: the bands, and the noise's trend with the motion, its scatter and its level.
+        tests: p-value by name: the bands, the noise's trend with the motion, its scatter and its level, and whether
+            runs differ by more than the fit lets them.
         noisy: whether the noise itself misbehaves: its level follows the motion, it comes in bursts, or it is
             above the stated level.
         within_step: whether a gap is no larger than the error of the readings' lattice, and is therefore none; the
@@ -112,6 +114,8 @@ def gap_test(fit: Fit, noise: Noise, trend: NoiseTrend, *, coarse_step: bool) ->
         if noise.stated_variance is not None:
             noisy["noise level"] = level_p_value(fit, noise)
     everything = p_values(fit, floor, noise.spread, scatter) | noisy
+    if fit.between is not None:
+        everything["between runs"] = fit.columns.wider(width_prior(fit.problem), fit.widths)
     limit = chosen.detection_rate / len(everything)
     smallest = min(everything.values())
     return GapTest(
@@ -145,7 +149,7 @@ def gap_or_colour(
     noise = noise.rounded(nominal, step)
     allowed = noise.rounding.allowed_in(nominal.problem.data)
     if allowed is not nominal.problem.data:
-        nominal = refit(Problem(allowed), nominal.point)
+        nominal = refit(replace(nominal.problem, data=allowed), nominal.point)
     for candidate in _candidates(nominal, noise):
         test = gap_test(candidate.fit, candidate.noise, trend, coarse_step=coarse_step)
         if candidate.believed(test):
@@ -190,7 +194,7 @@ class _Candidate:
         if found is None:
             return None
         data = nominal.problem.data
-        white = refit(Problem(whitened(data, found)), nominal.point)
+        white = refit(replace(nominal.problem, data=whitened(data, found)), nominal.point)
         return cls(nominal, source, white, noise.coloured(found, data))
 
     def believed(self, test: GapTest) -> bool:

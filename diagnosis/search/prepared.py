@@ -34,6 +34,7 @@ from diagnosis.noise.sensor_noise import (
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import second_mode_alone
 from diagnosis.search.hypothesis import Hypothesis
+from diagnosis.search.scatter import as_stated
 from diagnosis.settings import Settings
 from diagnosis.where.place import Place, locate
 from tunnel_sim.effects import Effect, the_effect
@@ -170,6 +171,7 @@ def prepared_and_tested(
         cut = missed and second_mode_alone(nominal, kinds) is None
         if cut:
             nominal = fit_nominal(without_rest(without_start(nominal.problem.data)))
+        nominal = as_stated(nominal, kinds)
         nominal, noise, test = gap_or_colour(nominal, noise, trend, step=step, coarse_step=coarse)
     known = (noise, trend, step, coarse, hum, nominal, cut)
     return Prepared(campaign, similarity, tuple(kinds), *known), test

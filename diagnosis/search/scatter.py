@@ -183,8 +183,7 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
         if between is None:
             return fitted
         prior = width_prior(fitted.problem)
-        now = np.array([one.width for one in fitted.problem.scatter])
-        here = fitted.columns.at(now, prior)
+        here = fitted.columns.at(fitted.widths, prior)
         if here.restricted - between.restricted < fitted.settings.scatter.widths_settled:
             return fitted
         again = try_fit(with_widths(fitted.problem, between), fitted.point, base=fitted)

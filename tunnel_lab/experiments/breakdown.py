@@ -150,7 +150,9 @@ def make_cases(
         campaign = as_campaign(simulated, "breakdown")
         starts = [(float(angle), 0.0) for angle in draw.conditions.start_angle]
         noise = float(np.sqrt(draw.conditions.noise_power))
-        bound = campaign_bound(campaign, **TRUTH, noise_std=noise, initial_states=starts, random_moments=None)
+        bound = campaign_bound(
+            campaign, noise_std=noise, initial_states=starts, random_moments=None, repeatability=None, **TRUTH
+        )
         cases.append(
             BiasCase(
                 effect=draw.effects[0].form.family if draw.effects else NOTHING_ADDED,

@@ -27,6 +27,7 @@ class BetweenRuns(Effect):
     """A number of the run that is (1 + σ e) times as great as stated, with e drawn from the unit normal."""
 
     fitted = False
+    autonomous = False
 
     def draw(self, stated: RunSettings, rng: np.random.Generator) -> Drawn:
         """Draw the run's deviation, in standard deviations."""

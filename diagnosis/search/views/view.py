@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Self
 
-import numpy as np
-
 from diagnosis.likelihood.least_squares import Fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.search.clock import Clock, Progress
@@ -55,8 +53,7 @@ class View:
     @cached_property
     def gap(self) -> ChannelMisfit:
         """What the nominal model leaves in the view, by channel."""
-        cost = self.base.scatter_cost if self.base.problem.scatter else np.inf
-        return replace(misfit(self.base), scatter_cost=cost)
+        return replace(misfit(self.base), scatter_cost=self.base.scatter_cost)
 
     @cached_property
     def left_by_read_off(self) -> Array:

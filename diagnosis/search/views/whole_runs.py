@@ -83,4 +83,5 @@ class WholeRuns(View):
     def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer fitted to convergence: only now, as another view may follow."""
         polished = polish(settled)
-        return replace(polished, fit=evident(polished.fit))
+        fitted = evident(polished.fit)
+        return polished if fitted is polished.fit else replace(polished, fit=fitted)
