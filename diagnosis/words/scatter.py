@@ -46,6 +46,11 @@ def spreads_of(document: Document) -> list[Mapping[str, Any]]:
     return list((document.get("repeatability") or {"spreads": ()})["spreads"])
 
 
+def repeats(document: Document) -> bool:
+    """Whether no scatter between the runs shows, and none is stated."""
+    return not any(one["width"] for one in spreads_of(document))
+
+
 def percent_of(value: float, digits: int = 2, *, sign: bool = False) -> str:
     """A fraction in per cent, such as ``0.29 %`` or ``−0.6 %``.
 
@@ -212,7 +217,7 @@ def repeatability_line(document: Document) -> str:
     found = document.get("repeatability")
     if not found or len(found["runs"]) < 2:
         return ""
-    if not any(one["width"] for one in found["spreads"]):
+    if repeats(document):
         return "Repeatability: the runs repeat; no scatter between them shows"
     each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
     beyond = f"; beyond it: {found['outlier']}" if found["outlier"] else ""
@@ -226,14 +231,13 @@ def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str) -> str:
 
 def repeatability_table(document: Document) -> TextTable:
     """Every run against the model; a table without rows where the runs repeat."""
-    found = document.get("repeatability") or {"spreads": (), "runs": ()}
-    rows = []
-    for one in found["runs"] if any(spread["width"] for spread in found["spreads"]) else ():
+    found, rows = document.get("repeatability"), []
+    for one in found["runs"] if found and not repeats(document) else ():
         own = [
             f"{_signed(one[name], one[f'{name}_std'])} (± {percent_of(one[f'{name}_band']).removesuffix(' %')})"
             for name in ("frequency", "damping")
         ]
-        outlies = "deviates far beyond the others" if one["id"] == found["outlier"] else ""
+        outlies = "deviates far beyond the others" if found and one["id"] == found["outlier"] else ""
         rows.append((one["id"], "on" if one["windy"] else "off", *own, outlies))
     marked = any(row[-1] for row in rows)
     heads = ["run", "wind", "frequency [%]", "damping [%]", ""]

@@ -135,7 +135,7 @@ def undecided_words(document: Document) -> str:
     most_named = settings_of(document).words.answers_named
     channels = {kind.name: kind.channel for kind in known_effects()}
     effects = {name: common["effects"][name] for name in without_scatter(common["effects"])}
-    named = {channels[name] for name in common["effects"]}
+    named = {channels[name] for name in effects}
     parts = [f"contain {plain(name)} ({probability(value)})" for name, value in effects.items()]
     for name, value in common["channels"].items():
         if name not in named:
