@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from diagnosis.words.remainder import closable_words
 from diagnosis.words.scatter import repeatability_line, repeatability_table, scatter_words, width_text
 from diagnosis.words.tables import (
     candidates_table,
@@ -167,3 +168,14 @@ def test_every_run_is_listed_against_the_model(given: Document) -> None:
     given["repeatability"] = None
     assert repeatability_line(given) == ""
     assert not repeatability_table(given).rows
+
+
+def test_what_could_be_closed_of_an_undecided_gap_is_beyond_the_scatter(given: Document) -> None:
+    given["closable"] = {
+        "excess": 1.2, "ceilings": [{"kind": "angle", "closed": 0.85, "std": 0.02, "held_out": "runs"}],
+        "kind": "angle", "words": "", "events": [], "curve": None, "law": None, "alike": [], "next_most": None,
+        "line": None,
+    }  # fmt: skip
+    assert "% of what the causes leave could be closed" in closable_words(given)
+    given["decided"] = False
+    assert "% of the gap beyond the scatter between runs could be closed" in closable_words(given)

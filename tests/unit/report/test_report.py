@@ -242,7 +242,7 @@ def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
     path = write_report(bare, data, tmp_path / "report.html")
     text = path.read_text("utf-8")
     assert document["where"]["words"] in Page(text).text
-    assert text.count("<svg") == 5
+    assert text.count("<svg") == 6
 
 
 def test_no_gap_is_said_so(document, written):
