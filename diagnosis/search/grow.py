@@ -72,6 +72,9 @@ def going_on(
     ranked = sorted(children, key=lambda h: -scale.weight(h))
     if not ranked or not _may_gain(ranked[0], scale):
         return []
+    best = max((*ranked, *parents), key=scale.weight)
+    if best.explains_runs:  # what differs between runs is left: another effect may explain it, beside this set
+        return [best] if best in ranked else []
     going = []
     for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
         smaller = [h for h in parents if set(h.effects) < set(child.effects)]
@@ -137,7 +140,7 @@ def _worth_fitting(
             for start in item[1]
         )
     )
-    if parent.effects:
+    if parent.effects or parent.explains_runs:
         needed, own = [], own_gain(parent.fit.problem)
         for kind, starts in scored[: chosen.grown_by]:
             by_chance = own_gain(starts[0].problem) - own

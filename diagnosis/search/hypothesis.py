@@ -82,6 +82,15 @@ class Hypothesis:
                 found[CHANNELS.index(channel)] += gain * count
         return found
 
+    @cached_property
+    def explains_runs(self) -> bool:
+        """Whether runs that differ by chance are explained, each by itself, down to what chance leaves."""
+        if not self.fit.problem.scatter:
+            return False
+        found, weighing = misfit(self.fit), self.fit.settings.weighing
+        by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * found.count)
+        return bool(np.all(found.excess < by_chance))
+
     def fitted_set(self, nominal: Fit, *, outside: bool = False) -> FittedSet:
         """What the weighing needs to know of it; the share is of the gap that ``nominal`` leaves.
 

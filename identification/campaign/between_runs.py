@@ -215,7 +215,7 @@ class UsualWidths:
     mechanical_damping: float = 0.01
     decades: float = 1.0
     least: float = 1e-3
-    most: float = 30.0
+    most: float = 20.0
 
     def prior(self, names: Sequence[str], stated: Mapping[str, float]) -> WidthPrior:
         """What is known of the widths of some deviations.
