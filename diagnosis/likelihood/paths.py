@@ -63,8 +63,8 @@ class Path:
     def fitted(self) -> Places:
         """The places of the fitted motion, in which no error of the reading is.
 
-        Along the measured path an error in proportion to the angle would be the residual itself, whatever causes it:
-        what is not residual is the release's.
+        Along the measured path an error in proportion to the angle would be the residual itself, whatever causes
+        it: what is not residual is the release's.
         """
         angle, rate = self._fitted
         return Places(angle, rate, self.time, self.stiffness, self.speed)
