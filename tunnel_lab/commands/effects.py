@@ -28,6 +28,10 @@ ABOUT_DIRECTIONS = (
     "Ca = ½ρVAl² Cnr; y is the reading."
 )
 """The sign convention of the equations."""
+_NOT_COMPARED = (
+    "Not compared with other effects: it is found in the records, in their spectra or in how runs differ, not in "
+    "the motion of a run."
+)
 _PAGE_HEAD = """# Effects
 
 <!-- Written by `tunnel effects --markdown docs/reference/effects.md`: change the registry, not this page. -->
@@ -104,12 +108,16 @@ def run(
         from tunnel_sim.engine.effect_laws import check
 
         own = effect_class(checked)
-        verdicts, seen = check(own), identifiability(own)
-        for law, fault in [*((v.law, v.fault) for v in verdicts), (seen.LAW, seen.fault)]:
+        laws = [(verdict.law, verdict.fault) for verdict in check(own)]
+        lines = [_NOT_COMPARED]
+        if own.fitted:
+            seen = identifiability(own)
+            laws, lines = [*laws, (seen.LAW, seen.fault)], seen.lines()
+        for law, fault in laws:
             say(f"violated: {law}: {fault}." if fault else f"obeyed: {law}.")
-        for line in seen.lines():
+        for line in lines:
             say(line)
-        if seen.fault or any(v.fault for v in verdicts):
+        if any(fault for _, fault in laws):
             raise typer.Exit(1)
         return
     if checked is not None:

@@ -156,3 +156,15 @@ def test_bad_effects_are_one_line_and_leave_nothing(
     assert err.count("\n") == 1
     assert part in err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in ALL_EFFECTS if not kind.fitted], ids=lambda kind: kind.name
+)
+def test_a_check_does_not_compare_the_motion_of_an_effect_that_no_fit_finds(
+    kind: type[Effect], tunnel
+) -> None:
+    status, out, err = tunnel("effects", "check", kind.name)
+    assert (status, err) == (0, "")
+    assert "violated" not in out
+    assert "Not compared with other effects" in " ".join(out.split())
