@@ -304,6 +304,24 @@ def test_an_open_set_is_scored_and_said_to_be_open(blind, quick, capsys):
     assert "not a blind test" in capsys.readouterr().out
 
 
+def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypatch):
+    monkeypatch.setattr(answer, "simulate_set", lambda *_, **__: [])
+    for words, made in (
+        ([], (0.5, "mixed", 0.5, 0.5)),
+        (["--scatter", "0"], (0.0, "mixed", 0.5, 0.5)),
+        (["--scatter", "1", "--scatter-level", "usual", "--scatter-normal", "1", "--stated", "0"],
+         (1.0, "usual", 1.0, 0.0)),
+    ):  # fmt: skip
+        folder = tmp_path / str(made)
+        assert (
+            main(["blind", "make", str(folder), "--count", "2", "--seed", "1", "--kinds", "none", *words])
+            == 0
+        )
+        said = json.loads((folder / "key.json").read_text())["made_with"]
+        assert tuple(said[n] for n in ("scatter", "scatter_level", "scatter_normal", "stated")) == made
+    assert main(["blind", "make", str(tmp_path / "x"), "--seed", "1", "--scatter", "1.5"]) == 2
+
+
 @pytest.mark.parametrize(
     ("words", "part"),
     [
