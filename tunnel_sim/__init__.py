@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tunnel_sim.files.plan_file import load_plan, paper_plan
     from tunnel_sim.files.rig_file import load_rig
     from tunnel_sim.physics.run_settings import RunSettings
+    from tunnel_sim.vocabulary.between_runs import Scatter
     from tunnel_sim.vocabulary.campaign import (
         Campaign,
         Repeatability,
@@ -46,6 +47,7 @@ else:
             ".files.plan_file": "load_plan paper_plan",
             ".files.rig_file": "load_rig",
             ".physics.run_settings": "RunSettings",
+            ".vocabulary.between_runs": "Scatter",
             ".vocabulary.campaign": "Campaign Repeatability RigProperties Run SensorProperties",
             ".vocabulary.errors": "TunnelError",
             ".vocabulary.plan": "AeroDerivatives CampaignPlan Condition EffectSetting SensorModel Truth",
@@ -68,6 +70,7 @@ __all__ = [
     "RigProperties",
     "Run",
     "RunSettings",
+    "Scatter",
     "SensorModel",
     "SensorProperties",
     "Truth",
