@@ -43,7 +43,8 @@ def draw_departures(
         if rng.random() >= (1.0 if name in certain else probability):
             continue
         changed = change(rng, found)
-        while mains and not _shows_mains(changed):
+        shown = mains and _shows_mains(found)  # else no change may help, and none is drawn again
+        while shown and not _shows_mains(changed):
             changed = change(rng, found)
         found = changed
     return found

@@ -132,6 +132,13 @@ def test_a_hum_is_drawn_where_every_run_shows_it():
                 assert 16.0 <= place <= 0.5 * rate - 2.0
 
 
+def test_a_hum_that_no_change_can_show_is_not_drawn_for_ever():
+    """Mains at 15.5 Hz of a rig as fast as this lie beyond no third harmonic, whatever the durations are."""
+    fast = replace(RIG, time_scale=0.31)
+    found = draw_departures(np.random.default_rng(1), fast, certain=("durations_differ",), mains=True)
+    assert np.ptp(found.kept) > 0.0
+
+
 def test_a_zero_of_every_run_is_stated_and_a_common_one_is_not():
     for c, zero in ((RIG, None), (changed("zeros_differ"), "per_run")):
         draw = CampaignDraw("none", c, (), 1)
