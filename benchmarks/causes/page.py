@@ -207,7 +207,9 @@ def _scatter_table(found: Sequence[Mapping[str, Any]]) -> list[str]:
         "\n## Runs that do not repeat exactly\n",
         f"Version {_SCATTERING} of the set (seed {edition.seed}) has {sum(edition.counts.values())} campaigns. In "
         "most of them wind speed, springs or damping differ from run to run by chance. Sets are exact whether "
-        "scatter is named or not; how it is named stands beside them.\n",
+        "scatter is named or not; how it is named stands beside them."
+        + ("" if OURS in [r["method"] for r in found] else " `tunnel diagnose` has not been run on it yet.")
+        + "\n",
         _table(heads, rows),
     ]
 
