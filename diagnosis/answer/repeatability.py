@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import fdtrc, stdtr
 
-from diagnosis.facts.repeatability import Repeatability, RunRepeat, Spread
+from diagnosis.facts.repeatability import Repeatability, RunRepeat, Spread, Trend
 from diagnosis.likelihood.between_runs import RunColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities
 from diagnosis.likelihood.residuals import linear_coefficients
@@ -25,7 +25,8 @@ from tunnel_sim.effects import ALL_EFFECTS
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _NUMBERS = 2  # by which a run may deviate: its frequency and its damping
-_FEWEST = 5  # runs among which one may deviate far beyond the others
+_FEWEST = 5  # runs among which one may deviate far beyond the others, or which may show a drift
+_OF_TREND = 2  # numbers of a straight line
 
 
 def repeatability(fitted: Fit) -> Repeatability | None:
@@ -43,7 +44,7 @@ def repeatability(fitted: Fit) -> Repeatability | None:
     runs = tuple(found.run(index) for index in range(len(fitted.problem.data.runs)))
     rate = fitted.settings.scatter.outlier_rate
     outliers = sorted((one for one in runs if one.p_value < rate), key=lambda one: one.p_value)
-    return Repeatability(found.spreads(), runs, outliers[0].id if outliers else "")
+    return Repeatability(found.spreads(), runs, outliers[0].id if outliers else "", found.trends())
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +115,39 @@ class _Runs:
             known, interval = data.repeatability.get(one.kind.scatters), (float(low[k]), float(high[k]))
             spreads.append(Spread(one.name, float(middle[k]), interval, known, one.shown, own))
         return tuple(spreads)
+
+    def trends(self) -> tuple[Trend, ...]:
+        """Numbers that the runs show to differ, and that follow the order of the runs.
+
+        The drift is a further common parameter: a run's own stiffness and damping change in proportion to its place
+        in the campaign. Widths are those beside it.
+        """
+        tried = [place for place in self.kept if self.scatter[place].shown]
+        rate = self.fitted.settings.scatter.trend_rate
+        found = [self._trend(place, len(tried)) for place in tried]
+        return tuple(one for one in found if one is not None and one.p_value < rate)
+
+    def _trend(self, place: int, tried: int) -> Trend | None:
+        """The drift of one number; None where too few runs have it."""
+        runs, kind = self.fitted.problem.data.runs, self.scatter[place].kind
+        count = sum(run.wind_on or kind.condition == "always" for run in runs)
+        if count < _FEWEST:
+            return None
+        order = np.linspace(-0.5, 0.5, len(runs))
+        change = [t * one[:, place] for t, one in zip(order, self.columns.deviations, strict=True)]
+        columns, size = self.columns.with_column(change)
+        products = RunProducts.of(
+            [one[:, self.kept] for one in columns.deviations], columns.common, columns.seen
+        )
+        widths = likeliest_widths(products, self.prior)
+        beside = marginal(products, widths)
+        slope, std = beside.common[-1] / size, float(np.sqrt(beside.covariance[-1, -1])) / size
+        if std <= 0.0:  # nothing but the common parameters changes along the campaign
+            return None
+        # the width is known by the runs alone
+        p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
+        left = float(widths[list(self.kept).index(place)])
+        return Trend(kind.name, float(slope), std, p_value, left)
 
     def run(self, index: int) -> RunRepeat:
         """One run against the model."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from diagnosis.facts.repeatability import Repeatability
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
 from diagnosis.result import Diagnosis, Hidden, ParameterEstimate
@@ -101,7 +102,14 @@ def in_own_units(answer: Diagnosis, similarity: Similarity) -> Diagnosis:
             tolerance=found.tolerance * factor,
         ),
         next_run=None if answer.next_run is None else own_next_run(answer.next_run, similarity),
+        repeatability=answer.repeatability and own_repeatability(answer.repeatability, similarity),
     )
+
+
+def own_repeatability(given: Repeatability, similarity: Similarity) -> Repeatability:
+    """The runs' repeatability with frequencies of the measured rig; all else is relative."""
+    runs = (replace(one, frequency_hz=similarity.own(one.frequency_hz, "Hz")) for one in given.runs)
+    return replace(given, runs=tuple(runs))
 
 
 def own_parameters(

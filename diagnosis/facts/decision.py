@@ -55,6 +55,9 @@ def decision(
         if together >= chosen.credible_from:
             break
     channel_of = {kind.name: kind.channel for kind in known_effects()}
+    proper = {
+        kind.name for kind in known_effects() if not kind.scatters
+    }  # runs differ by chance beside any of them
     causes = [(set(effect.split(" + ")) & channel_of.keys(), value) for effect, value in answers]
     first, probable = answers[0][0], answers[0][1] >= chosen.decided_from
     names_effects = first not in ("none", "unknown")
@@ -65,7 +68,8 @@ def decision(
         credible=tuple(credible),
         effects=_common(causes, chosen.in_common),
         channels=_common(
-            [({channel_of[name] for name in names}, value) for names, value in causes], chosen.in_common
+            [({channel_of[name] for name in names & proper}, value) for names, value in causes],
+            chosen.in_common,
         ),
     )
 

@@ -27,6 +27,25 @@ class Spread:
 
 
 @dataclass(frozen=True)
+class Trend:
+    """A number that drifts over the campaign, run by run in the order of the runs.
+
+    Args:
+        effect: name of the scatter of that number.
+        change: of the number from the first run to the last one, relative, dimensionless.
+        std: its standard deviation, dimensionless.
+        p_value: that the order of the runs shows as much by chance, times the number of trends sought.
+        left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
+    """
+
+    effect: str
+    change: float
+    std: float
+    p_value: float
+    left: float
+
+
+@dataclass(frozen=True)
 class RunRepeat:
     """A run against the model of all runs.
 
@@ -65,8 +84,10 @@ class Repeatability:
         spreads: chance differences between the runs; empty where they repeat.
         runs: every run against the model.
         outlier: id of the run that deviates far beyond the others; empty: none.
+        trends: numbers that drift over the campaign, beyond chance.
     """
 
     spreads: tuple[Spread, ...] = ()
     runs: tuple[RunRepeat, ...] = ()
     outlier: str = ""
+    trends: tuple[Trend, ...] = ()

@@ -256,7 +256,8 @@ class Unexplained:
         """Responses to a kind's basis, by run, shape (rows, k)."""
         basis = {**COMMON, **SINGLE}[kind]
         if kind in OF_READING:
-            return [path.seen(basis(path, self.ranges) * self.ranges.angle) for path in self.paths]
+            reach = self.ranges.angle
+            return [path.seen(basis(path.fitted, self.ranges) * reach) for path in self.paths]
         return [path.response(basis(path, self.ranges)) for path in self.paths]
 
     @cached_property

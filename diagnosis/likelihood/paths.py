@@ -49,16 +49,33 @@ class Path:
         return np.asarray((np.arange(self.run.reading.size) + 0.5) * self.run.interval)
 
     @cached_property
-    def _motion(self) -> tuple[Array, Array]:
-        run = self.run
-        residual = run.unscaled(self.fit.residuals[self.index])
-        fitted = run.reading - residual - self.fit.zero(self.index)
+    def _fitted(self) -> tuple[Array, Array]:
+        run, omega = self.run, self.omega
+        fitted = run.reading - run.unscaled(self.fit.residuals[self.index]) - self.fit.zero(self.index)
         slope = np.gradient(fitted, run.interval)
-        omega = self.omega
+        if not run.derivative:
+            return fitted, slope
+        # each derivative of an oscillation leads by a quarter cycle and is ω times as large
+        angle, rate = ((-slope, fitted * omega**2), (-fitted, -slope))[run.derivative - 1]
+        return angle / omega**2, rate / omega**2
+
+    @property
+    def fitted(self) -> Places:
+        """The places of the fitted motion, in which no error of the reading is.
+
+        Along the measured path an error in proportion to the angle would be the residual itself, whatever causes
+        it: what is not residual is the release's.
+        """
+        angle, rate = self._fitted
+        return Places(angle, rate, self.time, self.stiffness, self.speed)
+
+    @cached_property
+    def _motion(self) -> tuple[Array, Array]:
+        run, omega = self.run, self.omega
+        fitted, slope = self._fitted
         if run.derivative:
-            # each derivative of an oscillation leads by a quarter cycle and is ω times as large
-            angle, rate = ((-slope, fitted * omega**2), (-fitted, -slope))[run.derivative - 1]
-            return angle / omega**2, rate / omega**2
+            return fitted, slope
+        residual = run.unscaled(self.fit.residuals[self.index])
         large = float(np.mean(self.fit.residuals[self.index] ** 2)) > _LARGE
         width = 2 * round(np.pi * (_NARROW if large else _WINDOW) / (omega * run.interval)) + 1
         if width < 5 or width > residual.size // 4:

@@ -373,6 +373,8 @@ class NominalModel:
             )
         if data.wind_on and all(run.wind_on for run in data.runs):
             found.append("whether an effect is mechanical or aerodynamic: there is no run with the wind off")
+        if len(data.runs) == 1:
+            found.append("how well runs repeat: a single run shows no scatter between runs")
         last = (_OF_WIND,) if data.wind_on else ()
         if data.driven:
             found.append("a lag of the sensor as opposed to a delay of the input: only their sum shows")

@@ -18,6 +18,7 @@ from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places,
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.model.similarity import Similarity
 from diagnosis.remainder.formula import choose, propose
+from diagnosis.search.scatter import with_scatter
 from diagnosis.search.study import Study
 from diagnosis.settings import RemainderSettings
 from diagnosis.where.excess import away_from_motion
@@ -32,7 +33,8 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     """Say how much of what the answer leaves could be closed, and by what.
 
     Args:
-        decided: whether the answer is; of an undecided one the whole gap of the nominal model is left.
+        decided: whether the answer is; of an undecided one the whole gap of the nominal model is left, beyond what
+            the runs differ by chance under the likeliest answer.
         significant: whether what remains is beyond chance.
 
     Returns:
@@ -42,7 +44,9 @@ def closable(study: Study, *, significant: bool, decided: bool = True) -> Closab
     Raises:
         LinAlgError: when the equations of a kind cannot be solved.
     """
-    left, similarity = study.chosen if decided else study.nominal, study.similarity
+    similarity, left = study.similarity, study.chosen
+    if not decided:
+        left = with_scatter(study.nominal, study.chosen.problem.scatter)
     if not study.causes or not significant or study.random is not None:
         return None
     # a run of a few blocks has no row of an eighth of a cycle

@@ -190,13 +190,12 @@ def _chosen(unexplained: Unexplained, kind: str, closable: float) -> Formula | N
         return None
     of_reading, columns = kind == "reading", []
     for path in unexplained.paths:
+        at = path.fitted if of_reading else path
         places: dict[str, float | Array] = {
-            "b": path.angle, "y": path.angle, "r": path.rate, "t": path.time, "V": path.speed,
-            "Kr": path.stiffness, "omega": path.still_omega,
+            "b": at.angle, "y": at.angle, "r": at.rate, "t": at.time, "V": at.speed,
+            "Kr": at.stiffness, "omega": path.still_omega,
         }  # fmt: skip
-        values = np.column_stack(
-            [np.broadcast_to(term.value(places), path.angle.shape) for term in candidates]
-        )
+        values = np.column_stack([np.broadcast_to(term.value(places), at.time.shape) for term in candidates])
         columns.append(path.seen(values) if of_reading else path.response(values))
     size = np.maximum(np.max([np.max(np.abs(c), axis=0) for c in columns], axis=0), 1e-300)
     parts = unexplained.normals([c / size for c in columns])

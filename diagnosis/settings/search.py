@@ -248,6 +248,12 @@ class ScatterSettings:
         "convention",
         ONE_IN_1000,
     )
+    trend_rate: float = setting(
+        0.001,
+        "Rate at which runs that differ by chance are said to drift over the campaign.",
+        "convention",
+        ONE_IN_1000,
+    )
     widths_settled: float = setting(
         1.0,
         "Fall of −2 ln L from which a fit is repeated with other widths.",

@@ -134,6 +134,18 @@ class WordsSettings:
     one_wind: float = setting(
         0.02, "Ratio of powers below which nearly all of the gap needs one wind.", "judgement"
     )
+    width_known_within: float = setting(
+        10.0,
+        "Ratio of the ends of a width's interval from which the width is said to be poorly known.",
+        "convention",
+        "An order of magnitude.",
+    )
+    deviation_named: float = setting(
+        3.0,
+        "Scatter of the other runs from which the frequency or damping of an outlying run is stated.",
+        "convention",
+        unit="std",
+    )
     interval_located: float = setting(
         0.8, "Share of a range from which an interval locates nothing.", "judgement"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -219,7 +219,12 @@ ACTS_WHEN = {"always": "with or without wind", "wind_on": "only with the wind on
 
 def plain(*names: str) -> str:
     """Effect names as words: ``mains hum, free play and coulomb friction``."""
-    *first, last = (name.replace("_", " ") for name in names)
+    return listed([name.replace("_", " ") for name in names])
+
+
+def listed(parts: Sequence[str]) -> str:
+    """Parts of a sentence as a list: ``one, two and three``."""
+    *first, last = parts
     return f"{', '.join(first)} and {last}" if first else last
 
 

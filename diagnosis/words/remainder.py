@@ -7,6 +7,7 @@ from typing import Any
 from diagnosis.facts.remainder import Ceiling
 from diagnosis.settings import settings_of
 from diagnosis.words.numbers import KINDS, Document, change_up_to, noise_powers, percent, plain
+from diagnosis.words.scatter import scattering
 from identification.printing import COEFFICIENTS, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 
@@ -52,7 +53,8 @@ def closable_words(document: Document) -> str:
     if found is None:
         return ""
     named = document["causes"] != ["unknown"] and document["decided"]
-    left = "what the causes leave" if named else "the gap"
+    beyond = " beyond the scatter between runs" if scattering(document["causes"]) else ""
+    left = "what the causes leave" if named else f"the gap{beyond}"
     ceilings = [ceiling(one) for one in found["ceilings"]]
     if found["kind"] == "noise":
         chosen = settings_of(document).remainder

@@ -17,6 +17,14 @@ from diagnosis.words.numbers import (
     share,
 )
 from diagnosis.words.remainder import ceiling, closable_line
+from diagnosis.words.scatter import (
+    answer_name,
+    named_answer,
+    repeatability_line,
+    repeatability_table,
+    scattering,
+    spread_estimate,
+)
 from diagnosis.words.verdict import rival_lines
 from identification.printing import (
     COEFFICIENTS,
@@ -37,7 +45,7 @@ def candidates_table(document: Document) -> TextTable:
     for candidate in shown:
         fitted = candidate["effect"] not in ("none", "unknown")
         closed = share(candidate["closed"]) if fitted else "–"
-        name = candidate["effect"].replace(" + ", " +\n")
+        name = answer_name(candidate["effect"]).replace(" + ", " +\n")
         rows.append((name, probability(candidate["probability"]), closed))
     if left := given[len(shown) :]:
         together = sum(candidate["probability"] for candidate in left)
@@ -54,7 +62,8 @@ def parameters_table(document: Document) -> TextTable:
         owner, _, name = full.rpartition(".")
         owner = owner or answer["effect"]
         mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
-        rows.append((owner if owner != effect else "", name, estimated(given, mark)))
+        size = spread_estimate(document, owner, given) or estimated(given, mark)
+        rows.append((owner if owner != effect else "", name, size))
         effect = owner
     whose = "Parameters" if document.get("decided", True) else "Parameters of the most probable answer"
     return TextTable(f"{whose} ± one standard deviation", ("effect", "parameter", "estimate"), tuple(rows))
@@ -81,7 +90,8 @@ def waterfall_table(document: Document) -> TextTable:
     rows = []
     for step in steps if len(steps) > 1 else ():
         alone = misfit_text(document, without[step["effect"]]) if step["effect"] in without else ""
-        rows.append((step["effect"] or "nominal model", misfit_text(document, step["excess"]), alone))
+        name = answer_name(step["effect"]) if step["effect"] else "nominal model"
+        rows.append((name, misfit_text(document, step["excess"]), alone))
     title = "Gap as the causes are added, root mean square (× noise power)"
     heads = ("added", "left", "left without it alone")
     return TextTable(f"{title}, {document.get('waterfall_on', '')}", heads, tuple(rows), heads[1:])
@@ -155,6 +165,8 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         candidates_table(document),
         parameters_table(document),
         inclusion_line(document),
+        repeatability_line(document),
+        repeatability_table(document),
         waterfall_table(document),
         closable_line(document),
         closable_table(document),
@@ -169,7 +181,7 @@ def diagnosis_brief(document: Document) -> str:
     """An answer in three lines: its causes, its gap, and where to go from here."""
     gap, first = document["gap"], document["candidates"][0]
     causes = document["causes"]
-    named = plain(*causes) if causes else "no gap"
+    named = named_answer(causes).lower() if causes else "no gap"
     undecided = "" if document.get("decided", True) else "undecided, most probably "
     misfit, excess = misfit_of(document), gap["excess_before"]
     size = f"{held_out_excess(excess)} noise powers"
@@ -219,7 +231,10 @@ def inclusion_line(document: Document) -> str:
     """The effects that may be among the causes, most probable first; empty where none is probable enough."""
     least = settings_of(document).words.effect_listed
     found = sorted(document.get("inclusion", {}).items(), key=lambda item: -item[1])
-    shown = [f"{name} {probability(value)}" for name, value in found if value >= least]
+    listed = [name for name, value in found if value >= least]
+    last = scattering(listed)  # of every answer
+    likely = dict(found)
+    shown = [f"{name} {probability(likely[name])}" for name in [n for n in listed if n not in last] + last]
     return f"Among the causes, with probability: {', '.join(shown)}" if shown else ""
 
 

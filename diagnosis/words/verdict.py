@@ -21,6 +21,14 @@ from diagnosis.words.numbers import (
     unit_shown,
     windy,
 )
+from diagnosis.words.scatter import (
+    BETWEEN_RUNS,
+    named_answer,
+    repeat_steps,
+    repeats_words,
+    scattering,
+    without_scatter,
+)
 from identification.printing import COEFFICIENTS, significant, with_std
 from tunnel_sim.effects import effect_class, known_effects
 
@@ -44,12 +52,12 @@ def _answer_in_words(document: Document) -> tuple[str, str]:
     if not causes:
         return "No gap", "none"
     if not document.get("decided", True):
-        effects, channels = document["common"]["effects"], document["common"]["channels"]
+        effects, channels = without_scatter(document["common"]["effects"]), document["common"]["channels"]
         known = plain(*effects) if effects else " and ".join(f"the {name}" for name in channels)
         return f"Undecided: {known}, and more" if known else "Undecided", "open"
     if causes == _UNKNOWN:
         return "Unexplained gap", "unknown"
-    names = plain(*causes)
+    names = named_answer(causes)
     if document["ambiguous_with"]:
         return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
     if (document.get("rest") or {}).get("material"):
@@ -80,12 +88,13 @@ def verdict(document: Document, rest: str) -> str:
 def _answer(document: Document, rest: str) -> str:
     """The gap, its causes, and how far it closes with them."""
     causes, gap, found = document["causes"], document["gap"], document["found"]
-    excess = gap["excess_before"]
+    excess, repeats = gap["excess_before"], repeats_words(document)
     if not causes:
-        return (
+        said = (
             f"No gap: the nominal model explains the runs down to their noise "
             f"(mean squared residual over noise variance, minus one: {excess:+.3f})."
         )
+        return " ".join(filter(None, (said, repeats)))
     size, misfit = times_noise(excess), misfit_of(document)
     if misfit is not None:
         size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}, {size}"
@@ -93,23 +102,31 @@ def _answer(document: Document, rest: str) -> str:
     if not document["decided"]:
         said = f"There is a gap ({size}), and its cause is undecided."
         with_first = "" if causes == _UNKNOWN else f"With the first of them added, {closes}"
-        return " ".join(filter(None, (said, undecided_words(document), with_first)))
+        return " ".join(filter(None, (said, undecided_words(document), repeats, with_first)))
     if causes == _UNKNOWN:
         nearly = "" if found["nearly"] is None else _nearly(found["nearly"])
         said = "no effect is named as its cause" if nearly else "no effect of the vocabulary explains it"
-        return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest)))
-    several, sources = len(causes) > 1, []
-    for name in causes:  # what each acts on and, where the campaign can show it, whether it needs the wind
+        return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest, repeats)))
+    proper = without_scatter(causes)
+    last = (closes, rest, _immaterial(found["immaterial"]))
+    if not proper:
+        said = f"There is a gap ({size}). {repeats} With these differences allowed for,"
+        return " ".join(filter(None, (said, *last)))
+    sources = []
+    for name in proper:  # what each acts on and, where the campaign can show it, whether it needs the wind
         kind = effect_class(name)
         wind = f", with the wind {'on' if kind.condition == 'wind_on' else 'on and off'}"
         wind = wind if found["both_winds"] else ""
-        sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if several else ''}")
-    return (
+        sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
+    said = (
         f"The gap ({size}) comes {'only in part ' if document['rest']['material'] else ''}"
-        f"from {plain(*causes)} (probability {probability(document['credible'][0]['probability'])}): "
-        f"{'; '.join(sources)}. With {'them' if several else 'it'} added, {closes} "
-        f"{' '.join(filter(None, (rest, _immaterial(found['immaterial']))))}"
+        f"from {plain(*proper)} (probability {probability(document['credible'][0]['probability'])}): "
+        f"{'; '.join(sources)}."
     )
+    with_all = f"With {'them' if len(proper) > 1 else 'it'} added,"
+    if len(causes) > len(proper):
+        with_all = f"With {'them' if len(proper) > 1 else 'it'} added and these differences allowed for,"
+    return " ".join(filter(None, (said, repeats, with_all, *last)))
 
 
 def undecided_words(document: Document) -> str:
@@ -117,25 +134,33 @@ def undecided_words(document: Document) -> str:
     common, credible = document["common"], document["credible"]
     most_named = settings_of(document).words.answers_named
     channels = {kind.name: kind.channel for kind in known_effects()}
-    named = {channels[name] for name in common["effects"]}
-    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in common["effects"].items()]
+    effects = {name: common["effects"][name] for name in without_scatter(common["effects"])}
+    named = {channels[name] for name in effects}
+    parts = [f"contain {plain(name)} ({probability(value)})" for name, value in effects.items()]
     for name, value in common["channels"].items():
         if name not in named:
             parts.append(f"act on the {name} ({probability(value)})")
     said = f"The likely answers {' and '.join(parts or ['have no effect and no channel in common'])}."
     answers = []
     for one in credible[:most_named]:
-        effect = one["effect"]
-        words = "no effect of the vocabulary" if effect == "unknown" else plain(*effect.split(" + "))
-        answers.append(f"{words} ({probability(one['probability'])})")
+        answers.append(f"{_among_answers(one['effect'])} ({probability(one['probability'])})")
     if len(credible) > most_named:
         answers.append(f"{len(credible) - most_named} more")
     most = answers[0] if len(answers) == 1 else f"{', '.join(answers[:-1])} or {answers[-1]}"
     together = probability(sum(one["probability"] for one in credible))
     if document["unpredictive"]:
-        best = plain(*document["unpredictive"].split(" + ")).capitalize()
+        best = _among_answers(document["unpredictive"]).capitalize()
         said += f" {best} fits best, but does not predict readings held out of the fit."
     return f"{said} The answer is one of these, with probability {together} together: {most}."
+
+
+def _among_answers(effect: str) -> str:
+    """An answer, whose scatter between runs is said of all answers together."""
+    names = effect.split(" + ")
+    proper = without_scatter(names)
+    if effect == "unknown":
+        return "no effect of the vocabulary"
+    return plain(*proper) if proper else BETWEEN_RUNS if scattering(names) else plain(effect)
 
 
 def _nearly(found: Mapping[str, Any]) -> str:
@@ -319,6 +344,7 @@ def next_steps(document: Document) -> list[str]:
         for remark in document.get("remarks", ())
         if remark["outcome"] != "noted"
     ]
+    steps += repeat_steps(document)
     if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
         words = f"Make the run that distinguishes the answers: {run_words(run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")

@@ -8,6 +8,7 @@ from typing import Any
 
 from diagnosis.settings import WordsSettings, settings_of
 from diagnosis.words.numbers import BANDS, CONDITIONS, PLACES, Document, part, plain
+from diagnosis.words.scatter import scattering
 from identification.printing import p_text
 from tunnel_sim.effects import effect_class
 
@@ -41,10 +42,13 @@ REASONS: Mapping[str, str | Callable[[Mapping[str, Any]], str]] = {
     "damping along the decay": "the damping shifts along the decay more than the frequency does",
     "both along the decay": "the frequency and the damping shift by similar amounts along the decay",
     "frequency between runs": "each run alone is linear, but the runs' frequencies do not agree with one model: a "
-    "stated value is wrong, or a stiffness is missing",
+    "stated value is wrong, a stiffness is missing, or the runs differ by chance",
     "damping between runs": "each run alone is linear, but the runs' damping does not agree with one model",
 }
 """Why a gap is said to act on a channel, or to need wind: clauses by the kind of the reason."""
+
+
+_BETWEEN_RUNS = ("frequency between runs", "damping between runs")
 
 
 def reason(given: Mapping[str, Any]) -> str:
@@ -73,13 +77,16 @@ def where_words(document: Document) -> str:
     channel, condition = reason(place["channel"]), reason(place["condition"])
     words = PLACES.get(where["channel"] or "")
     acts = f"It acts on {words}" if words else "What it acts on cannot be determined"
+    between = place["channel"]["kind"] in _BETWEEN_RUNS and bool(scattering(document["causes"]))
+    if between:
+        acts, channel = "Most of it is between the runs", "each run alone is linear"
     if where["condition"] is None:
         parts.append(f"{acts}: {channel}; {condition}.")
     else:
         parts.append(f"{acts}: {channel}.")
         if place["wind"]:  # without runs of both winds the condition goes unsaid
             parts.append(f"It is there {CONDITIONS[where['condition']]}: {condition}.")
-    return " ".join(filter(None, (*parts, _agreement(where, place))))
+    return " ".join(filter(None, (*parts, "" if between else _agreement(where, place))))
 
 
 def _nowhere(found: Mapping[str, Any]) -> str:

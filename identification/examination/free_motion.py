@@ -120,51 +120,96 @@ class Centre:
         zero: rad (rad/s or rad/s² where the reading is a rate or an acceleration).
         std: its standard deviation, in the same unit; it includes the change along the run.
         swing: half the largest distance of two neighbouring peaks, in the same unit.
+        square: mean square of the clear swings, in that unit squared.
+        omega: angular frequency of the oscillation, rad/s.
     """
 
     run: Run
     zero: float
     std: float
     swing: float
+    square: float
+    omega: float
+
+
+_EXPLAINED_TO = (
+    0.01  # share to which a shift follows its cause: a wind holds its speed to some tenths of a per cent
+)
+_LEAST_BEYOND = 3  # runs more than numbers of the conditions, for the rest of their zeros to be compared
 
 
 def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     """Give every run its own zero where the records show that they have one, unless the campaign states it.
 
-    Only runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
-    amplitude, and in a stream at an angle on the wind.
+    Runs of equal spring, wind and swing are compared: with an asymmetric spring the centre depends on the
+    amplitude, and in a stream at an angle on the wind. So are all runs, once what such causes shift is taken out.
     """
     if campaign.sensor.zero not in (None, "auto"):
         return campaign, ()
+    found = [centre_of(run, campaign.sensor.resolution or 0.0) for run in campaign.runs]
+    centres = [centre for centre in found if centre is not None]
+    middle = float(np.median([centre.zero for centre in centres])) if centres else 0.0
+    centres = [replace(c, std=float(np.hypot(c.std, _EXPLAINED_TO * (c.zero - middle)))) for c in centres]
+    groups = _of_equal_conditions(centres)
+    scatter = sum(_scatter(group, np.ones((len(group), 1))) for group in groups)
+    freedom = sum(len(group) - 1 for group in groups)
+    words = "under equal conditions"
+    if freedom == 0 or scatter <= float(chdtri(freedom, MISFIT_RATE)):
+        shifts = _shifts(centres)
+        freedom = len(centres) - shifts.shape[1]
+        if freedom < _LEAST_BEYOND or _scatter(centres, shifts) <= float(chdtri(freedom, MISFIT_RATE)):
+            return campaign, ()
+        groups, words = [centres], "beyond what wind, spring and amplitude shift"
+    largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
+    compared = {centre.run.id for group in groups for centre in group}
+    remark = Remark(
+        Outcome.NOTED,
+        tuple(run.id for run in campaign.runs if run.id in compared),
+        f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit} "
+        f"{words}; every run of the campaign is fitted with a zero of its own",
+        "state zero = 'common' under [sensor] if the zero cannot have moved between them",
+    )
+    return replace(campaign, sensor=replace(campaign.sensor, zero="per_run")), (remark,)
+
+
+def _of_equal_conditions(centres: list[Centre]) -> list[list[Centre]]:
+    """The centres of two runs or more of equal spring, wind and swing."""
     by_condition: dict[tuple[float | None, ...], list[Centre]] = defaultdict(list)
-    for run in campaign.runs:
-        centre = centre_of(run, campaign.sensor.resolution or 0.0)
-        if centre is not None:
-            by_condition[run.spring_stiffness, run.wind_speed, run.air_density].append(centre)
-    groups, scatter = [], 0.0  # of two runs or more; weighted sum of squared distances from their means
+    for centre in centres:
+        run = centre.run
+        by_condition[run.spring_stiffness, run.wind_speed, run.air_density].append(centre)
+    groups = []
     for one in by_condition.values():
         left = sorted(one, key=lambda centre: -centre.swing)
         while left:
             alike = [centre for centre in left if centre.swing >= EQUAL_SWINGS * left[0].swing]
             left = left[len(alike) :]
             if len(alike) > 1:
-                zero = np.array([centre.zero for centre in alike])
-                weight = 1.0 / np.maximum([centre.std for centre in alike], 1e-300) ** 2
-                scatter += float(weight @ (zero - weight @ zero / weight.sum()) ** 2)
                 groups.append(alike)
-    freedom = sum(len(group) - 1 for group in groups)
-    if freedom == 0 or scatter <= float(chdtri(freedom, MISFIT_RATE)):
-        return campaign, ()
-    largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
-    compared = {centre.run.id for group in groups for centre in group}
-    remark = Remark(
-        Outcome.NOTED,
-        tuple(run.id for run in campaign.runs if run.id in compared),
-        f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit} under equal "
-        f"conditions; every run of the campaign is fitted with a zero of its own",
-        "state zero = 'common' under [sensor] if the zero cannot have moved between them",
-    )
-    return replace(campaign, sensor=replace(campaign.sensor, zero="per_run")), (remark,)
+    return groups
+
+
+def _shifts(centres: list[Centre]) -> Array:
+    """What may shift the centre of a run from a zero common to all, in columns, shape (runs, shifts).
+
+    A constant moment, one of the dynamic pressure, and the mean moment of an asymmetric spring, each over the
+    stiffness, which is in proportion to ω²; and an error of the reading in proportion to the square of the angle.
+    """
+    omega, square = (np.array([getattr(c, name) for c in centres]) for name in ("omega", "square"))
+    pressure = np.array([(c.run.air_density or 1.0) * c.run.wind_speed**2 for c in centres])
+    columns = [np.ones(len(centres)), omega**-2, pressure * omega**-2, square * omega**-2, square]
+    sized = np.column_stack([column / (np.max(np.abs(column), initial=0.0) or 1.0) for column in columns])
+    vectors, values, _ = np.linalg.svd(sized, full_matrices=False)
+    return np.asarray(vectors[:, values > 1e-6 * values.max(initial=0.0)], np.float64)
+
+
+def _scatter(centres: list[Centre], shifts: Array) -> float:
+    """Weighted sum of squares of the zeros about the shifts that fit them best."""
+    weight = 1.0 / np.maximum([centre.std for centre in centres], 1e-300)
+    zero = weight * np.array([centre.zero for centre in centres])
+    columns = weight[:, None] * shifts
+    left = zero - columns @ np.linalg.lstsq(columns, zero, rcond=None)[0]
+    return float(left @ left)
 
 
 def centre_of(run: Run, resolution: float) -> Centre | None:
@@ -179,12 +224,13 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
     frequency = starting_frequency(run.record)
     if frequency is None:
         return None
-    heights = follow_peaks(run.record, frequency, sparse=True)[1]
+    times, heights = follow_peaks(run.record, frequency, sparse=True)
     swings = 0.5 * np.abs(np.diff(heights))
     if swings.size < _LEAST_CENTRES + 1:
         return None
     middles = 0.25 * (heights[:-2] + 2.0 * heights[1:-1] + heights[2:])
-    clear = middles[swings[1:] > CLEAR_SWING * swings.max()]
+    seen = swings[1:] > CLEAR_SWING * swings.max()
+    clear = middles[seen]
     if clear.size < _LEAST_CENTRES:
         return None
     half = clear.size // 2
@@ -192,7 +238,9 @@ def centre_of(run: Run, resolution: float) -> Centre | None:
     # Neighbouring middles share two of their three peaks: half as many are independent.
     chance = float(clear.std(ddof=1)) * np.sqrt(2.0 / clear.size)
     std = float(np.linalg.norm([along, chance, resolution / np.sqrt(12.0)]))
-    return Centre(run, float(clear.mean()), std, float(swings.max()))
+    omega = np.pi * (times.size - 1) / float(times[-1] - times[0])
+    square = float(np.mean(swings[1:][seen] ** 2))
+    return Centre(run, float(clear.mean()), std, float(swings.max()), square, omega)
 
 
 _SQUARABLE = 1e100  # of the reading's unit: squares of larger readings overflow

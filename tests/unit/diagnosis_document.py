@@ -249,3 +249,84 @@ def _backbone(name: str, nominal: float) -> dict[str, Any]:
         "nominal_frequency_hz": nominal,
         "nominal_zeta": 0.011,
     }
+
+
+def scattering_document() -> dict[str, Any]:
+    """The same answer beside chance differences between the runs; one run deviates far beyond the others."""
+    given = document()
+    names = ["wind_speed_scatter", "damping_scatter"]
+    given["ambiguous_with"] = []
+    given["causes"] = sorted([CAUSE, *names])
+    effect = " + ".join(given["causes"])
+    given["candidates"][0]["effect"] = effect
+    given["candidates"][0]["parameters"] = {
+        f"{CAUSE}.coefficient": _value(0.003125, 1.7e-5, "N m s2/rad2"),
+        "wind_speed_scatter.spread": {"value": 0.00293, "std": None, "unit": "1"},
+        "damping_scatter.spread": {"value": 0.0117, "std": None, "unit": "1"},
+    }
+    given["credible"] = [{"effect": effect, "probability": 0.9123}]
+    given["waterfall"][1:1] = [{"effect": " + ".join(names), "excess": 9.25}]
+    given["repeatability"] = {
+        "spreads": [
+            _spread("wind_speed_scatter", 0.00291, (0.00132, 0.00619), {"beta": -0.00623, "gamma": 0.00514}),
+            _spread(
+                "stiffness_scatter", 0.000321, (0.00016, 0.00064), dict.fromkeys(IDS, 0.0001), shown=False
+            ),
+            _spread(
+                "damping_scatter",
+                0.0101,
+                (0.0062, 0.0185),
+                {"alpha": 0.0107, "beta": -0.0211, "gamma": 0.0023},
+            ),
+        ],
+        "runs": [
+            _repeat("alpha", 1.913, 0.01157, (-1.9e-4, 6.8e-7), (0.0105, 1.8e-4), (1.5e-4, 0.0102), 0.89),
+            _repeat("beta", 2.427, 0.01259, (-0.0119, 1.3e-6), (-0.0043, 9.7e-5), (3.9e-4, 0.0039), 2e-6),
+            _repeat("gamma", 2.531, 0.02053, (4.9e-4, 2.1e-6), (0.0017, 9.5e-5), (0.0013, 0.0033), 1.0),
+        ],
+        "outlier": "beta",
+        "trends": [],
+    }
+    return given
+
+
+def _spread(
+    effect: str,
+    width: float,
+    interval: tuple[float, float],
+    deviations: dict[str, float],
+    *,
+    shown: bool = True,
+) -> dict[str, Any]:
+    return {
+        "effect": effect,
+        "width": width,
+        "interval": list(interval),
+        "stated": None,
+        "shown": shown,
+        "deviations": deviations,
+    }
+
+
+def _repeat(
+    name: str,
+    hertz: float,
+    zeta: float,
+    frequency: tuple[float, float],
+    damping: tuple[float, float],
+    bands: tuple[float, float],
+    p_value: float,
+) -> dict[str, Any]:
+    return {
+        "id": name,
+        "windy": name != "alpha",
+        "frequency_hz": hertz,
+        "damping_ratio": zeta,
+        "frequency": frequency[0],
+        "frequency_std": frequency[1],
+        "damping": damping[0],
+        "damping_std": damping[1],
+        "frequency_band": bands[0],
+        "damping_band": bands[1],
+        "p_value": p_value,
+    }

@@ -188,7 +188,7 @@ class Answer:
     """The answer: in words, in figures, and by hand."""
 
     def __init__(self, session: Session, document: dict[str, Any]) -> None:
-        from diagnosis.words import remainder, tables, verdict
+        from diagnosis.words import remainder, scatter, tables, verdict
         from diagnosis.words.verdict import headline
         from tunnel_lab.report.view import facts
 
@@ -211,6 +211,7 @@ class Answer:
         with ui.expansion("What remains, the runs, and caveats"):
             rest, closable = remainder.rest_line(document), remainder.closable_line(document)
             show_parts([rest, closable, tables.closable_table(document)])
+            show_parts([scatter.repeatability_line(document), scatter.repeatability_table(document)])
             show_parts([tables.gap_table(document), *tables.closing_lines(document)])
         if document["gap"]["detected"]:
             ByHandPart(session, document)
@@ -219,12 +220,16 @@ class Answer:
         """The figures of the report's summary."""
 
         def drawings() -> list[str]:
+            from diagnosis.words.scatter import repeats
             from tunnel_lab.report.drawing import inline_svg
             from tunnel_lab.report.figures import waterfall_figure
             from tunnel_lab.report.page import DESCRIPTIONS
+            from tunnel_lab.report.repeatability import repeatability_figure
             from tunnel_lab.report.where import runs_figure
 
             drawn = {"waterfall": waterfall_figure(document)}
+            if not repeats(document):
+                drawn["repeatability"] = repeatability_figure(document)
             if document.get("maps"):
                 drawn["where-runs"] = runs_figure(document)
             return [

@@ -14,6 +14,8 @@ from tunnel_lab.terminal.outputs import bar, say, say_written
 from tunnel_sim.vocabulary.errors import TunnelError, library, shown
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tunnel_sim.vocabulary.campaign import Campaign, Run
 
 
@@ -38,8 +40,12 @@ EffectOption = Annotated[
 
 def plot(
     campaign: Annotated[
-        Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its fit.")
+        Path, Argument(help=f"{CAMPAIGN_HELP} Or a file of tunnel diagnose --json, for its figures.")
     ],
+    names: Annotated[
+        list[str] | None,
+        Argument(metavar="[FIGURE]...", help="Figures of a diagnosis. Default: fit and repeatability."),
+    ] = None,
     out: Annotated[
         Path, Option("--out", "-o", metavar="FOLDER", help="Where the figures go, in a subfolder.")
     ] = Path("tunnel-output"),
@@ -55,12 +61,16 @@ def plot(
 
     Of a diagnosis it writes fit-1 and so on, two runs to a page: what was
     measured, what the nominal model and the model with the causes predict, and
-    their residuals in degrees, in the cycles where the models differ most.
+    their residuals in degrees, in the cycles where the models differ most; and
+    repeatability: frequency and damping of every run minus the model's, in per
+    cent, with the scatter between runs. Other figures of the report are drawn
+    by name, such as waterfall or where-backbones.
 
     [bold]Examples[/bold]
       tunnel plot my-campaign
       tunnel plot my-campaign --out figures
       tunnel plot answer.json --run r02
+      tunnel plot answer.json repeatability waterfall
 
     [bold]Exit status[/bold]
       0 drawn, 1 no run could be identified (windows is left out), 2 bad
@@ -69,21 +79,18 @@ def plot(
     from identification import identify
     from tunnel_lab.plotting import runs as figures
     from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.report.diagnosis_file import read_document
-    from tunnel_lab.report.where import fit_pages
     from tunnel_sim.files.writing import output_folder
 
     failure = ""
     if campaign.suffix.lower() == ".json":
-        pages = fit_pages(read_document(campaign), split_names(runs))
-        if not pages:
-            remedy = "diagnose the campaign again"
-            raise TunnelError("has no curves to draw", where=shown(campaign), remedy=remedy)
-        drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
+        drawn = _of_diagnosis(campaign, names or [], split_names(runs))
         folder = output_folder(out / campaign.stem)
     else:
         if runs:
             raise TunnelError("--run is for the file of a diagnosis", remedy="leave it out for a campaign")
+        if names:
+            what = f"the figure {names[0]!r} is one of a diagnosis"
+            raise TunnelError(what, where=shown(campaign), remedy="give the file of tunnel diagnose --json")
         data = given_campaign(campaign)
         folder = output_folder(out / campaign.resolve().name)
         drawn = {f"traces-{number}": page for number, page in enumerate(figures.trace_pages(data), 1)}
@@ -97,6 +104,30 @@ def plot(
     if failure:
         say(f"Note: {failure}", stderr=True)
         raise typer.Exit(1)
+
+
+def _of_diagnosis(file: Path, names: list[str], runs: tuple[str, ...]) -> dict[str, Figure]:
+    """Figures of a diagnosis by the name of their file.
+
+    Raises:
+        TunnelError: for a figure or a run that it does not have, or a diagnosis without curves.
+    """
+    from tunnel_lab.report import draw
+    from tunnel_lab.report.diagnosis_file import read_document
+    from tunnel_lab.report.repeatability import repeatability_figure
+    from tunnel_lab.report.where import fit_pages
+
+    document, drawn = read_document(file), dict[str, "Figure"]()
+    if not names or "fit" in names:
+        pages = fit_pages(document, runs)
+        if not pages:
+            raise TunnelError(
+                "has no curves to draw", where=shown(file), remedy="diagnose the campaign again"
+            )
+        drawn = {f"fit-{number}": page for number, page in enumerate(pages, 1)}
+    drawn |= {name: draw(document, name) for name in names if name != "fit"}
+    repeats = None if names else repeatability_figure(document)
+    return drawn if repeats is None else drawn | {"repeatability": repeats}
 
 
 def spread(campaign: Campaign, count: int = 4) -> tuple[Run, ...]:

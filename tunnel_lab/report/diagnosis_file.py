@@ -130,6 +130,10 @@ class DiagnosisDocument(Document):
         default_factory=list,
         description="runs that were disturbed: run, at_s, kept_until_s (null: left out), p_value",
     )
+    repeatability: Table | None = Field(
+        default=None,
+        description="spreads, trends and the outlier of the differences between runs; every run against the model",
+    )
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")
     provenance: Table = Field(description="versions, SHA-256 of the records, and runs left out as asked")

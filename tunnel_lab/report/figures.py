@@ -11,6 +11,7 @@ import numpy as np
 
 from diagnosis.settings import settings_of
 from diagnosis.words.numbers import excess_std, plain, probability
+from diagnosis.words.scatter import answer_name
 from identification.printing import coefficient_label, significant
 from tunnel_lab.plotting.style import (
     COLOURS,
@@ -41,6 +42,7 @@ from tunnel_lab.report.drawing import (
     misfit_scale,
     run_labels,
 )
+from tunnel_lab.report.repeatability import repeatability_figure
 from tunnel_lab.report.view import WITHIN_THE_NOISE
 from tunnel_sim.vocabulary.record import Array
 
@@ -78,6 +80,7 @@ def diagnosis_figures(document: Document) -> dict[str, Figure]:
         }
     figures |= {
         "which": candidates_figure(document),
+        "repeatability": repeatability_figure(document),
         "how-far": closure_figure(document),
         "law": law_figure(document),
         "coefficients": coefficients_figure(document),
@@ -124,7 +127,7 @@ def waterfall_figure(document: Document) -> Figure | None:
     if np.isfinite(alone).any():
         label = "without this cause alone"
         axes.plot(alone, rows[:-1], "o", color=INK, mfc=PAPER, ms=_MARK, label=label)
-    names = [textwrap.fill(f"+ {plain(str(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
+    names = [textwrap.fill(f"+ {plain(answer_name(step['effect']))}", _STEP_LABEL) for step in steps[1:]]
     axes.set_yticks(rows, ["nominal model", *names, "the rest"])
     axes.set(ylim=(left.size + 0.5, -0.5), xlabel=f"root mean square misfit [{unit}]")
     axes.locator_params(axis="x", nbins=6)
@@ -187,7 +190,7 @@ def candidates_figure(document: Document) -> Figure | None:
     shown = [c for c in document["candidates"][:SHOWN] if c["probability"] >= least]
     if len(shown) < 2:
         return None
-    names = [textwrap.fill(plain(candidate["effect"]), _LABEL) for candidate in shown]
+    names = [textwrap.fill(plain(answer_name(candidate["effect"])), _LABEL) for candidate in shown]
     fig = figure(NARROW, 0.7 + 0.3 * len(shown) + 0.15 * sum(name.count("\n") for name in names))
     axes = fig.add_subplot()
     values = [candidate["probability"] for candidate in shown]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from diagnosis.words.numbers import Document, plain
 from diagnosis.words.remainder import closable_line
+from diagnosis.words.scatter import repeatability_line, repeatability_table, repeats
 from diagnosis.words.tables import (
     closable_table,
     hidden_table,
@@ -50,6 +51,7 @@ DESCRIPTIONS = {
     "where-phase-plane": "Map of the missing moment over angle and rate.",
     "where-moment": "Mean of the missing moment against the angle and against the rate.",
     "which": "Bars: probability of each answer.",
+    "repeatability": "Frequency and damping ratio of every run minus the model's, with the scatter as a band.",
     "how-far": "Misfit of every run with the nominal model and with the causes added.",
     "law": "The missing moment, or error of the reading, as a curve with its band or as a map.",
     "coefficients": "Coefficients before and after the causes are added, with 95 % intervals.",
@@ -145,6 +147,9 @@ def render_report(
         "more": other_answers(document),
         "causes": view.cause_paragraphs(document),
         "inclusion": plain(inclusion_line(document)),
+        "repeats": repeats(document),
+        "repeatability": repeatability_line(document),
+        "repeatability_table": repeatability_table(document),
         "steps": view.step_rows(document),
         "closable": closable_table(document).rows,
         "closable_words": closable_line(document),

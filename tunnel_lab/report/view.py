@@ -24,6 +24,7 @@ from diagnosis.words.numbers import (
     unit_shown,
     windy,
 )
+from diagnosis.words.scatter import answer_name, spread_estimate
 from diagnosis.words.tables import listed_answers
 from diagnosis.words.verdict import size_words
 from identification.printing import (
@@ -115,7 +116,7 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
             "name": plain(name),
             "acts": acts_on(document, name),
             "parameters": [
-                (plain(full.rpartition(".")[2]), estimate(value))
+                (plain(full.rpartition(".")[2]), spread_estimate(document, name, value) or estimate(value))
                 for full, value in answer["parameters"].items()
                 if full.partition(".")[0] == name or len(names) == 1
             ],
@@ -151,11 +152,17 @@ def candidate_rows(document: Document) -> list[dict[str, Any]]:
     """The probable answers, at least three, formatted."""
     return [
         {
-            "name": plain(c["effect"]),
+            "name": plain(answer_name(c["effect"])),
             "probability": probability(c["probability"]),
             "closed": "–" if c["effect"] in ("none", "unknown") else percent(c["closed"]),
             "excess": excess(c["excess_after"]),
-            "parameters": [(plain(n).replace(".", ": "), estimate(v)) for n, v in c["parameters"].items()],
+            "parameters": [
+                (
+                    plain(n).replace(".", ": "),
+                    spread_estimate(document, n.rpartition(".")[0] or c["effect"], v) or estimate(v),
+                )
+                for n, v in c["parameters"].items()
+            ],
         }
         for c in document["candidates"][: listed_answers(document)]
     ]
@@ -242,7 +249,7 @@ def step_rows(document: Document) -> list[dict[str, str]]:
     steps, without = document.get("waterfall", []), document.get("without", {})
     return [
         {
-            "name": plain(step["effect"] or "nominal model"),
+            "name": plain(answer_name(step["effect"])) if step["effect"] else "nominal model",
             "left": _gap(document, step["excess"]),
             "without": _gap(document, without.get(step["effect"])),
         }

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.unit.diagnosis_document import document
+from tests.unit.diagnosis_document import document, scattering_document
 from tunnel_sim.files import writing
 
 Tunnel = Callable[..., tuple[int, str, str]]
@@ -121,6 +121,27 @@ def test_plot_draws_the_fit_of_a_diagnosis(tunnel: Tunnel, tiny_campaign: Path, 
     assert "no curves to draw" in err
     status, _, err = tunnel("plot", tiny_campaign, "--run", "r01")
     assert (status, err.count("\n")) == (2, 1)
+
+
+def test_plot_draws_how_the_runs_repeat(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
+    (tmp_path / "answer.json").write_text(json.dumps(scattering_document()))
+    status, _, err = tunnel("plot", tmp_path / "answer.json", "--out", tmp_path / "all")
+    assert (status, err) == (0, "")
+    names = {path.name for path in (tmp_path / "all" / "answer").iterdir()}
+    assert names == {"fit-1.pdf", "fit-1.png", "repeatability.pdf", "repeatability.png"}
+    status, _, err = tunnel(
+        "plot", tmp_path / "answer.json", "repeatability", "waterfall", "--out", tmp_path / "two"
+    )
+    assert (status, err) == (0, "")
+    names = {path.name for path in (tmp_path / "two" / "answer").iterdir()}
+    assert names == {"repeatability.pdf", "repeatability.png", "waterfall.pdf", "waterfall.png"}
+    status, _, err = tunnel("plot", tmp_path / "answer.json", "repeatable", "--out", tmp_path / "none")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "no figure 'repeatable'; choose of its figures: " in err
+    assert not (tmp_path / "none").exists()
+    status, _, err = tunnel("plot", tiny_campaign, "repeatability", "--out", tmp_path / "none")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "is one of a diagnosis; give the file of tunnel diagnose --json" in err
 
 
 def test_plot_refuses_a_folder_that_cannot_be_made(

@@ -146,6 +146,21 @@ def test_what_differs_in_one_run_is_placed_in_it():
     assert first["to_s"] == pytest.approx(3.0, abs=0.4)
 
 
+def test_runs_that_differ_by_chance_are_no_error_of_the_reading_alike_in_all():
+    """Truth: the time of every run is stretched by its own share, so that no law of all runs exists."""
+    rng, data = np.random.default_rng(5), campaign(duration=6.0)
+    runs = []
+    for run in data.runs:
+        time = run.record.time_s
+        stretched = np.interp(time * (1.0 + rng.normal(0.0, 1e-3)), time, run.record.yaw_rad)
+        runs.append(replace(run, record=replace(run.record, yaw_rad=stretched)))
+    unexplained = Unexplained(nominal(replace(data, runs=tuple(runs))))
+    reading, between = unexplained.common("reading"), unexplained.single("between")
+    assert between.ceiling.closed > 0.95
+    assert reading.ceiling.closed < 0.5
+    assert chosen_kind({"reading": reading}, {"between": between}, Settings().remainder) == "between"
+
+
 def test_a_vibration_is_a_steady_line():
     study = study_of("platform_vibration", 0.05, frequency=7.2, seed=3.0)
     found = closable(study, significant=True)

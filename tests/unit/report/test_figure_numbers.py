@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from tests.unit.diagnosis_document import CONDITIONS, IDS, document
+from tests.unit.diagnosis_document import CONDITIONS, IDS, document, scattering_document
 from tests.unit.shown_numbers import numbers
 from tunnel_lab.plotting.style import styled
 from tunnel_lab.report import figures as answer
@@ -338,3 +338,54 @@ def test_the_band_of_a_proposed_law_holds_two_standard_deviations(given: Documen
     low_high = [(-0.1, 2.804), (-0.1, 3.196), (0.0, 0.608), (0.0, 1.392), (0.1, -2.588), (0.1, -1.412)]
     assert band(axes.collections[0]) == pytest.approx(np.array(low_high))
     assert axes.get_ylabel() == "missing moment [N m]"
+
+
+def test_every_run_is_drawn_against_the_model_with_its_band() -> None:
+    given = scattering_document()
+    fig = answer.repeatability_figure(given)
+    assert fig is not None
+    runs = given["repeatability"]["runs"]
+    for axes, name in zip(fig.axes, ("frequency", "damping"), strict=True):
+        bands = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in axes.patches]
+        assert bands == [
+            pytest.approx((-196 * run[f"{name}_band"], 196 * run[f"{name}_band"])) for run in runs
+        ]
+        drawn = {round(y): x for box in axes.containers[1:] for x, y in curve(box.lines[0])}
+        assert drawn == {row: pytest.approx(100.0 * run[name]) for row, run in enumerate(runs)}
+        for box in axes.containers[1:]:
+            for (x, y), bar in zip(curve(box.lines[0]), box.lines[2][0].get_segments(), strict=True):
+                reach = 196 * runs[round(y)][f"{name}_std"]
+                assert bar[:, 0] == pytest.approx([x - reach, x + reach])
+    assert [label.get_text() for label in fig.axes[0].get_yticklabels()] == list(IDS)  # in their order
+    # the outlying run has a mark of its own, and its deviation where it is beyond the band
+    marks = {box.get_label(): box.lines[0] for box in fig.axes[0].containers[1:]}
+    assert curve(marks["deviates far beyond"])[0][1] == IDS.index("beta")
+    assert [text.get_text() for text in fig.axes[0].texts] == ["−1.2 %"]
+    assert not [text.get_text() for text in fig.axes[1].texts][1:]
+    assert marks["wind on"].get_markerfacecolor() != marks["wind off"].get_markerfacecolor()
+
+
+def test_runs_that_repeat_have_bands_of_the_noise_and_a_single_run_no_figure() -> None:
+    given = scattering_document()
+    found = given["repeatability"]
+    found |= {"spreads": [], "outlier": ""}
+    for run in found["runs"]:
+        run |= {"frequency_band": 0.0, "damping_band": 0.0}
+    fig = answer.repeatability_figure(given)
+    assert fig is not None
+    widths = [bar.get_width() for bar in fig.axes[0].patches]
+    assert widths == [pytest.approx(2 * 196 * run["frequency_std"]) for run in found["runs"]]
+    assert "noise (95 %)" in [text.get_text() for text in fig.legends[0].get_texts()]
+    given["repeatability"]["runs"] = found["runs"][:1]
+    assert answer.repeatability_figure(given) is None
+    given["repeatability"] = None
+    assert answer.repeatability_figure(given) is None
+
+
+def test_scatter_between_runs_is_one_bar_of_the_waterfall_and_of_the_answers() -> None:
+    given = scattering_document()
+    for fig in (answer.waterfall_figure(given), answer.candidates_figure(given)):
+        assert fig is not None
+        labels = " ".join(label.get_text() for label in fig.axes[0].get_yticklabels()).replace("\n", " ")
+        assert "scatter between runs" in labels
+        assert "wind speed scatter" not in labels

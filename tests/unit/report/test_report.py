@@ -20,6 +20,7 @@ from diagnosis.result import (
     ParameterEstimate,
     RunGap,
 )
+from tests.unit.diagnosis_document import scattering_document
 from tests.unit.gap_campaigns import campaign, nominal, studied
 from tunnel_lab.report import Byline, render_report, write_report, write_summary
 from tunnel_lab.report.drawing import THEMED, inline_svg
@@ -80,7 +81,8 @@ def document(data):
         waterfall=Waterfall((Step(None, base.excess), Step(CAUSE, 0.01)), {CAUSE: base.excess}, "somewhere"),
         seconds={"nominal fit": 0.5},
     )  # fmt: skip
-    return json.loads(json.dumps(answer.to_json_dict() | {"maps": maps.to_json_dict()}, allow_nan=False))
+    drawn = {"maps": maps.to_json_dict(), "repeatability": scattering_document()["repeatability"]}
+    return json.loads(json.dumps(answer.to_json_dict() | drawn, allow_nan=False))
 
 
 @pytest.fixture(scope="module")
@@ -240,7 +242,7 @@ def test_a_document_without_maps_is_rendered_too(document, data, tmp_path):
     path = write_report(bare, data, tmp_path / "report.html")
     text = path.read_text("utf-8")
     assert document["where"]["words"] in Page(text).text
-    assert text.count("<svg") == 5
+    assert text.count("<svg") == 6
 
 
 def test_no_gap_is_said_so(document, written):
@@ -260,9 +262,22 @@ def test_a_page_that_cannot_be_written_is_one_line(document, data, tmp_path):
 
 
 def test_every_figure_is_described(document):
-    without_maps = diagnosis_figures(document | {"maps": None})
+    without_maps = diagnosis_figures(document | {"maps": None, "repeatability": None})
     assert list(without_maps) == ["waterfall", "which", "how-far", "law", "coefficients"]
     assert list(diagnosis_figures(document)) == list(DESCRIPTIONS)
+
+
+def test_how_the_runs_repeat_is_a_section_or_one_line(document, written):
+    page = written(document)
+    assert "<summary><h2>How the runs repeat</h2></summary>" in page
+    assert 'data-figure="repeatability"' in page
+    assert "deviates far beyond the others" in page
+    found = document["repeatability"]
+    page = written(document | {"repeatability": found | {"spreads": [], "outlier": ""}})
+    assert "<p>Repeatability: the runs repeat; no scatter between them shows.</p>" in page
+    assert 'data-figure="repeatability"' not in page
+    assert "How the runs repeat" not in page
+    assert "Repeatability" not in written(document | {"repeatability": None})
 
 
 def test_figures_take_the_colours_of_the_theme(page):

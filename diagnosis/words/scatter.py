@@ -1,0 +1,254 @@
+"""How the runs repeat, in sentences: by how much they differ by chance, and the run that deviates far beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from diagnosis.settings import WordsSettings, settings_of
+from diagnosis.words.numbers import Document, listed, plain, probability
+from identification.printing import TextTable, concise, significant, with_std
+from tunnel_sim.effects import ALL_EFFECTS
+
+SCATTERS = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
+"""The number that differs between runs, by the name of the scatter."""
+NUMBERS = {
+    "wind_speed": "the wind speed",
+    "spring_stiffness": "the spring",
+    "mechanical_damping": "the damping",
+}
+"""The numbers that may differ between runs, in words."""
+BETWEEN_RUNS = "scatter between runs"
+"""Chance differences between runs, of whatever number, in a few words."""
+_MEANT = (
+    "These are standard deviations between runs, with 90 % intervals; the intervals of the coefficients allow for "
+    "them."
+)
+_DRIFTS = {
+    "wind_speed": "does the lab warm up, or the fan drift?",
+    "spring_stiffness": "does the spring warm up, or creep?",
+    "mechanical_damping": "does the bearing run in, or the cable creep?",
+}
+
+
+def without_scatter(names: Iterable[str]) -> list[str]:
+    """Causes proper: those that are not chance differences between runs."""
+    return [name for name in names if name not in SCATTERS]
+
+
+def scattering(names: Iterable[str]) -> list[str]:
+    """Chance differences between runs among some causes."""
+    return [name for name in names if name in SCATTERS]
+
+
+def spreads_of(document: Document) -> list[Mapping[str, Any]]:
+    """The chance differences between the runs, as the document has them; none for a document without them."""
+    return list((document.get("repeatability") or {"spreads": ()})["spreads"])
+
+
+def repeats(document: Document) -> bool:
+    """Whether no scatter between the runs shows, and none is stated."""
+    return not any(one["width"] for one in spreads_of(document))
+
+
+def percent_of(value: float, digits: int = 2, *, sign: bool = False) -> str:
+    """A fraction in per cent, such as ``0.29 %`` or ``−0.6 %``.
+
+    Args:
+        digits: significant ones.
+        sign: whether a plus sign is written.
+    """
+    text = significant(100.0 * abs(value), digits) if value else "0"
+    return f"{'−' if value < 0.0 else '+' if sign else ''}{text} %"
+
+
+def _stated(spread: Mapping[str, Any]) -> str:
+    """What the campaign states, as it states it."""
+    return f"{100.0 * spread['stated']:.4g} %"
+
+
+def width_text(spread: Mapping[str, Any]) -> str:
+    """A width with its interval, such as ``0.29 % (0.13 to 0.62 %)``; alone where it is as stated."""
+    low, high = spread["interval"]
+    text = percent_of(spread["width"])
+    return text if low == high else f"{text} ({percent_of(low).removesuffix(' %')} to {percent_of(high)})"
+
+
+def named_answer(causes: Sequence[str]) -> str:
+    """The causes in a few words, such as ``coulomb friction, and scatter between runs``."""
+    proper = without_scatter(causes)
+    if not scattering(causes):
+        return plain(*proper)
+    return f"{plain(*proper)}, and {BETWEEN_RUNS}" if proper else BETWEEN_RUNS.capitalize()
+
+
+def answer_name(effect: str) -> str:
+    """Names of effects joined by plus signs, with every scatter between runs as one part."""
+    names = effect.split(" + ")
+    return " + ".join([*without_scatter(names), *([BETWEEN_RUNS] if scattering(names) else [])])
+
+
+def spread_estimate(document: Document, effect: str, given: Mapping[str, Any]) -> str | None:
+    """The parameter of a scatter in per cent, with its interval in the answer; None of other effects.
+
+    Args:
+        effect: that the parameter is of.
+        given: the parameter, as the document has it.
+    """
+    if effect not in SCATTERS:
+        return None
+    spread = next((one for one in spreads_of(document) if one["effect"] == effect), None)
+    return percent_of(given["value"]) if spread is None else width_text(spread)
+
+
+def repeats_words(document: Document) -> str:
+    """How the runs repeat, in sentences; empty where they do, or the document does not say."""
+    return " ".join(filter(None, (scatter_words(document), outlier_words(document))))
+
+
+def scatter_words(document: Document) -> str:
+    """By how much the runs differ by chance, and what that means; empty where they do not."""
+    spreads = spreads_of(document)
+    shown = [one for one in spreads if one["shown"]]
+    if not shown:
+        return stated_words(document)
+    trends = {one["effect"]: one for one in document["repeatability"].get("trends", ())}
+    parts = "; ".join(_differs(one, trends) for one in shown)
+    said = [f"{_start(document)}: {parts}. {_MEANT}", *map(trend_words, trends.values())]
+    return " ".join([*said, *_told_apart(spreads, settings_of(document).words)])
+
+
+def _start(document: Document) -> str:
+    if not document.get("decided", True):
+        return "Whatever the cause, the runs differ from each other by chance"
+    if without_scatter(document["causes"]):
+        return "Beside it the runs differ by chance"
+    only = "" if document["rest"]["material"] else ", and by nothing else"
+    likely = probability(document["credible"][0]["probability"])
+    return f"The runs differ from each other by chance{only} (probability {likely})"
+
+
+def _differs(spread: Mapping[str, Any], trends: Mapping[str, Any]) -> str:
+    """One number that differs: by how much, beyond what, and in which runs most."""
+    text = f"{NUMBERS[SCATTERS[spread['effect']]]} by {width_text(spread)}"
+    if spread["stated"] is not None:
+        text += f", beyond the {_stated(spread)} stated"
+    if spread["effect"] in trends:
+        return text
+    most = sorted(spread["deviations"].items(), key=lambda one: -abs(one[1]))[:2]
+    return f"{text}, {' and '.join(f'{run} {percent_of(own, 1, sign=True)}' for run, own in most)} most"
+
+
+def trend_words(trend: Mapping[str, Any]) -> str:
+    """That a number drifts over the campaign, in a sentence."""
+    number = SCATTERS[trend["effect"]]
+    change, std = 100.0 * abs(trend["change"]), 100.0 * trend["std"]
+    goes = "rises" if trend["change"] > 0.0 else "falls"
+    return (
+        f"That is not all by chance: {NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the "
+        f"last run ({_DRIFTS[number]}), and differs by {percent_of(trend['left'])} beside that."
+    )
+
+
+def stated_words(document: Document) -> str:
+    """That the runs differ no more than the campaign states; empty where it states nothing."""
+    stated = [one for one in spreads_of(document) if one["stated"]]
+    if not stated or document["causes"] == ["unknown"]:
+        return ""
+    sizes = listed([f"{NUMBERS[SCATTERS[one['effect']]]} {_stated(one)}" for one in stated])
+    return f"The runs differ from each other within what is stated ({sizes}); the intervals allow for it."
+
+
+def _told_apart(spreads: Sequence[Mapping[str, Any]], chosen: WordsSettings) -> list[str]:
+    """That the runs tell two numbers apart poorly, where they do."""
+    both = [one for one in spreads if SCATTERS[one["effect"]] in ("wind_speed", "spring_stiffness")]
+    if len(both) < 2 or not any(one["shown"] for one in both):
+        return []
+    poorly = [one for one in both if _ratio(one["interval"]) > chosen.width_known_within and one["shown"]]
+    hidden = [one for one in both if not one["shown"] and one["stated"] is None]
+    if hidden:
+        other = NUMBERS[SCATTERS[hidden[0]["effect"]]]
+        bound = percent_of(hidden[0]["interval"][1])
+        return [f"These runs do not show whether {other} differs as well; by up to {bound} it may."]
+    if poorly:
+        return [
+            "These runs tell the wind speed and the spring apart poorly: add wind-off runs, or log the wind speed."
+        ]
+    return []
+
+
+def _ratio(interval: Sequence[float]) -> float:
+    low, high = interval
+    return high / low if low > 0.0 else float("inf")
+
+
+def outlier_words(document: Document) -> str:
+    """The run that deviates far beyond the others, with its deviation; empty without one."""
+    found = document.get("repeatability") or {}
+    run = found.get("outlier")
+    if not run:
+        return ""
+    own = next(one for one in found["runs"] if one["id"] == run)
+    parts = []
+    for name in ("frequency", "damping"):
+        usual = max(own[f"{name}_band"], own[f"{name}_std"], 1e-300)
+        parts.append((abs(own[name]) / usual, f"{name} {percent_of(own[name], sign=True)}"))
+    least = settings_of(document).words.deviation_named
+    far = [text for stds, text in parts if stds >= least] or [max(parts)[1]]
+    return f"Run {run} deviates far beyond the others: {' and '.join(far)} against the model of all runs."
+
+
+def repeat_steps(document: Document) -> list[str]:
+    """What to do next about a run that deviates far beyond the others, and about numbers told apart poorly."""
+    run = (document.get("repeatability") or {}).get("outlier")
+    steps = (
+        [f"Repeat run {run}, or look for what disturbed it: it deviates far beyond the others."]
+        if run
+        else []
+    )
+    poorly = _told_apart(spreads_of(document), settings_of(document).words)
+    if poorly and "wind_speed_scatter" not in document["causes"]:  # whose advice says it too
+        steps.append("Log the wind speed of every run: the runs do not tell it from the spring.")
+    return steps
+
+
+def repeatability_line(document: Document) -> str:
+    """How well the runs repeat, in a line; empty for a document without it."""
+    found = document.get("repeatability")
+    if not found or len(found["runs"]) < 2:
+        return ""
+    if repeats(document):
+        return "Repeatability: the runs repeat; no scatter between them shows"
+    each = [f"{name} ± {_root_mean_square(found['runs'], name)}" for name in ("frequency", "damping")]
+    beyond = f"; beyond it: {found['outlier']}" if found["outlier"] else ""
+    return f"Repeatability: between runs {', '.join(each)} (one standard deviation){beyond}"
+
+
+def _root_mean_square(runs: Sequence[Mapping[str, Any]], name: str) -> str:
+    """Of the scatter of a number over the runs, in per cent."""
+    return percent_of((sum(one[f"{name}_band"] ** 2 for one in runs) / len(runs)) ** 0.5)
+
+
+def repeatability_table(document: Document) -> TextTable:
+    """Every run against the model; a table without rows where the runs repeat."""
+    found, rows = document.get("repeatability"), []
+    for one in found["runs"] if found and not repeats(document) else ():
+        own = [
+            f"{_signed(one[name], one[f'{name}_std'])} (± {percent_of(one[f'{name}_band']).removesuffix(' %')})"
+            for name in ("frequency", "damping")
+        ]
+        outlies = "deviates far beyond the others" if found and one["id"] == found["outlier"] else ""
+        rows.append((one["id"], "on" if one["windy"] else "off", *own, outlies))
+    marked = any(row[-1] for row in rows)
+    heads = ["run", "wind", "frequency [%]", "damping [%]", ""]
+    last = None if marked else -1
+    title = "Every run against the model, and its scatter by chance (one standard deviation)"
+    return TextTable(
+        title, tuple(heads[:last]), tuple(row[:last] for row in rows), ("frequency [%]", "damping [%]")
+    )
+
+
+def _signed(value: float, std: float) -> str:
+    """A deviation in per cent with its sign."""
+    text = concise(100.0 * abs(value), 100.0 * std)
+    return f"{'−' if value < 0.0 else '+'}{text}"
