@@ -73,7 +73,9 @@ def going_on(
     if not ranked or not _may_gain(ranked[0], scale):
         return []
     best = max((*ranked, *parents), key=scale.weight)
-    if best.explains_runs:  # what differs between runs is left: another effect may explain it, beside this set
+    if (
+        best.explains_runs
+    ):  # what differs between runs is left: another effect may explain it, beside this set
         return [best] if best in ranked else []
     going = []
     for child in ranked:  # may still lead on from the best it grew from: of two equal causes one closes half
