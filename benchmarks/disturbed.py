@@ -1,8 +1,9 @@
 """How often a disturbed run is named, and the causes beside it are exactly right.
 
 Run as ``python -m benchmarks.disturbed FOLDER --seed N --count C``. Campaigns of the reference simulator have none,
-one or two causes; in one run each of them there is a blow, a push or a bump of the reading, or in none with
-``--undisturbed``. Every answer is appended to ``answers.jsonl`` in the folder; a second call goes on.
+one or two causes, and in one run each of them there is a blow, a push or a bump of the reading. With
+``--undisturbed`` there is none, and only the runs accused are counted, without a search for causes. Every answer is
+appended to ``answers.jsonl`` in the folder; a second call goes on.
 """
 
 from __future__ import annotations
@@ -17,10 +18,15 @@ from typing import Any
 import numpy as np
 
 from diagnosis import diagnose
+from diagnosis.diagnosable import choose
+from diagnosis.search.investigate import nominal_study
+from diagnosis.settings import Settings
 from tunnel_reference.disturbance import DISTURBANCE, with_disturbances
 from tunnel_reference.draw import Mixture
 from tunnel_reference.make import as_campaign, draw_set, truth_of
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
+from tunnel_sim.effects import known_effects
+from tunnel_sim.files.writing import as_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
 KINDS = {"none": 1.0, "single": 2.0, "pair": 2.0}
@@ -49,9 +55,14 @@ def answered(one: Simulated, name: str) -> dict[str, Any]:
         "at_s": hit and hit.extra["at"] * scale,
         "size": hit and hit.target,
     }
-    begun = time.process_time()
+    begun, campaign = time.process_time(), as_campaign(one, name)
     try:
-        found = diagnose(as_campaign(one, name)).to_json_dict()
+        if hit is None:
+            chosen = choose(campaign, known_effects(), Settings().selection)
+            accused = nominal_study(chosen.campaign, chosen.kinds).disturbed
+            seconds = time.process_time() - begun
+            return {"name": name, "truth": truth, "disturbed": as_json(accused), "seconds": seconds}
+        found = diagnose(campaign).to_json_dict()
     except TunnelError as error:
         return {"name": name, "truth": truth, "error": str(error)}
     return {

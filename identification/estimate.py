@@ -183,11 +183,11 @@ class RunScatter:
     """How runs of equal conditions differ by chance, beyond their noise. It is in the coefficients' intervals.
 
     Args:
-        frequency: of the natural frequency, relative standard deviation, root mean square over the runs.
-        damping: of the decay rate, the same.
-        wind_speed: of the runs' own speeds, relative standard deviation; None where it is not counted.
-        spring_stiffness: of the runs' own springs, the same.
-        mechanical_damping: of the runs' own mechanical damping, the same.
+        frequency: standard deviation of the natural frequency, a fraction of it; root mean square over the runs.
+        damping: standard deviation of the decay rate, a fraction of it; root mean square over the runs.
+        wind_speed: standard deviation of the runs' own speeds, a fraction; None where it is not counted.
+        spring_stiffness: standard deviation of the runs' own springs, a fraction; None where it is not counted.
+        mechanical_damping: standard deviation of their own damping, a fraction; None where it is not counted.
         stated: those of these three that the campaign states; the others are estimated.
         covariances: what each of the three that is not None adds to the covariance of the parameters, in the
             products of their units; shape (k, p, p).

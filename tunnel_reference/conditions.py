@@ -108,6 +108,10 @@ class Conditions:
         time_start: time stamp of the first sample, s.
         gaps: stretches of every run that are not written, from and to, shares of the duration, shape (gaps, 2).
         offset: angle that is subtracted from all readings as written, rad.
+        speed_deviation: a run's own deviation of the speed, as a share of the stated one.
+        stiffness_deviation: a run's own deviation of the spring, as a share of its stiffness.
+        damping_deviation: a run's own deviation of Cr, as a share of it.
+        zero_deviation: a run's own zero less that of the campaign, which does not state it, rad.
     """
 
     spring_stiffness: Array
@@ -145,6 +149,10 @@ class Conditions:
     time_start: Array = field(default_factory=lambda: np.zeros(1))
     gaps: Array = field(default_factory=lambda: np.zeros((0, 2)))
     offset: float = 0.0
+    speed_deviation: Array = field(default_factory=lambda: np.zeros(1))
+    stiffness_deviation: Array = field(default_factory=lambda: np.zeros(1))
+    damping_deviation: Array = field(default_factory=lambda: np.zeros(1))
+    zero_deviation: Array = field(default_factory=lambda: np.zeros(1))
 
     @property
     def runs(self) -> int:
@@ -184,12 +192,18 @@ class Conditions:
     @property
     def true_stiffness(self) -> Array:
         """The springs' true stiffness, N m/rad, shape (runs,)."""
-        return self.spring_stiffness * self.stiffness_scale
+        return self.spring_stiffness * self.stiffness_scale * (1.0 + self.stiffness_deviation)
+
+    @property
+    def true_damping(self) -> Array:
+        """The mechanical damping of every run, N m s/rad, shape (runs,)."""
+        return np.broadcast_to(self.mechanical_damping * (1.0 + self.damping_deviation), (self.runs,))
 
     @property
     def true_speed(self) -> Array:
         """The true wind speed, m/s, shape (runs,)."""
-        return np.where(self.wind_on, self.wind_speed + self.speed_offset, 0.0)
+        own = self.wind_speed * self.speed_deviation
+        return np.where(self.wind_on, self.wind_speed + self.speed_offset + own, 0.0)
 
     @property
     def reference_moment(self) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tunnel_reference.between_runs import MIXED, ScatterDraw, draw_scatter
 from tunnel_reference.catalogue import Form, Group
 from tunnel_reference.conditions import Conditions
 from tunnel_reference.departures import draw_departures
@@ -125,6 +126,7 @@ class CampaignDraw:
         kind: one of ``KINDS``.
         effects: those that matter, then small ones.
         seed: of the sensor's noise.
+        scatter: differences between the runs; None where they repeat.
     """
 
     kind: str
@@ -132,6 +134,7 @@ class CampaignDraw:
     effects: tuple[EffectDraw, ...]
     seed: int
     mixture: Mixture = field(default_factory=lambda: Mixture())
+    scatter: ScatterDraw | None = None
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,9 @@ class Mixture:
             that all of them break, of `tunnel_reference.departures.DEPARTURES`.
         departures: probability that an assumption is broken, each.
         driven: whether all runs are driven, or some.
+        scatter: probability that the runs differ from each other.
+        level: of these differences, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
+        stated: probability that a campaign states its differences.
     """
 
     textbook: float = 0.5
@@ -156,6 +162,9 @@ class Mixture:
     certain: tuple[str, ...] = ()
     driven: bool = False
     departures: float = 0.0
+    scatter: float = 0.0
+    level: str = MIXED
+    stated: float = 0.5
 
     @property
     def families(self) -> tuple[str, ...]:
@@ -176,6 +185,7 @@ def draw_campaign(
     if kind not in KINDS:
         raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {kind!r}")
     mixture = mixture or Mixture()
+    (between,) = rng.spawn(1)  # of its own, so that all else is drawn alike with and without scatter
     number = NUMBERS.get(kind, 0)
     known = mixture.families
     names = draw_families(rng, number, families, known)
@@ -203,7 +213,17 @@ def draw_campaign(
     if kind in BEYOND:
         pool = _pool(BEYOND[kind], rng, mixture)
         effects = [_draw_effect(rng, pool[int(rng.integers(len(pool)))], conditions)]
-    return CampaignDraw(kind, conditions, tuple(effects), int(rng.integers(2**62)), mixture)
+    scatter = None
+    if between.random() < mixture.scatter:
+        scatter = draw_scatter(
+            between,
+            conditions.runs,
+            level=mixture.level,
+            textbook=mixture.textbook,
+            rare=mixture.rare,
+            stated=mixture.stated,
+        )
+    return CampaignDraw(kind, conditions, tuple(effects), int(rng.integers(2**62)), mixture, scatter)
 
 
 def redraw(draw: CampaignDraw) -> CampaignDraw:

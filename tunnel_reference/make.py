@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 
+from tunnel_reference.between_runs import scattered
 from tunnel_reference.conditions import (
     FRONTAL_AREA,
     NOMINAL_INERTIA,
@@ -16,7 +18,7 @@ from tunnel_reference.conditions import (
 )
 from tunnel_reference.draw import DEFAULT_SHARES, KINDS, NUMBERS, CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.severity import Simulated, read_and_fit, simulate_motions, size_separably
-from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive, Hold, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.record import Record
@@ -68,7 +70,10 @@ def _in_turn(rng: np.random.Generator, number: int, families: Sequence[str]) -> 
 
 def simulate_set(draws: Sequence[CampaignDraw], *, progress: bool = False) -> list[Simulated]:
     """Scale the effects of drawn campaigns and simulate them."""
-    sized = size_separably(draws, progress=progress)
+    sized = [
+        replace(one, conditions=scattered(one.conditions, one.scatter))
+        for one in size_separably(draws, progress=progress)  # whose excess is that of the effects alone
+    ]
     if progress:
         print(f"simulating {len(sized)} campaigns", file=sys.stderr)
     return [read_and_fit(d, motion) for d, motion in zip(sized, simulate_motions(sized), strict=True)]
@@ -118,7 +123,12 @@ def as_campaign(simulated: Simulated, name: str) -> Campaign:
             zero="per_run" if np.any(c.zero_shift) else None,
         ),
         runs=runs,
+        repeatability=Repeatability(**known) if (known := _stated(simulated.draw)) else None,
     )
+
+
+def _stated(draw: CampaignDraw) -> dict[str, float]:
+    return {} if draw.scatter is None else dict(draw.scatter.stated)
 
 
 def truth_of(simulated: Simulated) -> dict[str, Any]:
@@ -128,7 +138,8 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
     none). ``small`` lists the effects beside them that need not be found. ``severity`` is the excess after
     refitting the nominal model. ``parameters`` gives each effect's form, severity parameter with its symbol,
     secondary parameters, and the excess for which it was scaled alone; its times and moments are those before
-    ``scale`` was applied.
+    ``scale`` was applied. Where the runs differ, ``scatter`` has the standard deviations between them, ``runs``
+    every run's own deviations, and ``repeatability`` what the campaign states; ``severity`` counts them too.
     """
     draw, c = simulated.draw, simulated.draw.conditions
     mattering = [e for e in draw.effects if not e.small]
@@ -170,6 +181,7 @@ def truth_of(simulated: Simulated) -> dict[str, Any]:
             }
             for e in draw.effects
         },
+        **({} if draw.scatter is None else draw.scatter.truth(c.runs)),
     }
 
 

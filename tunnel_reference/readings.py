@@ -103,7 +103,8 @@ def read_motion(
     ordered = sorted(terms, key=lambda t: t.order)
     for term in (t for t in ordered if t.order < Order.NOISE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
-    value = value + conditions.zero + conditions.zero_shift + conditions.noise_scale * noise
+    value = value + conditions.zero + conditions.zero_shift + conditions.zero_deviation
+    value = value + conditions.noise_scale * noise
     for term in (t for t in ordered if Order.NOISE <= t.order < Order.LINE):
         value = term.law(Reading(value, motion, conditions, rng), term.params)
     if not any(t.order is Order.ROUNDING for t in ordered):

@@ -9,15 +9,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.causes.entry import About, answer_all
-from benchmarks.causes.make import CAMPAIGNS, PUBLISHED, check, make
+from benchmarks.causes.make import CAMPAIGNS, check, make, published
 from benchmarks.causes.methods import METHODS
-from benchmarks.causes.page import RESULTS, write_page
+from benchmarks.causes.page import results_of, write_page
 from benchmarks.causes.score import read_answers, score
-from benchmarks.causes.tracks import SEED, VERSION
+from benchmarks.causes.tracks import EDITIONS, VERSION
 from tunnel_sim.files.writing import write_json
 from tunnel_sim.vocabulary.errors import TunnelError
 
-SET = Path("tunnel-output") / f"causes-v{VERSION}"
+
+def _folder(given: argparse.Namespace) -> Path:
+    """The folder of the set, where none is named that of its version."""
+    folder: Path | None = given.folder
+    return Path("tunnel-output") / f"causes-v{given.version}" if folder is None else folder
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,17 +43,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _make(given: argparse.Namespace) -> None:
-    seal = make(given.folder, seed=given.seed, jobs=given.jobs)
-    if given.seed == SEED and PUBLISHED.exists():
-        check(given.folder, PUBLISHED)
-        print(f"{seal}: the published set, version {VERSION}")
+    folder, seal_of = _folder(given), published(given.version)
+    seal = make(folder, version=given.version, seed=given.seed, jobs=given.jobs)
+    if given.seed in (None, EDITIONS[given.version].seed) and seal_of.exists():
+        check(folder, seal_of)
+        print(f"{seal}: the published set, version {given.version}")
 
 
 def _run(given: argparse.Namespace) -> None:
     method = importlib.import_module(f"benchmarks.causes.methods.{given.method}")
-    answers = given.folder / "answers" / given.method
-    answer_all(method.answer, given.folder / CAMPAIGNS, answers, jobs=given.jobs, first=given.first)
-    _score_one(given.folder, answers, given.method, method.ABOUT, RESULTS / f"{given.method}.json")
+    folder, results = _folder(given), results_of(given.version)
+    answers = folder / "answers" / given.method
+    answer_all(method.answer, folder / CAMPAIGNS, answers, jobs=given.jobs, first=given.first)
+    results.mkdir(exist_ok=True)
+    _score_one(folder, answers, given.method, method.ABOUT, results / f"{given.method}.json")
 
 
 def _score(given: argparse.Namespace) -> None:
@@ -73,18 +80,19 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.causes", description=__doc__)
     commands = parser.add_subparsers(required=True)
     one = commands.add_parser("make", help="make the set")
-    one.add_argument("folder", type=Path, nargs="?", default=SET)
-    one.add_argument("--seed", type=int, default=SEED, help="another seed makes another set")
+    one.add_argument("folder", type=Path, nargs="?")
+    one.add_argument("--seed", type=int, help="another seed makes another set")
     one.set_defaults(work=_make)
     two = commands.add_parser(
         "run", help="answer with a method of this project, and score; continues where it ended"
     )
     two.add_argument("method", choices=METHODS)
-    two.add_argument("folder", type=Path, nargs="?", default=SET)
+    two.add_argument("folder", type=Path, nargs="?")
     two.add_argument("--first", type=int, help="only so many campaigns")
     two.set_defaults(work=_run)
     for command in (one, two):
         command.add_argument("--jobs", type=int, default=1, help="processes")
+        command.add_argument("--version", type=int, choices=EDITIONS, default=VERSION, help="of the set")
     three = commands.add_parser("score", help="score the answers of any entry")
     three.add_argument("folder", type=Path)
     three.add_argument("answers", type=Path)

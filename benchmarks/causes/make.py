@@ -19,36 +19,42 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from benchmarks.causes.tracks import REAL, SEED, TRACKS, VERSION, draw_all
+from benchmarks.causes.tracks import EDITIONS, REAL, VERSION, draw_all
 from diagnosis.blind.sets import file_hash, write_document
 from tunnel_sim.files.reading import read_json
 from tunnel_sim.processes import in_processes
 from tunnel_sim.vocabulary.errors import TunnelError
 
 SEAL, KEY, CAMPAIGNS = "seal.json", "key/key.json", "campaigns"
-PUBLISHED = Path(__file__).parent / f"v{VERSION}" / SEAL
 CHUNK = 10  # campaigns simulated together; larger chunks are hardly quicker
+
+
+def published(version: int = VERSION) -> Path:
+    """Where the seal of a version is published; it need not exist yet."""
+    return Path(__file__).parent / f"v{version}" / SEAL
 
 
 def make(
     out: Path,
     *,
-    seed: int = SEED,
+    version: int = VERSION,
+    seed: int | None = None,
     counts: Mapping[str, int] | None = None,
     jobs: int = 1,
     salt: str | None = None,
-    real: bool = True,
+    real: bool | None = None,
 ) -> Path:
     """Make a set; an interrupted one is continued.
 
     Args:
         out: its folder.
-        seed: of everything drawn; the same arguments give the same numbers.
-        counts: number of campaigns by track; None: those of ``TRACKS``.
+        version: of the set, of ``EDITIONS``.
+        seed: of everything drawn; the same arguments give the same numbers. None: that of the version.
+        counts: number of campaigns by track; None: those of the version.
         jobs: number of processes.
         salt: random text of the key, so that its hash cannot be found by trying truths; None: made from the
             seed, as for the published set, whose key everyone can make.
-        real: whether the packaged measured records are in it.
+        real: whether the packaged measured records are in it; None: as the version says.
 
     Returns:
         The seal's file.
@@ -58,7 +64,9 @@ def make(
     """
     if (out / SEAL).exists():
         raise TunnelError("holds a finished set", where=str(out), remedy="name another folder")
-    counts = {name: track.count for name, track in TRACKS.items()} if counts is None else counts
+    edition = EDITIONS[version]
+    seed = edition.seed if seed is None else seed
+    counts = edition.counts if counts is None else counts
     drawn = draw_all(seed, counts)
     todo = [(i, seed, dict(counts)) for i in range(0, len(drawn), CHUNK)]
     (out / ".making").mkdir(parents=True, exist_ok=True)
@@ -67,10 +75,10 @@ def make(
     truths: dict[str, Any] = {}
     for first, *_ in todo:
         truths |= read_json(out / ".making" / f"{first}.json", remedy="make the set again")
-    if real:
+    if edition.real if real is None else real:
         truths |= _copy_records(out / CAMPAIGNS)
-    salt = hashlib.sha256(f"causes v{VERSION} {seed}".encode()).hexdigest() if salt is None else salt
-    made_with = {"version": VERSION, "seed": seed, "counts": dict(counts)}
+    salt = hashlib.sha256(f"causes v{version} {seed}".encode()).hexdigest() if salt is None else salt
+    made_with = {"version": version, "seed": seed, "counts": dict(counts)}
     (out / KEY).parent.mkdir(exist_ok=True)
     key = write_document(
         out / KEY, {"schema_version": 1, "salt": salt, "made_with": made_with, "truths": truths}
@@ -172,7 +180,9 @@ def truths_by_track(key: Mapping[str, Any]) -> dict[str, list[str]]:
     Args:
         key: its document.
     """
-    found: dict[str, list[str]] = {name: [] for name in (*TRACKS, REAL)}
+    found: dict[str, list[str]] = {
+        name: [] for name in (*(n for e in EDITIONS.values() for n in e.tracks), REAL)
+    }
     for name, truth in key["truths"].items():
         found[truth["track"]].append(name)
     return {track: sorted(names) for track, names in found.items() if names}

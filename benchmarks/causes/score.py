@@ -16,9 +16,9 @@ import numpy as np
 
 from benchmarks.causes.entry import NAMES, UNKNOWN, About
 from benchmarks.causes.make import SEAL, truths_by_track
-from benchmarks.causes.tracks import VERSION
 from diagnosis.blind.cases import NAMES as COEFFICIENTS
-from diagnosis.blind.cases import Case, case, found_by_group, inclusions
+from diagnosis.blind.cases import SCATTERING, Case, case, found_by_group, inclusions
+from diagnosis.blind.scatter import scatter_score
 from diagnosis.blind.score import calibration, smooth_calibration
 from identification.statistics import Proportion
 from tunnel_sim.files.reading import as_described
@@ -55,11 +55,11 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
 
 def _check(answer: Mapping[str, Any]) -> None:
     """The rules of the schema that a score depends on, without a validator's package."""
-    labels = {*NAMES, UNKNOWN}
+    labels = {*NAMES, UNKNOWN, *SCATTERING}
     named = answer["causes"] or []
     if not labels >= set(named) or not labels >= set(answer["probability"]):
         raise ValueError("names a cause outside the vocabulary")
-    if UNKNOWN in named and len(named) > 1:
+    if UNKNOWN in named and set(named) - {UNKNOWN, *SCATTERING}:
         raise ValueError("'unknown' stands alone")
     values = [*answer["probability"].values(), *(s["probability"] for s in answer.get("sets", ()))]
     if not all(0.0 <= float(p) <= 1.0 for p in values):
@@ -113,10 +113,25 @@ def as_case(name: str, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> C
         ],
         "inclusion": {n: float(answer["probability"].get(n, 0.0)) for n in NAMES} if own is not None else {},
         "coefficients": answer.get("coefficients", {}),
+        "repeatability": {"spreads": _spreads(answer.get("scatter", {}))},
         "gap": {"closed": 0.0},  # not asked of an entry
         "wall_s": float(answer.get("seconds", 0.0)),
     }
     return case(name, truth, document)
+
+
+def _spreads(scatter: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What an entry says of the scatter between runs, as a diagnosis has it."""
+    effects = {number: name for name, number in SCATTERING.items()}
+    return [
+        {
+            "effect": effects[number],
+            "width": one["value"],
+            "interval": one["interval_90"],
+            "shown": one["named"],
+        }
+        for number, one in scatter.items()
+    ]
 
 
 def log_score(cases: Sequence[Case]) -> float | None:
@@ -204,7 +219,7 @@ def score(
     text = json.dumps(answers, sort_keys=True).encode()
     return {
         "schema_version": 1,
-        "version": VERSION,
+        "version": key["made_with"]["version"],
         "method": name,
         "title": about.title,
         "setting": about.setting,
@@ -215,6 +230,7 @@ def score(
         "answered": len(every),
         "of": len(key["truths"]),
         "all": figures(every),
+        "scatter": as_json(scatter_score(every)) if any(c.scatter.widths for c in every) else None,
         "found_of_nameable": Proportion.of(nameable).to_json_dict(),
         "tracks": tracks,
         "cases": {

@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tunnel_reference.between_runs import MIXED
 from tunnel_reference.draw import CampaignDraw, Mixture, draw_campaign
 from tunnel_reference.forms import FAMILIES
 from tunnel_reference.make import plan_kinds
 
-VERSION = 1
-SEED = 20271001
 REAL = "real"
 _ANY = {"single": 0.4, "pair": 0.25, "three": 0.15, "none": 0.1, "outside": 0.1}
 _RANDOM = ("buffeting", "vortex_shedding")
@@ -28,6 +27,10 @@ class Track:
         certain: circumstances of every campaign, of `tunnel_reference.draw.CIRCUMSTANCES`.
         first: families of which one acts in every campaign, in turn; empty: all.
         about: what it is, in a few words.
+        scatter: whether the runs differ by chance.
+        level: of the scatter, of `tunnel_reference.between_runs.LEVELS`, or ``mixed``.
+        stated: share of campaigns that state their scatter.
+        textbook: share of textbook forms, of effects and of the distribution of the scatter, which is normal.
     """
 
     count: int
@@ -35,6 +38,10 @@ class Track:
     about: str
     certain: tuple[str, ...] = ()
     first: tuple[str, ...] = field(default=())
+    scatter: bool = False
+    level: str = MIXED
+    stated: float = 0.0
+    textbook: float = 0.5
 
 
 TRACKS: Mapping[str, Track] = {
@@ -52,7 +59,52 @@ TRACKS: Mapping[str, Track] = {
         16, _ANY, "coloured noise; rounded or jittered time stamps", ("coloured", "uneven_stamps")
     ),
 }  # fmt: skip
-"""The simulated tracks; the packaged measured records are one more, ``real``."""
+"""The simulated tracks of version 1; the packaged measured records are one more, ``real``."""
+
+_SCATTERING: Mapping[str, Track] = {
+    "scatter_alone": Track(
+        16, {"none": 1.0}, "runs that differ by chance, and nothing else", scatter=True, level="usual", textbook=1.0
+    ),
+    "scatter_stated": Track(
+        16, {"none": 1.0}, "the same, and the campaign states by how much", scatter=True, stated=1.0, textbook=1.0
+    ),
+    "beside_scatter": Track(
+        24, {"single": 0.6, "pair": 0.4}, "one or two effects in runs that differ by chance", scatter=True,
+        stated=0.25,
+    ),
+    "runs_that_repeat": Track(8, {"none": 0.5, "single": 0.5}, "for comparison: none or one, and runs that repeat"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Edition:
+    """A set of its own, with a seal of its own.
+
+    Args:
+        seed: of everything drawn.
+        tracks: by name.
+        real: whether the packaged measured records are in it.
+    """
+
+    seed: int
+    tracks: Mapping[str, Track]
+    real: bool
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of campaigns by track."""
+        return {name: track.count for name, track in self.tracks.items()}
+
+
+VERSION = 1
+EDITIONS: Mapping[int, Edition] = {
+    VERSION: Edition(20271001, TRACKS, True),
+    2: Edition(20281001, _SCATTERING, False),
+}
+"""The sets: version 1, and beside it version 2, of runs that do not repeat exactly."""
+
+SEED = EDITIONS[VERSION].seed
+_ALL = {name: track for edition in EDITIONS.values() for name, track in edition.tracks.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +113,7 @@ class Drawn:
 
     Args:
         name: as in the set; it says nothing of the track.
-        track: of ``TRACKS``.
+        track: of an edition.
         draw: the campaign before its effects are scaled.
     """
 
@@ -75,23 +127,31 @@ def draw_all(seed: int, counts: Mapping[str, int]) -> list[Drawn]:
 
     Args:
         seed: of all random numbers; the same arguments give the same campaigns.
-        counts: number of campaigns by track.
+        counts: number of campaigns by track, all of one version.
 
     Returns:
         The campaigns by name, tracks mixed.
     """
     drawn = [(track, draw) for track, count in counts.items() for draw in _track(seed, track, count)]
-    order = np.random.default_rng([seed, len(TRACKS)]).permutation(len(drawn))
+    of = next(edition.tracks for edition in EDITIONS.values() if set(counts) <= set(edition.tracks))
+    order = np.random.default_rng([seed, len(of)]).permutation(len(drawn))
     return [Drawn(f"c{i + 1:04d}", *drawn[k]) for i, k in enumerate(order)]
 
 
 def _track(seed: int, name: str, count: int) -> list[CampaignDraw]:
     """The campaigns of a track; families come in turn, so that their frequencies differ by at most one."""
-    track, number = TRACKS[name], list(TRACKS).index(name)
+    track, number = _ALL[name], list(_ALL).index(name)
     rng = np.random.default_rng([seed, number])
     pool = np.array(track.first or FAMILIES)
     turns = [str(f) for _ in range(-(-count // len(pool))) for f in rng.permutation(pool)]
-    mixture = Mixture(variety=0.0, certain=track.certain)
+    mixture = Mixture(
+        textbook=track.textbook,
+        variety=0.0,
+        certain=track.certain,
+        scatter=float(track.scatter),
+        level=track.level,
+        stated=track.stated,
+    )
     draws = []
     for index, kind in enumerate(plan_kinds(count, dict(track.kinds))):
         families = () if kind in ("none", "outside") else (turns[index],)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -12,6 +12,8 @@ from diagnosis.facts.decision import Decision, decision
 from diagnosis.search.weigh import UNKNOWN
 from diagnosis.settings import settings_of
 from identification.statistics import Proportion
+from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.vocabulary.between_runs import SCATTERED
 
 _KINDS = ("none", "single", "pair", "three", "four")
 NAMES = ("cn_beta", "cn_r")
@@ -20,6 +22,7 @@ MODERATE = (1.0, 10.0)
 
 
 _Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+_Width = Annotated[float, Field(ge=0.0)]
 
 
 class _Read(BaseModel):
@@ -34,6 +37,10 @@ class _Scale(_Read):
 
 class _Truth(_Read):
     effects: list[str]
+    scatter: dict[str, _Width] = {}
+    scatter_level: str = ""
+    scatter_form: str = "normal"
+    repeatability: dict[str, _Width] = {}
     small: list[str] = []
     scale: _Scale = _Scale()
     few_runs: bool = False
@@ -63,8 +70,20 @@ class _Gap(_Read):
     closed: float | None = None
 
 
+class _Spread(_Read):
+    effect: str
+    width: _Width
+    interval: tuple[_Width, _Width] = Field(strict=False)
+    shown: bool
+
+
+class _Repeatability(_Read):
+    spreads: list[_Spread] = []
+
+
 class _Answer(_Read):
     causes: list[str] | None
+    repeatability: _Repeatability | None = None
     ambiguous_with: list[str] = []
     candidates: list[_Candidate] = []
     inclusion: dict[str, _Probability] = {}
@@ -74,9 +93,31 @@ class _Answer(_Read):
 
     @model_validator(mode="after")
     def _closed_where_named(self) -> _Answer:
-        if self.causes and self.causes != ["unknown"] and (self.gap is None or self.gap.closed is None):
+        causes = [name for name in self.causes or () if name not in SCATTERING]
+        if causes and causes != ["unknown"] and (self.gap is None or self.gap.closed is None):
             raise ValueError("causes without the share of the gap that they close")
         return self
+
+
+SCATTERING = {kind.name: kind.scatters for kind in ALL_EFFECTS if kind.scatters}
+"""The number that each effect between runs scatters. They are beside the causes, and are scored by themselves."""
+
+
+@dataclass(frozen=True)
+class TrueScatter:
+    """How the runs of a campaign differ.
+
+    Args:
+        widths: standard deviation between runs by number, relative; empty where the runs repeat.
+        level: of the widths, such as ``small``; empty where the truth does not say.
+        form: of the distribution.
+        stated: what the campaign states, relative, by number; empty for nothing.
+    """
+
+    widths: Mapping[str, float] = field(default_factory=dict)
+    level: str = ""
+    form: str = "normal"
+    stated: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +135,7 @@ class Case:
         few_runs: whether the protocol has few springs and speeds.
         coloured: whether the sensor's noise is coloured.
         stamps: ``even``, ``rounded`` or ``jittered``.
+        scatter: how its runs differ, beside the causes.
     """
 
     name: str
@@ -107,12 +149,27 @@ class Case:
     few_runs: bool = False
     coloured: bool = False
     stamps: str = "even"
+    scatter: TrueScatter = field(default_factory=TrueScatter)
 
     @property
     def causes(self) -> tuple[str, ...] | None:
-        """The causes answered; None where there is no answer."""
+        """The causes answered, without scatter between runs; None where there is no answer."""
         found = self.answer["causes"]
-        return None if found is None else tuple(found)
+        return None if found is None else tuple(name for name in found if name not in SCATTERING)
+
+    @property
+    def named_scatter(self) -> frozenset[str]:
+        """The numbers of the runs that are said to scatter."""
+        return frozenset(
+            {SCATTERING[name] for name in self.answer["causes"] or () if name in SCATTERING}
+            | {number for number, spread in self.spreads.items() if spread["shown"]}
+        )
+
+    @property
+    def spreads(self) -> dict[str, Mapping[str, Any]]:
+        """What is said of the scatter of each number: its ``width``, ``interval`` and whether it is ``shown``."""
+        said = (self.answer.get("repeatability") or {}).get("spreads", ())
+        return {SCATTERING[one["effect"]]: one for one in said if one["effect"] in SCATTERING}
 
     @property
     def right(self) -> bool:
@@ -155,7 +212,7 @@ class Case:
     @property
     def probability(self) -> float | None:
         """Of the answer that was given; None where it is not among the candidates."""
-        wanted = " + ".join(self.causes or ()) or "none"
+        wanted = " + ".join(self.answer["causes"] or ()) or "none"
         for candidate in self.answer.get("candidates", ()):
             if candidate["effect"] == wanted:
                 return float(candidate["probability"])
@@ -181,7 +238,7 @@ class Case:
         found = self.decision
         if found is None:
             return None
-        likely = [set(effect.split(" + ")) - {"none"} for effect, _ in found.credible]
+        likely = [set(effect.split(" + ")) - {"none", *SCATTERING} for effect, _ in found.credible]
         return any(names - set(self.small) == set(self.truth) for names in likely)
 
     @property
@@ -230,6 +287,12 @@ def case(
         few_runs=stated.few_runs,
         coloured=stated.coloured_share > 0.0,
         stamps=stated.stamps,
+        scatter=TrueScatter(
+            {name: width for name, width in stated.scatter.items() if width > 0.0 and name in SCATTERED},
+            stated.scatter_level,
+            stated.scatter_form,
+            stated.repeatability,
+        ),
     )
 
 
@@ -259,6 +322,13 @@ GROUPS: dict[str, Callable[[Case], bool]] = {
     "rounded stamps": lambda c: c.stamps == "rounded",
     "jittered stamps": lambda c: c.stamps == "jittered",
     "few runs": lambda c: c.few_runs,
+    "scatter between runs": lambda c: bool(c.scatter.widths),
+    "small scatter": lambda c: c.scatter.level == "small",
+    "large scatter": lambda c: c.scatter.level == "large",
+    "scatter, stated": lambda c: bool(c.scatter.stated),
+    "one cause beside scatter": lambda c: c.number == 1 and bool(c.scatter.widths),
+    "two causes beside scatter": lambda c: c.number == 2 and bool(c.scatter.widths),
+    "runs that repeat": lambda c: not c.scatter.widths,
     "fast rigs": lambda c: c.time_scale < MIDDLE[0],
     "middle rigs": lambda c: MIDDLE[0] <= c.time_scale <= MIDDLE[1],
     "slow rigs": lambda c: c.time_scale > MIDDLE[1],
@@ -321,11 +391,12 @@ def found_by_group(cases: Sequence[Case]) -> list[Found]:
 def inclusions(cases: Sequence[Case]) -> list[tuple[list[float], list[bool]]]:
     """By campaign, the stated probability that each effect is among the causes, and whether it is.
 
-    Small effects are left out, and so are campaigns without these probabilities.
+    Small effects and scatter between runs are left out, and so are campaigns without these probabilities.
     """
     result = []
     for c in cases:
-        stated = {name: p for name, p in c.answer.get("inclusion", {}).items() if name not in c.small}
+        beside = {*c.small, *SCATTERING}
+        stated = {name: p for name, p in c.answer.get("inclusion", {}).items() if name not in beside}
         if stated:
             result.append((list(stated.values()), [name in c.truth for name in stated]))
     return result

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.blind.cases import NAMES, Case, Found, case, found_by_group, inclusions, label
+from diagnosis.blind.scatter import ScatterScore, scatter_score
 from diagnosis.blind.sets import (
     KEY,
     SEAL,
@@ -285,6 +286,11 @@ class Score:
         wrong = [c for c in self.cases if c.number and not c.right]
         return Proportion.of([c.rival for c in wrong])
 
+    def scatter(self) -> ScatterScore | None:
+        """What is found of the scatter between runs; None where no campaign has any and none is named."""
+        asked = any(c.scatter.widths or c.named_scatter for c in self.cases)
+        return scatter_score(self.cases) if asked else None
+
     def closure(self) -> tuple[Proportion, float, float]:
         """Of campaigns named rightly: how many close 0.95 on held-out runs; median and 5th percentile closed."""
         closed = [float(c.answer["gap"]["closed"]) for c in self.cases if c.named_rightly]
@@ -342,6 +348,7 @@ class Score:
             "calibration": {"error": error, "bins": as_json(bins)},
             "found": {found.group: found.to_json_dict() for found in self.found()},
             "inclusion_calibration": as_json(self.inclusion()),
+            "scatter": as_json(self.scatter()),
             "false_alarms": as_json(self.false_alarms()),
             "missed": as_json(self.missed()),
             "rivals_named": as_json(self.rivals()),
@@ -355,7 +362,8 @@ class Score:
             "cases": [
                 {"name": c.name, "truth": list(c.truth), "small": list(c.small),
                  "causes": None if c.causes is None else list(c.causes),
-                 "probability": c.probability, "right": c.right, "severity": c.severity}
+                 "probability": c.probability, "right": c.right, "severity": c.severity,
+                 "scatter": dict(c.scatter.widths), "scatter_named": sorted(c.named_scatter)}
                 for c in self.cases
             ],
         }  # fmt: skip
@@ -412,6 +420,9 @@ def score_set(
                     "variety": float(made_with.get("variety", 0.0)),
                     "small": float(made_with.get("small", 0.0)),
                     "departures": float(made_with.get("departures", 0.0)),
+                    "scatter": float(made_with.get("scatter", 0.0)),
+                    "scatter_level": str(made_with.get("scatter_level", "mixed")),
+                    "stated": float(made_with.get("stated", 0.5)),
                 }
     else:
         open_truth = "seal the set (tunnel blind make) or put a truth.json into every campaign"

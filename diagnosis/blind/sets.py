@@ -150,6 +150,9 @@ def make_blind(
                 "small": mixture.small,
                 "driven": mixture.driven,
                 "departures": mixture.departures,
+                "scatter": mixture.scatter,
+                "scatter_level": mixture.level,
+                "stated": mixture.stated,
             },
             "truths": truths,
         }

@@ -68,14 +68,14 @@ def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:
     for name, p_value in beyond_the_others(list(seen.values()), chosen):
         one = seen[name]
         most = int(np.argmax(one.drop))
-        # a jump is seen before it happens, in fits that include it
-        first = most
+        # fits that include a large jump show it before it happens; it may begin a cycle earlier than it seems
+        first, frequency = most, resonance(nominal, index[name])
         while first > 0 and _clear(float(one.chance[first - 1]), chosen):
             first -= 1
+        last = min(float(one.time[first]), float(one.time[most]) - 1.0 / frequency)
         begun = float(stamps[name][0]) + similarity.own(runs[name].start, "s")
-        at, until = (begun + similarity.own(float(one.time[place]), "s") for place in (most, first))
-        cycles = one.time[first] * resonance(nominal, index[name])
-        kept = until if cycles >= chosen.disturbed_kept else None
+        at, until = (begun + similarity.own(time, "s") for time in (float(one.time[most]), last))
+        kept = until if last * frequency >= chosen.disturbed_kept else None
         found.append(Disturbance(name, at, kept, p_value))
     return tuple(sorted(found, key=lambda one: one.run))
 

@@ -19,8 +19,7 @@ from diagnosis.likelihood.residuals import linear_coefficients, resonance
 from tunnel_sim.vocabulary.record import Array
 
 _ROWS = 24  # per cycle, to which readings are averaged: nothing above the third harmonic is fitted
-_HALF = 2.0  # cycles on either side of an instant that are fitted
-_EDGE = 1.5  # cycles at either end of a record in which a jump cannot be distinguished from the release
+_HALF = 2.0  # cycles on either side of an instant that are fitted; nearer to an end no jump is sought
 _APART = 0.25  # cycles between the instants
 _FEWEST = 6.0  # cycles of a run in which jumps are sought
 _SMOOTH, _SLOW = 4, 2  # orders of the slow change of amplitude and phase, the first time and then
@@ -149,7 +148,7 @@ def _of_run(fit: Fit, index: int) -> Jumps | None:
     cycles = motion.cycles
     if not cycles[-1] > _FEWEST or not np.all(np.diff(cycles) > 0.0):
         return None
-    instants = np.arange(_EDGE, cycles[-1] - _EDGE, _APART)
+    instants = np.arange(_HALF, cycles[-1] - _HALF, _APART)
     drop, left, freedom = np.array(list(_compared(motion, instants))).T
     everywhere = float(np.quantile(drop, 0.25)) / _QUARTILE
     scaled = drop / np.maximum(np.maximum(left, everywhere), 1.0)

@@ -67,11 +67,12 @@ class Marginal:
 
     Args:
         log_determinant: Σ ln|I + S Dᵀ D S|, dimensionless: what the freedom of the deviations costs.
-        quadratic: χ² with the deviations at their likeliest, and their squares over their variances.
+        quadratic: χ² with the deviations at their likeliest, and their squares over their variances; dimensionless.
         common: the likeliest δ, shape (common,).
         covariance: its covariance, shape (common, common).
         deviations: the likeliest of every run, shape (runs, k).
-        log_information: ln|H| of the normal matrix H of the common parameters, for the restricted likelihood.
+        log_information: ln|H| of the normal matrix H of the common parameters, for the restricted likelihood;
+            dimensionless.
         slope: derivative of `restricted` with respect to ln(widths), shape (k,).
     """
 
@@ -202,12 +203,13 @@ class UsualWidths:
     """What is known of the widths of runs that nobody has stated: judgements on rigs in general.
 
     Args:
-        wind_speed: a good tunnel holds its speed to some tenths of a per cent; relative, one standard deviation.
-        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; the same.
-        mechanical_damping: bearings and cables come back to a per cent; the same.
-        decades: standard deviation of log10(width): a rig ten times as good or as bad is not unusual.
-        least: least width that is considered, over the usual one.
-        most: greatest width that is considered, over the usual one.
+        wind_speed: a good tunnel holds its speed to some tenths of a per cent; a fraction, one standard deviation.
+        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; a fraction,
+            one standard deviation.
+        mechanical_damping: bearings and cables come back to a per cent; a fraction, one standard deviation.
+        decades: standard deviation of log10(width), dimensionless: a rig ten times as good or bad is not unusual.
+        least: least width that is considered, over the usual one; a ratio.
+        most: greatest width that is considered, over the usual one; a ratio.
     """
 
     wind_speed: float = 0.003

@@ -123,7 +123,12 @@ class MeasuredRuns:
         return replace(self, weights=weights)
 
     def about(self, start: Array, used: Array) -> RunProducts:
-        """The products of their columns, for corrections of φ and the used deviations."""
+        """The products of their columns, for corrections of φ and deviations.
+
+        Args:
+            start: φ, shape (p,).
+            used: places of the deviations in `DEVIATIONS`, shape (k,).
+        """
         rows = zip(self.links, self.seen, self.weights, self.moves, strict=True)
         of_runs = [(j, z - j @ start, w, d[:, used]) for j, z, w, d in rows]
         return RunProducts(
@@ -147,7 +152,7 @@ class Scatter:
         stated: those that the campaign states.
         parameters: φ, shape (p,).
         noise: covariance of φ by the noise of the runs alone, shape (p, p).
-        quadratic: χ² with the deviations at their likeliest.
+        quadratic: χ² with the deviations at their likeliest, dimensionless.
         gains: by run, how φ depends on its values, shape (p, m).
         moves: by run, of one standard deviation of each, shape (m, k).
         seen: by run, its values, shape (m,).
@@ -301,6 +306,7 @@ def ratio_limit(free: int, rate: float = policy.DIFFERENCE_RATE) -> float:
 
     Args:
         free: number of widths that are estimated, 1 or more.
+        rate: of exceeding it where no run scatters, at most; a probability.
     """
     low, high = 0.0, float(chdtri(free, rate))
     while high - low > 1e-6:  # the mixture lies between χ² of one less and of all of them

@@ -6,6 +6,7 @@ import pytest
 from identification import identify
 from identification.uncertainty.cramer_rao import campaign_bound, damped_sinusoid_bound
 from tests.reference.free_decays import RESOLUTION, TWELVE, Setting, Truth, angle_of, campaign
+from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.errors import TunnelError
 
 NAMES = ("cn_beta", "cn_r", "yaw_inertia", "mechanical_damping")
@@ -74,6 +75,42 @@ def test_campaign_bound_matches_numerical_information():
     bound = campaign_bound(data, **dict(zip(NAMES, base, strict=True)), noise_std=1e-3)
     assert bound.parameters == NAMES
     np.testing.assert_allclose(np.array(bound.covariance), expected, rtol=1e-4)
+
+
+def test_the_bound_of_runs_that_scatter_is_that_of_their_marginal_distribution():
+    """Truth: the readings' own covariance, with every run's deviations as errors that its readings share."""
+    settings = (
+        *(Setting(spring, speed) for spring in (16.12, 44.84) for speed in (0.0, 20.0)),
+        Setting(21.02, 24.0),
+    )
+    data = campaign(settings, duration=2.0, rate=100.0)
+    time, base, widths = (
+        data.runs[0].record.time_s,
+        np.array([0.49, -0.11, 0.1014, 0.012]),
+        (4e-3, 7e-4, 0.02),
+    )
+
+    def reading(setting, d):
+        """By changes d of the coefficients and the zero, of the release, and of the run's own deviations."""
+        p, state, own = np.array([*base, 0.0]) + d[:5], np.array([setting.release, 0.0]) + d[5:7], d[7:]
+        truth = Truth(*p[:3], mechanical_damping=p[3] * (1.0 + own[2]))
+        spring, speed = setting.spring * (1.0 + own[1]), setting.speed * (1.0 + own[0])
+        return angle_of(Setting(spring, speed, *state), truth, time) + p[4]
+
+    information = np.zeros((5 + 2 * len(settings),) * 2)
+    for place, setting in enumerate(settings):
+        steps = 1e-6 * np.eye(10)
+        slopes = np.array([(reading(setting, step) - reading(setting, -step)) / 2e-6 for step in steps]).T
+        columns, own = np.zeros((time.size, len(information))), slopes[:, 7:] * np.array(widths)
+        columns[:, :5], columns[:, 5 + 2 * place : 7 + 2 * place] = slopes[:, :5], slopes[:, 5:7]
+        information += columns.T @ np.linalg.solve(1e-6 * np.eye(time.size) + own @ own.T, columns)
+    expected = np.linalg.inv(information)[:4, :4]
+    truth = dict(zip(NAMES, base, strict=True))
+    found = campaign_bound(data, **truth, noise_std=1e-3, repeatability=Repeatability(*widths))
+    np.testing.assert_allclose(np.array(found.covariance), expected, rtol=1e-3)
+    without = campaign_bound(data, **truth, noise_std=1e-3, repeatability=Repeatability())
+    assert without == campaign_bound(data, **truth, noise_std=1e-3)
+    assert found.std("cn_beta") > 3.0 * without.std("cn_beta")
 
 
 def test_estimate_claims_the_bound_when_the_model_is_right():

@@ -33,6 +33,8 @@ duration = 5.0
 air_density = 1.2
 truth = { cn_beta = 0.495, cn_r = -0.114, yaw_inertia = 0.1, mechanical_damping = 0.01 }
 sensor = { sample_rate = 500.0, noise_std = 0.001, resolution = 0.0, zero = 0.01 }
+scatter = { wind_speed = 0.003, mechanical_damping = 0.01, zero = 0.002, spring_stiffness_drift = -0.002 }
+repeatability = { wind_speed = 0.003, spring_stiffness = 0.0005 }
 drive = { kind = "multisine", from_hz = 0.5, to_hz = 5.0, amplitudes_nm = [0.1], hold = "zero", seed = 2 }
 
 [[effects]]
@@ -115,6 +117,7 @@ def campaign_document() -> dict[str, Any]:
         "campaign": {"name": "seed", "description": "two runs"},
         "rig": {"yaw_inertia": 0.1, "frontal_area": 0.036, "reference_length": 0.625, "width": 0.225},
         "sensor": {"sample_rate": 50.0, "resolution": 0.0005, "noise_std": 0.0005},
+        "repeatability": {"wind_speed": 0.003, "mechanical_damping": 0.01},
         "runs": [
             {"id": "r1", "file": "r1.csv", "wind_speed": 0.0, **common},
             {"id": "r2", "file": "r2.parquet", "wind_speed": 15.0, **common},

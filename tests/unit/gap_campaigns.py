@@ -109,11 +109,14 @@ def precise(data: Campaign) -> Campaign:
     return dataclasses.replace(data, runs=tuple(runs))
 
 
-def with_blow(data: Campaign, impulse: float, when: float) -> Campaign:
-    """The same campaign with a blow to every run: exact, since the nominal model is linear."""
+def with_blow(data: Campaign, impulse: float, when: float, only: str = "") -> Campaign:
+    """The same campaign with a blow to every run, or to one: exact, since the nominal model is linear."""
     area = 0.5 * 1.2 * 0.036 * 0.625
     runs = []
     for run in data.runs:
+        if only not in ("", run.id):
+            runs.append(run)
+            continue
         assert run.spring_stiffness is not None
         stiffness = run.spring_stiffness - area * run.wind_speed**2 * CN_BETA
         decay = 0.5 * (DAMPING - area * 0.625 * run.wind_speed * CN_R) / INERTIA

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +31,16 @@ to a separate key, whose salted SHA-256 is published with the data.
   tunnel blind diagnose set
   tunnel blind score set --markdown docs/blind-check.md
 """
+
+
+class ScatterLevel(StrEnum):
+    """How wide the scatter between runs is."""
+
+    MIXED = "mixed"
+    SMALL = "small"
+    USUAL = "usual"
+    LARGE = "large"
+
 
 app = typer.Typer(help=HELP, rich_markup_mode="rich", no_args_is_help=True)
 
@@ -83,6 +94,19 @@ def make(
             "noise and zeros than the standard rig's.",
         ),
     ] = 0.0,
+    scatter: Annotated[
+        float,
+        Option(
+            "--scatter", min=0, max=1, help="Share whose runs differ by chance; 0: as earlier versions drew."
+        ),
+    ] = 0.5,
+    scatter_level: Annotated[
+        ScatterLevel,
+        Option("--scatter-level", help="Widths: small or large (mixed), or the usual ones throughout."),
+    ] = ScatterLevel.MIXED,
+    stated: Annotated[
+        float, Option("--stated", min=0, max=1, help="Share of these that state a [repeatability].")
+    ] = 0.5,
     driven: Annotated[
         bool, typer.Option("--driven", help="Drive the runs, all or some, by known moments or other inputs.")
     ] = False,
@@ -94,6 +118,8 @@ def make(
     at random. It has up to four effects that matter, or one outside the vocabulary,
     in the textbook form or another, each sized to 1–100 times the noise power. No
     two of them imitate each other. Small effects beside them need not be found.
+    In half of all campaigns wind speed, springs or damping differ from run to run:
+    the causes count without that, and how it is named is scored beside them.
     Effects of an --effects-file are not drawn: they have one form only, that of the
     fits, so that finding them would not be an independent test. A folder of
     campaigns from tunnel simulate, each with its truth.json, can be diagnosed with
@@ -114,7 +140,10 @@ def make(
     with bar("writing campaigns", count) as progress:
         where = make_blind(
             out, count=count, seed=seed, shares=shares, key=key,
-            mixture=Mixture(textbook, rare, variety, small, driven=driven, departures=departures),
+            mixture=Mixture(
+                textbook, rare, variety, small, driven=driven, departures=departures,
+                scatter=scatter, level=scatter_level.value, stated=stated,
+            ),
             progress=progress,
             show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
@@ -175,7 +204,8 @@ def score(
     The output gives exact matches by kind with Wilson intervals, causes found and
     false by number of causes and by circumstances, false alarms, calibration of
     the answer and of the probabilities of the effects, closure on held-out runs,
-    errors of Cnβ and Cnr before and after, and the answers by true cause. A folder
+    errors of Cnβ and Cnr before and after, the answers by true cause, and what is
+    found of the scatter between runs. A folder
     without seal.json but with a truth.json in every campaign is scored as an open
     set and labelled as one.
 

@@ -70,7 +70,7 @@ def run(
         ),
     ] = None,
     budget: Annotated[
-        bool, Option("--budget", help="Add scatter and choice of model; show the dominant source.")
+        bool, Option("--budget", help="Add the choice of model; show the dominant source.")
     ] = False,
     uncertainties: Annotated[
         Path | None,
@@ -108,8 +108,8 @@ def run(
       tunnel identify my-campaign --uncertainties known.toml --model conventional
 
     [bold]Uncertainty[/bold]
-      By default, standard deviations are due to sensor noise only. --budget adds
-      the scatter of the runs and the choice of model. --uncertainties also adds
+      By default, standard deviations are due to sensor noise and to the scatter
+      between runs. --budget adds the choice of model. --uncertainties also adds
       those of the stated Kr, V, ρ, A and l. The combined standard uncertainty is
       then reported, and a table shows which source dominates.
 

@@ -30,6 +30,7 @@ from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.steps import follow_fastest, whole_steps
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives, SensorModel, Truth
@@ -265,7 +266,10 @@ def packaged_grid() -> Grid:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A campaign, which does not state its noise, with truth and nominal Cramér–Rao bound by quantity, SI."""
+    """A campaign, which does not state its noise, with truth and Cramér–Rao bound by quantity, SI.
+
+    The bound is that of the nominal model, with the scatter between the runs where they scatter.
+    """
 
     campaign: Campaign
     truth: Mapping[str, float]
@@ -297,7 +301,12 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
         ]
         campaign = _campaign(cell, truth, runs, rig, rng)
         states = [(release, 0.0) for _, _, release in runs]
-        bounds = campaign_bound(campaign, **vars(truth), noise_std=noise, initial_states=states)
+        scatter = Repeatability(
+            **{one.scatters: one.severity for one in effects_of(cell.effect) if one.scatters}
+        )
+        bounds = campaign_bound(
+            campaign, **vars(truth), noise_std=noise, initial_states=states, repeatability=scatter
+        )
         return Trial(campaign, dict(vars(truth)), {name: bounds.std(name) for name in bounds.parameters})
     zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))
     omega = 2.0 * np.pi * cell.frequency * (1.0 + _FREQUENCY_SPREAD * rng.uniform(-1.0, 1.0))

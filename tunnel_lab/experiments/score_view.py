@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
 """How the quantities of a score are written."""
 ABOUT = (
-    "Bound: Cramér–Rao's, of the nominal model. Worst: of the cells. In brackets: the standard error in the last "
-    "digits; after shares: their 95 % interval."
+    "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter. Worst: of the cells. In "
+    "brackets: the standard error in the last digits; after shares: their 95 % interval."
 )
 _SHOWN_WORSE = 12
 _SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")

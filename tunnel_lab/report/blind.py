@@ -89,6 +89,7 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
             "beyond a third and three times the standard rig's. Intervals take the causes of a campaign as "
             "independent.",
         ),
+        *_scatter_sections(score),
         _section(
             "Alarms",
             ("", "number", "of", "share", "95 %"),
@@ -116,6 +117,56 @@ def _answer_sections(score: Score) -> list[ScoreSection]:
             smooth,
             "Of the probability of every effect that it is among the causes. The kernel is as wide as the error "
             "that it gives (Błasiok and Nakkiran 2023); the interval is by resampling campaigns.",
+        ),
+    ]
+
+
+_SCATTER = {
+    "wind_speed": "wind speed",
+    "spring_stiffness": "spring stiffness",
+    "mechanical_damping": "mechanical damping",
+    "all": "all",
+}
+_OF_SCATTER = {
+    "named_alone": "no cause, scatter not stated: scatter named and nothing else",
+    "no_gap": "no cause, scatter as stated: nothing named",
+    "false_alarms": "runs repeat: scatter named falsely",
+    "exact": "runs scatter: causes exactly right",
+    "exact_repeating": "runs repeat: causes exactly right",
+}
+
+
+def _scatter_sections(score: Score) -> list[ScoreSection]:
+    """What is found of the scatter between runs; none where there is none."""
+    found = score.scatter()
+    if found is None:
+        return []
+    shares = ((text, getattr(found, name)) for name, text in _OF_SCATTER.items())
+    return [
+        _section(
+            "Scatter between runs",
+            ("campaigns where", "number", "of", "share", "95 %"),
+            ((text, *_share(share)) for text, share in shares if share.total),
+            "Scatter is not counted among the causes. Where there is no cause, and for the widths below, campaigns "
+            "count whose deviations are normal.",
+        ),
+        _section(
+            "Widths of the scatter",
+            (
+                "number",
+                "named where not stated",
+                "named falsely",
+                "within a factor of 1.5",
+                "in the 90 % interval",
+            ),
+            (
+                (
+                    _SCATTER[one.number],
+                    *map(_brief, (one.named, one.false, one.within)),
+                    _brief(one.covered),
+                )
+                for one in found.by_number
+            ),
         ),
     ]
 
@@ -203,6 +254,12 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
             f"--textbook {made['textbook']:g} --rare {made['rare']:g} "
             f"--variety {made['variety']:g} --small {made['small']:g}"
             + (f" --departures {made['departures']:g}" if made["departures"] else "")
+            + f" --scatter {made.get('scatter', 0.0):g}"
+            + (
+                f" --scatter-level {made['scatter_level']} --stated {made['stated']:g}"
+                if made["scatter"]
+                else ""
+            )
         ]
     lines = [
         "# Blind check",
@@ -215,6 +272,7 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         "rigs of another scale of time and moments, of few runs, with coloured noise, with rounded or jittered",
         "time stamps, or with small effects beside. Intervals are Wilson's at 95 %. This page",
         "is written by the commands below; nothing in it is typed by hand.",
+        *_ABOUT_SCATTER[: 2 * bool(score.scatter())],
         "",
         "```bash",
         *making,
@@ -244,6 +302,12 @@ def markdown(score: Score, folder: str, figures: Sequence[str] = ("", "")) -> st
         f"Columns: {', '.join(f'{number} {name}' for name, number in numbers.items())}.", "",
     ]  # fmt: skip
     return "\n".join(lines)
+
+
+_ABOUT_SCATTER = (
+    "In some campaigns the wind speed, the springs or the damping differ from run to run by chance. Causes are",
+    "counted without that, and what is found of it has a table of its own.",
+)
 
 
 def _rows(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

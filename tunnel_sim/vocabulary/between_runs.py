@@ -121,12 +121,21 @@ def between_runs(seed: np.random.SeedSequence) -> np.random.Generator:
 
 
 def together(one: float, other: float) -> float:
-    """Two relative deviations at once, dimensionless; exact where one of them is zero."""
+    """Two deviations at once; exact where one of them is zero.
+
+    Args:
+        one: relative, dimensionless.
+        other: relative, dimensionless.
+    """
     return one + other + one * other
 
 
 def along(runs: int) -> Array:
-    """How far each run is from the first to the last, from 0 to 1, shape (runs,), a fraction; 0 of a single run."""
+    """How far each run is from the first to the last, from 0 to 1, shape (runs,), a fraction; 0 of a single run.
+
+    Args:
+        runs: a count.
+    """
     return np.arange(runs) / max(1, runs - 1)
 
 

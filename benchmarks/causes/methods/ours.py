@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.causes.entry import About, answer_of, main
+from diagnosis.blind.cases import SCATTERING
 
 ABOUT = About("tunnel diagnose", "as delivered, no option")
 
@@ -26,7 +27,17 @@ def answer(folder: Path) -> dict[str, Any]:
     stated = {
         when: _stated(values) for when, values in found["coefficients"].items() if when in ("before", "after")
     }
-    return answer_of(found["causes"], probability, [(n, p / total) for n, p in sets], stated)
+    answered = answer_of(found["causes"], probability, [(n, p / total) for n, p in sets], stated)
+    spreads = (found.get("repeatability") or {}).get("spreads", ())
+    scatter = {
+        SCATTERING[one["effect"]]: {
+            "value": one["width"],
+            "interval_90": one["interval"],
+            "named": one["shown"],
+        }
+        for one in spreads
+    }
+    return answered | ({"scatter": scatter} if scatter else {})
 
 
 def _names(effect: str) -> tuple[str, ...]:

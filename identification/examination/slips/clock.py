@@ -6,7 +6,7 @@ of each run against its own mean frequency shows which of the two it is. Where a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri, fdtri
@@ -47,7 +47,10 @@ class _Phase:
 
 @dataclass(frozen=True)
 class DriftingClock(StatementSlip):
-    """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused."""
+    """All runs, or a single one, change their frequency linearly with time, not with the amplitude. Refused.
+
+    A single run whose phase may as well jump at an instant is not: it may have been disturbed.
+    """
 
     def find(self, seen: Seen) -> tuple[Remark, ...]:
         """Fit a drift of the clock, and powers of the amplitude, to the phases of all free decays of angles."""
@@ -66,6 +69,8 @@ class DriftingClock(StatementSlip):
             ratio = (other / left) / max(squares / freedom, 1.0)
             if not good or ratio <= float(fdtri(left, freedom, 1.0 - policy.REFUSAL_RATE)):
                 continue
+            if places != whole and _jumps(phases, places[0], squares):
+                continue
             ids = tuple(phases[place].run for place in places)
             who = "every run" if places == whole else "the run"
             air = "" if still.intersection(ids) else ", or the wind speed"
@@ -76,6 +81,24 @@ class DriftingClock(StatementSlip):
             remedy = "correct time_s by a reference, let the spring settle, or leave the runs out"
             return (Remark(Outcome.REFUSED, ids, what, remedy),)
         return ()
+
+
+def _jumps(phases: list[_Phase], place: int, squares: float) -> bool:
+    """Whether a jump of a run's phase at one instant, as a blow makes, leaves no more than a drift does.
+
+    Args:
+        place: of the run among the phases.
+        squares: sum of squares that the drift leaves, dimensionless.
+    """
+    one = phases[place]
+    after = np.arange(one.phase.size)
+    for at in range(1, one.phase.size - 1):
+        for smeared in (0.0, 0.5):  # the window around the instant shows a part of the jump
+            jump = np.where(after == at, smeared, after > at).astype(np.float64)
+            tried = [*phases[:place], replace(one, drift=jump), *phases[place + 1 :]]
+            if _fit(tried, (place,), by_amplitude=False)[2] <= squares:
+                return True
+    return False
 
 
 def _phase(swing: Swing) -> _Phase | None:

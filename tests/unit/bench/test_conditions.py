@@ -12,6 +12,7 @@ from tunnel_lab.bench.conditions import RIG
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files import import_records
 from tunnel_sim.files.campaign_folder import read_campaign
+from tunnel_sim.vocabulary.between_runs import Repeatability
 
 
 @pytest.fixture
@@ -37,6 +38,21 @@ def test_what_is_typed_is_in_the_campaign(session: Session) -> None:
     assert text.startswith("# Original: a.csv, SHA-256")  # comments of the import stay
     assert "# reference_length =" in text
     assert conditions.typed(session)["b"]["wind_speed"] == "12.5"
+
+
+def test_what_is_stated_of_the_scatter_stays(session: Session) -> None:
+    path = session.campaign / "campaign.toml"
+    text = path.read_text("utf-8")
+    assert "\n# [repeatability]   # optional: wind_speed, spring_stiffness and mechanical_damping" in text
+    path.write_text(
+        text.replace("[[runs]]", "[repeatability]\nspring_stiffness = 0.0005\n[[runs]]", 1), "utf-8"
+    )
+    cells = conditions.stated(session)
+    cells["b"]["spring_stiffness"] = "16.12"
+    assert conditions.save(session, cells) == {}
+    found = read_campaign(session.campaign)
+    assert found.runs[1].spring_stiffness == 16.12
+    assert found.repeatability == Repeatability(spring_stiffness=0.0005)
 
 
 def test_a_density_is_asked_for_where_it_is_needed(session: Session) -> None:

@@ -41,6 +41,27 @@ def made(tmp_path_factory):
     return folder
 
 
+def test_scatter_is_in_the_key_and_what_is_known_of_it_in_the_campaigns(tmp_path, monkeypatch):
+    c = rig((21.02, 67.98, 21.02), (0.0, 0.0, 25.0), (0.35,) * 3, sample_rate=250.0)
+    monkeypatch.setattr(draw, "draw_conditions", lambda _rng: c)
+    monkeypatch.setattr(severity, "_SUBSTEPS", 2)
+    mixture = Mixture(textbook=1.0, variety=0.0, scatter=1.0, level="usual", stated=1.0)
+    key = make_blind(tmp_path / "set", count=2, seed=5, shares={"none": 1.0}, mixture=mixture)
+    document = json.loads(key.read_text())
+    assert {document["made_with"][name] for name in ("scatter", "scatter_level", "stated")} == {1.0, "usual"}
+    for name, truth in document["truths"].items():
+        assert truth["effects"] == []
+        assert truth["scatter"] == {
+            "wind_speed": 0.003,
+            "spring_stiffness": 0.0005,
+            "mechanical_damping": 0.01,
+        }
+        assert list(truth["runs"]) == ["r01", "r02", "r03"]
+        stated = read_campaign(tmp_path / "set" / name).repeatability
+        assert stated is not None
+        assert stated.stated == truth["repeatability"] == truth["scatter"]
+
+
 @pytest.fixture
 def blind(made, tmp_path):
     import shutil

@@ -20,7 +20,7 @@ from benchmarks.causes.make import CAMPAIGNS, KEY, check, data_hash, make
 from benchmarks.causes.methods import METHODS
 from benchmarks.causes.page import page_text
 from benchmarks.causes.score import figures, likely_sets, read_answers, score
-from benchmarks.causes.tracks import TRACKS, draw_all
+from benchmarks.causes.tracks import EDITIONS, TRACKS, draw_all
 from tests.marks import slow
 from tests.reference.rigs import rig
 from tunnel_reference import draw, severity
@@ -28,6 +28,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 EXAMPLES = Path(__file__).parents[3] / "benchmarks/causes/examples"
 COUNTS = {"none": 1, "one": 2}
+FIRST_TRACKS = ["none", "none", "three_and_four", "three_and_four", "one", "one"]
 
 
 def made(folder, **more):
@@ -64,6 +65,82 @@ def test_the_published_set_has_every_effect_alone_and_its_tracks():
         assert (c.coloured_share > 0.0) == (d.track == "coloured_and_uneven")
         families = {e.form.family for e in d.draw.effects if not e.small}
         assert d.track != "random_moments" or families & {"buffeting", "vortex_shedding"}
+
+
+def test_the_campaigns_of_the_published_set_are_drawn_as_when_it_was_published():
+    """The first names by track, of the seal's seed; its hashes are of the numbers."""
+    drawn = draw_all(EDITIONS[1].seed, EDITIONS[1].counts)
+    assert [d.track for d in drawn[:6]] == FIRST_TRACKS
+    assert all(d.draw.scatter is None for d in drawn)
+
+
+def test_the_second_version_has_runs_that_do_not_repeat():
+    edition = EDITIONS[2]
+    drawn = draw_all(edition.seed, edition.counts)
+    assert len(drawn) == sum(edition.counts.values()) == 64
+    for d in drawn:
+        scatter, track = d.draw.scatter, edition.tracks[d.track]
+        assert (scatter is not None) == track.scatter
+        assert (d.draw.kind == "none") == (not d.draw.effects)
+        if d.track == "scatter_alone":
+            assert (scatter.level, scatter.form, scatter.stated) == ("usual", "normal", {})
+        if d.track == "scatter_stated":
+            assert scatter.stated
+    alone = [d for d in drawn if d.track == "beside_scatter"]
+    assert {d.draw.kind for d in alone} == {"single", "pair"}
+    assert any(d.draw.scatter.stated for d in alone)
+    assert not all(d.draw.scatter.stated for d in alone)
+
+
+def scattering(folder):
+    c = rig((21.02, 67.98, 21.02), (0.0, 0.0, 25.0), (0.35,) * 3, sample_rate=250.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(draw, "draw_conditions", lambda _rng: c)
+        patch.setattr(severity, "_SUBSTEPS", 2)
+        make(
+            folder, version=2, seed=3, counts={"scatter_alone": 2, "scatter_stated": 1, "runs_that_repeat": 1}
+        )
+    return folder
+
+
+def test_scatter_is_scored_beside_the_causes(tmp_path):
+    """An entry that knows the truth, one that takes scatter for a gap, and one that names scatter everywhere."""
+    folder = scattering(tmp_path / "set")
+    key = check(folder)
+    assert key["made_with"]["version"] == 2
+    truths = key["truths"]
+    knows, gaps, everywhere = {}, {}, {}
+    for name, truth in truths.items():
+        width = {
+            n: {"value": v, "interval_90": [0.5 * v, 2.0 * v], "named": True}
+            for n, v in truth.get("scatter", {}).items()
+        }
+        unstated = {} if truth.get("repeatability") else width
+        knows[name] = {"campaign": name, **answer_of(truth["effects"], {}), "scatter": unstated}
+        gaps[name] = {"campaign": name, **answer_of(["unknown"], {"unknown": 1.0})}
+        everywhere[name] = {
+            "campaign": name,
+            **answer_of(["wind_speed_scatter"], {"wind_speed_scatter": 1.0}),
+        }
+    found = score(folder, key, knows, "knows", About("knows", ""))
+    jsonschema.validate(next(iter(knows.values())), schema())
+    assert found["version"] == 2
+    assert found["all"]["exact"]["count"] == 4
+    told = found["scatter"]
+    assert [told[name]["count"] for name in ("named_alone", "no_gap", "false_alarms")] == [2, 1, 0]
+    assert told["by_number"]["all"]["within"]["count"] == told["by_number"]["all"]["named"]["count"] == 6
+    found = score(folder, key, gaps, "gaps", About("gaps", ""))
+    assert found["all"]["exact"]["count"] == 0
+    assert found["scatter"]["named_alone"]["count"] == found["scatter"]["no_gap"]["count"] == 0
+    for answer in everywhere.values():
+        jsonschema.validate(answer, schema())
+    found = score(folder, key, everywhere, "everywhere", About("everywhere", ""))
+    told = found["scatter"]
+    assert [told[name]["count"] for name in ("named_alone", "no_gap", "false_alarms")] == [2, 0, 1]
+    page = page_text([found], "x.png", [found])
+    assert "## Runs that do not repeat exactly" in page
+    assert "| everywhere |" in page
+    assert "do not repeat" not in page_text([found], "x.png")
 
 
 def test_the_same_seed_makes_the_same_set_also_where_it_was_interrupted(small, tmp_path, monkeypatch):

@@ -192,4 +192,7 @@ def test_runs_of_a_cell_may_scatter_in_several_numbers(tmp_path):
         return float(np.std(found))
 
     assert spread(plain) < 1e-4
+    # the bound of a trial knows the scatter: no mean of runs is better than their own deviations allow
+    bounds = [draw_trial(cell, grid.seed, 0).bound["yaw_inertia"] for cell in (plain, scattering)]
+    assert bounds[1] > 0.01 * 0.098 / np.sqrt(scattering.runs) > 10.0 * bounds[0]
     assert 0.2 < spread(scattering) / 0.005 < 2.0  # half of the spring's 1 %; 99.9 % of chi squared of 11

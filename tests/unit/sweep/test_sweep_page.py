@@ -24,9 +24,10 @@ def test_the_file_is_read_and_the_code_runs(here, tmp_path: Path, monkeypatch: p
     (text,) = blocks("toml")
     (tmp_path / "sweep.toml").write_text(text, encoding="utf-8")
     whole = read_sweep(tmp_path / "sweep.toml")
-    assert whole.size == 2 * 3 * 4 * 10
+    assert whole.size == 2 * 3 * 2 * 4 * 10
     small = text.replace("replicates = 10", "replicates = 1").replace("duration = 10.0", "duration = 2.0")
     small = small.replace("[0.0002, 0.0005, 0.002]", "0.0005").replace("[0.35, 0.495]", "0.35")
+    small = small.replace("[0.0, 0.003]", "0.003")
     small = small.replace('["output_error", "conventional"]', '["conventional"]')
     small = small.replace("records = false", "records = true").replace(
         "coefficient = 0.002", "coefficient = [0.002, 0.003, 0.004, 0.005, 0.006]"

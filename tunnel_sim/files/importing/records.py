@@ -271,6 +271,10 @@ _RIG = {
     "yaw_inertia": "kg m2, nominal Izz of model and support; optional",
     "width": "m, for Strouhal numbers; optional",
 }
+_REPEATABILITY = (
+    "# [repeatability]   # optional: wind_speed, spring_stiffness and mechanical_damping, each as one standard\n"
+    "#                   # deviation between runs, relative, such as 0.003\n"
+)
 _RUN = {
     "spring_stiffness": "N m/rad: needed for Izz, Cr, Cnβ and Cnr; without it a run gives ωn and ζ",
     "air_density": "kg/m3: needed for Cnβ and Cnr",
@@ -342,7 +346,8 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
     unknown = [f"# {key} =   # {why}" for key, why in _RIG.items() if key not in rig]
-    head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)]), _RUNS_HEAD]
+    head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)])]
+    head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
     blocks = []
     for run in document["runs"]:
         unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
