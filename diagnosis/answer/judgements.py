@@ -81,7 +81,7 @@ def zeros_apart(study: Study) -> tuple[Fact, ...]:
     whole = float(sum(left @ left - left.size for left in nominal.residuals))
     by_chance = float(chdtrc(means.size, means.sum()))
     share = float(means.sum() - means.size) / whole if whole > 0.0 else 0.0
-    if len(means) < 2 or by_chance >= study.settings.answer.remains_rate or share < chosen.zeros_close:
+    if len(means) < 2 or by_chance >= chosen.zeros_rate or share < chosen.zeros_close:
         return ()
     return (Fact("zeros apart", {"share": min(share, 1.0)}),)
 

@@ -140,6 +140,12 @@ class WordsSettings:
         "convention",
         "Most of it.",
     )
+    zeros_rate: float = setting(
+        0.001,
+        "Rate at which zeros of the runs that are apart by chance are mentioned.",
+        "convention",
+        ONE_IN_1000,
+    )
     width_known_within: float = setting(
         10.0,
         "Ratio of the ends of a width's interval from which the width is said to be poorly known.",
