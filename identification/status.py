@@ -142,8 +142,8 @@ def left_out_as_asked(ids: Collection[str]) -> tuple[Remark, ...]:
     """The remark on runs that the user asked to leave out; none where there are none."""
     if not ids:
         return ()
-    it = "it" if len(ids) == 1 else "them"
-    return (Remark(Outcome.LEFT_OUT, tuple(ids), "left out, as asked", f"repeat {it} and diagnose again"),)
+    remedy = f"repeat the run{'s' if len(ids) > 1 else ''}"
+    return (Remark(Outcome.LEFT_OUT, tuple(ids), "left out, as asked", remedy),)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.special import chdtrc
@@ -29,6 +30,7 @@ from tunnel_sim.vocabulary.record import Array
 #: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
 #: differences, which would pin a parameter that the runs do not determine.
 _APART = 1e-4
+_FACTORS = (1.0, 0.3)  # on widths from which their maxima are sought
 _USUAL = UsualWidths()
 _NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
 
@@ -106,8 +108,14 @@ class RunColumns:
 
     def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
         """The likeliest widths and what they make of the runs."""
-        widths = likeliest_widths(self.products, prior, start)
-        return self.at(widths, prior)
+        # a further parameter may explain what a width did: there are two maxima then
+        first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
+        tries = [np.maximum(first * np.array(one), prior.least) for one in product(*[_FACTORS] * first.size)]
+        best = min(tries, key=lambda widths: self.at(widths, prior).restricted)
+        ends = [
+            likeliest_widths(self.products, prior, one) for one in (first, best)[: 1 + (best is not tries[0])]
+        ]
+        return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
 
     def wider(self, prior: WidthPrior, widths: Array) -> float:
         """Probability that runs of given widths seem to differ as much more as they do, by the likelihood ratio."""
@@ -116,7 +124,8 @@ class RunColumns:
 
     def at(self, widths: Array, prior: WidthPrior) -> Between:
         """What given widths make of the runs."""
-        return Between(widths, marginal(self.products, widths), prior.cost(widths))
+        within = marginal(self.products, prior.most).log_information
+        return Between(widths, marginal(self.products, widths), prior.cost(widths), within)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +136,14 @@ class Between:
         widths: relative, shape (kinds,).
         found: the deviations integrated out.
         prior_cost: −2 ln of the prior density of the widths, up to a constant.
+        within: ln|H| of the common parameters' normal matrix where the runs may differ most, so that they are known
+            from what happens within runs.
     """
 
     widths: Array
     found: Marginal
     prior_cost: float
+    within: float
 
     @property
     def likelihood(self) -> float:
@@ -145,9 +157,14 @@ class Between:
 
     @property
     def cost(self) -> float:
-        """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much."""
+        """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much.
+
+        Parameters that only the comparison of runs determines are integrated out over what greatest widths leave of
+        them. Else an effect that makes a few runs agree by chance would bring their width to nothing.
+        """
         away = float(np.sum((self.found.deviations / self.widths) ** 2))
-        return self.found.log_determinant + away + self.prior_cost
+        compared = self.found.log_information - self.within
+        return self.found.log_determinant + away + self.prior_cost + compared
 
 
 def _orthonormal(columns: Array) -> Array:

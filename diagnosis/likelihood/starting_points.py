@@ -22,6 +22,7 @@ from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial
 from tunnel_sim.vocabulary.record import Array
 
 _HELD = 1e18  # precision of deviations that stay as they are
+_MODERATE, _SMALL = 3.0, 0.05  # sizes of a change, over that of what the fit leaves
 _NEARER = 0.02  # of the size that linear theory gives an effect
 
 
@@ -112,7 +113,7 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
     sizes = np.array([trial.values.get(info.name, info.default) for info in own])
     names = base.problem.names
     replaced = names.index(trial.replaces) if trial.replaces in names else None
-    change = _moderate_change(base, problem, sizes, scaled, replaced)
+    change = _moderate_change(base, problem, sizes, scaled, replaced, second_order=trial.second_order)
     if change is None:
         return None
     moved = None
@@ -268,14 +269,22 @@ def change_to(base: Fit, problem: Problem, point: Point) -> list[Array]:
 
 
 def _moderate_change(
-    base: Fit, problem: Problem, values: Array, scaled: int | None, replaced: int | None = None
+    base: Fit,
+    problem: Problem,
+    values: Array,
+    scaled: int | None,
+    replaced: int | None = None,
+    *,
+    second_order: bool = False,
 ) -> list[Array] | None:
     """Change of the scaled prediction by an effect, one value lowered until the change is moderate.
 
     ``values`` holds the effect's parameters and is changed in place to those that were used; ``scaled`` is the
     place of the one that is lowered, None where none may be, and ``replaced`` that of the one that it replaces.
+    Where the runs differ by chance, it is small: the square of an error of the phase is one of the amplitude, and
+    would tell an effect from such differences. An effect of ``second_order`` shows by that square alone.
     """
-    limit = 3.0 * np.sqrt(base.total)
+    limit = (_SMALL if base.problem.scatter and not second_order else _MODERATE) * np.sqrt(base.total)
     for _ in range(12):
         change = change_to(
             base, problem, Point(_with_effect(base, values, scaled, replaced), base.point.release)

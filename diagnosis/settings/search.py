@@ -276,10 +276,11 @@ class WeighingSettings:
         decision="0036",
     )
     needless_scatter: float = setting(
-        14.0,
+        8.0,
         "−2 ln of that evidence by which a needless effect may lower it.",
         "judgement",
-        "With the price of an effect it is 20, by which a needless one lowers χ² once in 22,000 effects tried.",
+        "With the price of an effect and what its size takes of the evidence it is 20 at usual widths, by which a "
+        "needless one lowers χ² once in 22,000 effects tried.",
         unit="χ²",
         decision="0036",
     )

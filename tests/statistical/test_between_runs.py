@@ -1,7 +1,7 @@
 """Intervals of campaigns that scatter hold, and those of campaigns that repeat are what they are without scatter.
 
-Campaigns are drawn in closed form; the model of the runs is not used to draw them. The planted case is every
-estimator without the mechanism: it must be caught.
+Campaigns are drawn in closed form; the model of the runs is not used to draw them. The planted cases are
+estimators without the mechanism: they must be caught. (Output error widens by the scatter of its residuals there.)
 """
 
 from functools import cache
@@ -79,7 +79,7 @@ def test_intervals_hold_with_few_runs_and_other_widths(settings, scale):
     assert not objections(counts, trials)
 
 
-@pytest.mark.parametrize("estimator", ["matrix_pencil", slow("output_error"), slow("conventional")])
+@pytest.mark.parametrize("estimator", ["matrix_pencil", slow("conventional")])
 def test_intervals_without_the_scatter_are_caught(estimator, monkeypatch):
     without_scatter(monkeypatch)
     assert objections(*inside(drawn(THREE_SPRINGS, 1.0), estimator))

@@ -83,3 +83,25 @@ def test_a_gain_that_must_be_found_costs_information() -> None:
     given = campaign("unknown gain")
     stated = tuple(replace(run, drive=Drive("drive", VALUES, "zero", GAIN)) for run in given.runs)
     assert bound(replace(given, runs=stated)).std("yaw_inertia") < bound(given).std("yaw_inertia")
+
+
+@pytest.mark.parametrize("estimator", ["output_error", "matrix_pencil"])
+def test_driven_runs_carry_the_scatter_of_their_springs(estimator: str) -> None:
+    """Springs clamped anew, 0.4 % each, in runs of two springs, driven by a moment or released."""
+    rng = np.random.default_rng(6)
+    column: InputColumn | None = "moment_nm" if estimator == "output_error" else None
+    given = replace(campaign("unknown gain"), name="scattering")
+    runs = []
+    for place, spring in enumerate((16.0, 36.0) * 4):
+        own = motion(spring * (1.0 + 0.004 * rng.standard_normal()), column)
+        record = Record(TIME, own + NOISE * rng.standard_normal(TIME.size))
+        drive = None if column is None else Drive(column, VALUES, "zero")
+        release = 0.2 if column is None else None
+        runs.append(Run(f"r{place}", record, 0.0, spring, release_angle=release, drive=drive))
+    estimate = identify(replace(given, runs=tuple(runs)), estimator)
+    assert estimate.repeatability is not None
+    assert estimate.repeatability.spring_stiffness is not None
+    low, high = estimate.repeatability.spring_stiffness.interval or (0.0, 0.0)
+    assert low < 0.004 < high
+    assert estimate.yaw_inertia is not None
+    assert abs(estimate.yaw_inertia.value - INERTIA) < 3.5 * estimate.yaw_inertia.std < 3.5 * 0.004 * INERTIA
