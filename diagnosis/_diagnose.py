@@ -11,6 +11,7 @@ import numpy as np
 
 from diagnosis.answer.assemble import assemble, localise
 from diagnosis.answer.candidates import cause_sizes
+from diagnosis.answer.judgements import zeros_apart
 from diagnosis.answer.other_motions import limit_cycle_answer, refused_limit_cycles, second_modes
 from diagnosis.answer.units import in_own_units
 from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable
@@ -161,6 +162,8 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
     # below one half a set of effects comes first, though each of them may be less probable than none
     odds = {candidate.effect: candidate.probability for candidate in answer.candidates}
     unknown = max(odds, key=odds.__getitem__, default="") in UNKNOWN
+    if unknown or not decided:
+        caution = (*caution, *zeros_apart(study))
     found = replace(
         answer.found,
         second_modes=second_modes(chosen.campaign, study.settings.words) if unknown else (),

@@ -347,7 +347,8 @@ class Diagnosis:
         """Draw one figure of the report.
 
         Args:
-            what: ``fit`` (the fit over the data) or the name of another figure, such as ``waterfall`` or ``place``.
+            what: ``fit`` (the fit over the data) or the name of another figure, such as ``waterfall``, ``place``
+                or ``repeatability``.
             runs: ids of the runs of ``fit``, of which two are drawn; empty: those with the largest gap.
 
         Returns:

@@ -134,6 +134,18 @@ class WordsSettings:
     one_wind: float = setting(
         0.02, "Ratio of powers below which nearly all of the gap needs one wind.", "judgement"
     )
+    zeros_close: float = setting(
+        0.5,
+        "Share of an unexplained gap from which zeros of the runs' own that would close it are mentioned.",
+        "convention",
+        "Most of it.",
+    )
+    zeros_rate: float = setting(
+        0.001,
+        "Rate at which zeros of the runs that are apart by chance are mentioned.",
+        "convention",
+        ONE_IN_1000,
+    )
     width_known_within: float = setting(
         10.0,
         "Ratio of the ends of a width's interval from which the width is said to be poorly known.",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from diagnosis.words.numbers import Document, part, plain
+from diagnosis.words.numbers import Document, part, plain, share
 from identification.status import Outcome, Remark
 from tunnel_sim.effects import effect_class
 
@@ -98,6 +98,10 @@ CAUTIONS: Mapping[str, Sentence] = {
     "unresolved": _unresolved,
     "rested": "The body is at rest at the end of {runs}. The fits leave that part out: the place where friction "
     "stops a body says little about its motion.",
+    "zeros apart": lambda given: (
+        f'A zero of each run\'s own would close {share(given["share"])} of the gap. State zero = "per_run" under '
+        "[sensor], and diagnose again, if the sensor or its mount may have moved between the runs."
+    ),
     "remainder not sought": "What could be closed of what remains, and by which formula, is not sought where a run "
     "is driven.",
     "remainder not solved": "How much of what remains could be closed was not found: its equations cannot be "

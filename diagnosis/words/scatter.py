@@ -55,7 +55,8 @@ def percent_of(value: float, digits: int = 2, *, sign: bool = False) -> str:
     """A fraction in per cent, such as ``0.29 %`` or ``−0.6 %``.
 
     Args:
-        digits: significant ones.
+        value: a fraction.
+        digits: significant ones (a count).
         sign: whether a plus sign is written.
     """
     text = significant(100.0 * abs(value), digits) if value else "0"
@@ -121,8 +122,8 @@ def scatter_words(document: Document) -> str:
 def _start(document: Document) -> str:
     if not document.get("decided", True):
         return "Whatever the cause, the runs differ from each other by chance"
-    if without_scatter(document["causes"]):
-        return "Beside it the runs differ by chance"
+    if proper := without_scatter(document["causes"]):
+        return f"Beside {'them' if len(proper) > 1 else 'it'} the runs differ by chance"
     only = "" if document["rest"]["material"] else ", and by nothing else"
     likely = probability(document["credible"][0]["probability"])
     return f"The runs differ from each other by chance{only} (probability {likely})"
@@ -207,7 +208,8 @@ def repeat_steps(document: Document) -> list[str]:
         else []
     )
     poorly = _told_apart(spreads_of(document), settings_of(document).words)
-    if poorly and "wind_speed_scatter" not in document["causes"]:  # whose advice says it too
+    named = {SCATTERS[name] for name in scattering(document["causes"])}
+    if poorly and "wind_speed" not in named:  # whose advice says it too
         steps.append("Log the wind speed of every run: the runs do not tell it from the spring.")
     return steps
 

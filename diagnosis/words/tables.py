@@ -22,6 +22,7 @@ from diagnosis.words.scatter import (
     named_answer,
     repeatability_line,
     repeatability_table,
+    repeats,
     scattering,
     spread_estimate,
 )
@@ -165,7 +166,7 @@ def diagnosis_parts(document: Document) -> list[str | TextTable]:
         candidates_table(document),
         parameters_table(document),
         inclusion_line(document),
-        repeatability_line(document),
+        "" if repeats(document) else repeatability_line(document),
         repeatability_table(document),
         waterfall_table(document),
         closable_line(document),

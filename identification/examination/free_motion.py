@@ -153,19 +153,19 @@ def with_zeros(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     groups = _of_equal_conditions(centres)
     scatter = sum(_scatter(group, np.ones((len(group), 1))) for group in groups)
     freedom = sum(len(group) - 1 for group in groups)
-    words = "under equal conditions"
+    words = " under equal conditions"
     if freedom == 0 or scatter <= float(chdtri(freedom, MISFIT_RATE)):
         shifts = _shifts(centres)
         freedom = len(centres) - shifts.shape[1]
         if freedom < _LEAST_BEYOND or _scatter(centres, shifts) <= float(chdtri(freedom, MISFIT_RATE)):
             return campaign, ()
-        groups, words = [centres], "beyond what wind, spring and amplitude shift"
+        groups, words = [centres], ", more than wind, spring and amplitude shift them"
     largest = max(max(c.zero for c in group) - min(c.zero for c in group) for group in groups)
     compared = {centre.run.id for group in groups for centre in group}
     remark = Remark(
         Outcome.NOTED,
         tuple(run.id for run in campaign.runs if run.id in compared),
-        f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit} "
+        f"they oscillate about zeros that differ by up to {largest:.2g} {campaign.sensor.unit}"
         f"{words}; every run of the campaign is fitted with a zero of its own",
         "state zero = 'common' under [sensor] if the zero cannot have moved between them",
     )

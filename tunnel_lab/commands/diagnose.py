@@ -296,6 +296,7 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         documents: of diagnoses, the reference first.
     """
     from diagnosis.words.numbers import excess_std, probability, share
+    from diagnosis.words.scatter import spread_estimate
 
     def excess(document: Document, key: str) -> str:
         """With its standard deviation by chance, where the document has the noise of its runs."""
@@ -319,7 +320,8 @@ def comparison_tables(names: Sequence[str], documents: Sequence[Document]) -> li
         for full, given in answer["parameters"].items():
             owner, _, name = full.rpartition(".")
             mark = "" if given["unit"] == "1" else unit_mark(given["unit"])
-            texts[owner or answer["effect"], name] = estimated(given, mark)
+            owner = owner or answer["effect"]
+            texts[owner, name] = spread_estimate(document, owner, given) or estimated(given, mark)
         parameters.append(texts)
     labels = {
         name: coefficient_label(name, given["unit"])

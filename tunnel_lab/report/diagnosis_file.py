@@ -61,6 +61,16 @@ class _Maps(Part):
     runs: list[_Run]
 
 
+class _Spread(Part):
+    effect: OneLine
+    width: Annotated[float, Field(ge=0.0)]
+    interval: list[float] = Field(min_length=2, max_length=2, description="central 0.90")
+
+
+class _Repeatability(Part):
+    spreads: list[_Spread] = Field(description="chance differences between runs, relative")
+
+
 class Document(Part):
     """The fields that are compared."""
 
@@ -77,6 +87,10 @@ class Document(Part):
     candidates: list[_Candidate] = Field(min_length=1, description="answers, most probable first")
     coefficients: _Coefficients = Field(description="estimates before and after, and a note")
     maps: _Maps | None = Field(default=None, description="data of the figures")
+    repeatability: _Repeatability | None = Field(
+        default=None,
+        description="spreads, trends and the outlier of the differences between runs; every run against the model",
+    )
 
 
 def read_diagnosis(path: Path) -> dict[str, Any]:
@@ -129,10 +143,6 @@ class DiagnosisDocument(Document):
     disturbed: list[Table] = Field(
         default_factory=list,
         description="runs that were disturbed: run, at_s, kept_until_s (null: left out), p_value",
-    )
-    repeatability: Table | None = Field(
-        default=None,
-        description="spreads, trends and the outlier of the differences between runs; every run against the model",
     )
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")

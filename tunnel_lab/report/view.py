@@ -24,7 +24,16 @@ from diagnosis.words.numbers import (
     unit_shown,
     windy,
 )
-from diagnosis.words.scatter import answer_name, spread_estimate
+from diagnosis.words.scatter import (
+    BETWEEN_RUNS,
+    SCATTERS,
+    answer_name,
+    scattering,
+    spread_estimate,
+    spreads_of,
+    width_text,
+    without_scatter,
+)
 from diagnosis.words.tables import listed_answers
 from diagnosis.words.verdict import size_words
 from identification.printing import (
@@ -92,7 +101,7 @@ def _misfit_fact(document: Document, label: str, value: float, powers: str) -> F
 
 
 def causes_found(document: Document) -> list[dict[str, Any]]:
-    """Every cause of the answer with its size.
+    """Every cause of the answer with its size, and the scatter between runs as the last one.
 
     Returns:
         Name, what it acts on, its parameters, what it does to a swing, and what its addition closes.
@@ -111,20 +120,28 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
         added = step["effect"].split(" + ")
         together = ", all together" if len(added) > 1 else ""
         closes |= dict.fromkeys(added, f"{before} to {after}{together}")
-    return [
+    found = [
         {
             "name": plain(name),
             "acts": acts_on(document, name),
             "parameters": [
-                (plain(full.rpartition(".")[2]), spread_estimate(document, name, value) or estimate(value))
+                (plain(full.rpartition(".")[2]), estimate(value))
                 for full, value in answer["parameters"].items()
                 if full.partition(".")[0] == name or len(names) == 1
             ],
             "does": does.get(name, ""),
             "closes": closes.get(name, ""),
         }
-        for name in names
+        for name in without_scatter(names)
     ]
+    if scatter := scattering(names):
+        spreads = [one for one in spreads_of(document) if one["effect"] in scatter]
+        widths = [(plain(SCATTERS[one["effect"]]), width_text(one)) for one in spreads]
+        closed = closes.get(scatter[0], "").removesuffix(", all together")
+        found.append(
+            {"name": BETWEEN_RUNS, "acts": "by chance", "parameters": widths, "does": "", "closes": closed}
+        )
+    return found
 
 
 def typeset(text: str) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.unit.diagnosis_document import document
+from tests.unit.diagnosis_document import document, scattering_document
 
 Tunnel = Callable[..., tuple[int, str, str]]
 Document = dict[str, Any]
@@ -52,6 +52,14 @@ def test_an_interval_is_read(tunnel: Tunnel, before: Path, tmp_path: Path) -> No
     given["coefficients"]["after"]["cn_r"]["interval"] = [-0.28, -0.24]
     status, _, err = tunnel("compare", before, written(tmp_path / "skewed.json", **given))
     assert (status, err) == (0, "")
+
+
+def test_widths_of_scatter_are_compared_in_per_cent(tunnel: Tunnel, before: Path, tmp_path: Path) -> None:
+    scattering = written(tmp_path / "scattering.json", **scattering_document())
+    status, out, err = tunnel("compare", before, scattering, "--format", "csv")
+    assert (status, err) == (0, "")
+    assert "wind_speed_scatter" in out
+    assert "0.29 % (0.13 to 0.62 %)" in out
 
 
 def tables(out: str) -> dict[str, list[dict[str, Any]]]:

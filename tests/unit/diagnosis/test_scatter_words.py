@@ -49,6 +49,9 @@ def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document
     assert "With it added and these differences allowed for, 98.8 % of the gap closes" in text
     assert text.endswith("What remains is small.")
     assert headline(given) == ("quadratic damping, and scatter between runs", "found")
+    given["causes"].append("coulomb_friction")
+    assert "Beside them the runs differ by chance: " in verdict(given, "")
+    given["causes"].pop()
     assert "quadratic damping, and scatter between runs (probability 0.91)" in diagnosis_brief(given)
 
 

@@ -73,7 +73,7 @@ def test_zeros_that_differ_are_known_from_runs_of_different_conditions():
     own = np.random.default_rng(4).normal(0.0, 0.005, len(GRID))
     kept, (remark,) = with_zeros(grid(own))
     assert kept.sensor.zero == "per_run"
-    assert "beyond what wind, spring and amplitude shift" in remark.what
+    assert "rad, more than wind, spring and amplitude shift them; " in remark.what
     assert len(remark.runs) == len(GRID)
 
 

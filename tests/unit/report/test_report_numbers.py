@@ -19,7 +19,15 @@ from diagnosis.settings import Settings
 from diagnosis.words.numbers import noise_powers, probability
 from diagnosis.words.tables import candidates_table, other_answers
 from diagnosis.words.verdict import headline, next_steps, run_words, size_words, undecided_words
-from tests.unit.diagnosis_document import CAUSE, CONDITIONS, IDS, RIVAL, campaign, document
+from tests.unit.diagnosis_document import (
+    CAUSE,
+    CONDITIONS,
+    IDS,
+    RIVAL,
+    campaign,
+    document,
+    scattering_document,
+)
 from tests.unit.shown_numbers import assert_known, assert_shows
 from tunnel_lab.report import page as report_page
 from tunnel_lab.report import render_report, view
@@ -462,3 +470,17 @@ def test_a_value_that_was_held_has_five_digits() -> None:
 def test_what_is_known_is_stated_of_the_vocabulary_only(given: Document) -> None:
     named = view.cause_paragraphs(given | {"causes": [CAUSE], "ambiguous_with": ["unknown", RIVAL]})
     assert [cause["name"] for cause in named] == [CAUSE.replace("_", " "), RIVAL.replace("_", " ")]
+
+
+def test_scatter_between_runs_is_the_last_of_the_causes() -> None:
+    given = scattering_document()
+    first, last = view.causes_found(given)
+    assert first["name"] == "quadratic damping"
+    assert last["name"] == "scatter between runs"
+    assert last["parameters"] == [
+        ("wind speed", "0.29 % (0.13 to 0.62 %)"),
+        ("mechanical damping", "1.0 % (0.62 to 1.8 %)"),
+    ]
+    row = view.candidate_rows(given)[0]
+    assert row["name"] == "quadratic damping + scatter between runs"
+    assert ("wind speed scatter: spread", "0.29 % (0.13 to 0.62 %)") in row["parameters"]
