@@ -30,7 +30,7 @@ from tunnel_sim.vocabulary.record import Array
 #: Power of a column, as a share of it, that differs from what deviations of the runs do; less is an error of finite
 #: differences, which would pin a parameter that the runs do not determine.
 _APART = 1e-4
-_FACTORS = (1.0, 0.3)  # on widths from which their maxima are sought
+_NARROWER = 0.3  # factor on widths from which their maxima are sought
 _USUAL = UsualWidths()
 _NULL = 1e-10  # singular value of a run's own columns, relative to the largest, that counts as zero
 
@@ -108,13 +108,13 @@ class RunColumns:
 
     def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
         """The likeliest widths and what they make of the runs."""
-        # a further parameter may explain what a width did: there are two maxima then
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)
-        tries = [np.maximum(first * np.array(one), prior.least) for one in product(*[_FACTORS] * first.size)]
-        best = min(tries, key=lambda widths: self.at(widths, prior).restricted)
-        ends = [
-            likeliest_widths(self.products, prior, one) for one in (first, best)[: 1 + (best is not tries[0])]
-        ]
+        # what a width does, a further parameter may do as well: there are several maxima then
+        narrower = (first, np.maximum(_NARROWER * first, prior.least), prior.least)
+        tries = [np.array(one) for one in product(*zip(*narrower, strict=True))]
+        costs = [marginal(self.products, one).restricted + prior.cost(one) for one in tries]
+        starts = {0, int(np.argmin(costs))}
+        ends = (likeliest_widths(self.products, prior, tries[one]) for one in sorted(starts))
         return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
 
     def wider(self, prior: WidthPrior, widths: Array) -> float:
