@@ -230,6 +230,11 @@ class Fit:
         return 0.0 if self.between is None else self.between.cost
 
     @property
+    def unlikelihood(self) -> float:
+        """−2 ln L up to a constant: χ² where the runs repeat, else with their deviations integrated out."""
+        return self.total if self.between is None else self.between.likelihood
+
+    @property
     def total(self) -> float:
         """χ² of the campaign, and how far the runs' own parameters are from their priors."""
         return float(self.chi2.sum()) + self.problem.parameters.surprise(self.point)

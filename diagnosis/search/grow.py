@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.likelihood.starting_points import StartingPoint, misses_motion, starting_points
 from diagnosis.search.clock import Progress
 from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, of_more_weight, own_gain, turned_back
-from diagnosis.search.scatter import settled
+from diagnosis.search.scatter import likelier, settled
 from diagnosis.search.weigh import log_weight, misfit_scale
 from tunnel_sim.effects import Effect
 
@@ -36,7 +37,7 @@ def grow(view: View, progress: Progress | None = None) -> list[Hypothesis]:
     # that the runs differ by chance alone is an answer, too
     found = {first.names: first for first in level if first.effects or first.fit.problem.scatter}
     while level:
-        children = view.with_forms(view.larger(level, progress), level)
+        children = _likeliest(view.with_forms(view.larger(level, progress), level), gap, view)
         found |= {child.names: child for child in children}
         level = view.to_grow(level, going_on(children, level, gap))
     return sorted(found.values(), key=lambda h: h.fit.total)
@@ -119,8 +120,9 @@ def sets_with_one_more(
                 near = [point for start in starts if (point := start.nearer()) is not None]
                 tried += [fitted for start in near if (fitted := _fitted(start, base)) is not None]
             there = filter(is_plausible, map(turned_back, tried))
-            best = min(there, key=lambda fitted: fitted.total, default=None)
+            best = min(there, key=lambda fitted: fitted.unlikelihood, default=None)
             if best is not None:
+                best = likelier(best, _repeating(parent, kind)) if parent.repeating is not None else best
                 child = Hypothesis((*parent.effects, kind.name), best)
                 found[child.names] = of_more_weight(found.get(child.names), child, misfit(base))
     return list(found.values())
@@ -153,6 +155,25 @@ def _worth_fitting(
     return [
         item for i, item in enumerate(scored) if i < chosen.always_fitted or item[1][0].predicted_drop > limit
     ]
+
+
+def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
+    """The set with an effect more fitted to runs that repeat exactly, the best from its starting points."""
+    base = parent.repeating
+    if base is None:
+        return None
+    starts = starting_points(base, kind)[: kind.tries]
+    tried = [fitted for start in starts if (fitted := _fitted(start, base)) is not None]
+    there = filter(is_plausible, map(turned_back, tried))
+    return min(there, key=lambda fitted: fitted.total, default=None)
+
+
+def _likeliest(children: Sequence[Hypothesis], gap: ChannelMisfit, view: View) -> list[Hypothesis]:
+    """The sets, the best of which are sought from runs that repeat exactly, too."""
+    scale = Scale.of((*children, view.smallest), gap, view.base.settings.weighing)
+    ranked = sorted(children, key=lambda h: -scale.weight(h))
+    first = view.base.settings.search.grown_from
+    return [replace(h, fit=likelier(h.fit)) if place < first else h for place, h in enumerate(ranked)]
 
 
 def _fitted(start: StartingPoint, base: Fit) -> Fit | None:

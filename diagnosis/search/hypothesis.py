@@ -31,12 +31,14 @@ class Hypothesis:
         fit: the fit.
         textbook: the fit with the textbook form, where the forms were freed; None otherwise.
         short: the same set fitted to shorter stretches of the runs, where effects are added there.
+        repeating: the same set fitted to runs that repeat exactly, from which effects are added as well.
     """
 
     effects: tuple[str, ...]
     fit: Fit
     textbook: Fit | None = None
     short: Hypothesis | None = None
+    repeating: Fit | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from identification.campaign.between_runs import WidthPrior
 from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of widths and fits
+_REPEATING = 8  # iterations of a fit to runs that repeat: it is close where they do
 _FEWEST = 2  # runs that may differ from each other
 
 _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
@@ -191,6 +192,28 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
             return fitted
         fitted = again
     return fitted
+
+
+def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
+    """A fit, or that which begins with runs that repeat exactly, where it is likelier.
+
+    Wide deviations hide much of what an effect does between runs, so that a fit from them may end in another minimum.
+
+    Args:
+        fitted: a fit whose runs differ by chance.
+        repeating: of the same effects to runs that repeat; None: from the values of the other.
+    """
+    if not fitted.problem.scatter:
+        return fitted
+    if repeating is None:
+        repeating = try_fit(*without_deviations(fitted), max_iterations=_REPEATING)
+    if repeating is None or not repeating.total < fitted.unlikelihood:
+        return fitted
+    least = width_prior(fitted.problem).least
+    scatter = tuple(one.as_wide_as(width) for one, width in zip(fitted.problem.scatter, least, strict=True))
+    again = try_fit(*with_deviations(repeating.problem, repeating.point, scatter))
+    again = None if again is None else settled(again)
+    return again if again is not None and again.unlikelihood < fitted.unlikelihood else fitted
 
 
 def with_widths(problem: Problem, between: Between) -> Problem:

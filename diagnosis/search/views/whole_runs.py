@@ -12,7 +12,7 @@ from diagnosis.search.clock import Clock
 from diagnosis.search.hypothesis import Hypothesis, polish
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
-from diagnosis.search.scatter import evident, scattered
+from diagnosis.search.scatter import evident, likelier, scattered
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
 
@@ -62,7 +62,7 @@ class WholeRuns(View):
     @property
     def smallest(self) -> Hypothesis:
         """The set that all others contain."""
-        return self.first or super().smallest
+        return self.first or Hypothesis((), self.base, repeating=self.unscattered)
 
     def sets(self, clock: Clock) -> Sets:
         """The sets that are found, and the random moments that may act beside them."""
@@ -83,5 +83,5 @@ class WholeRuns(View):
     def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer fitted to convergence: only now, as another view may follow."""
         polished = polish(settled)
-        fitted = evident(polished.fit)
+        fitted = evident(likelier(polished.fit))
         return polished if fitted is polished.fit else replace(polished, fit=fitted)
