@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,11 +23,14 @@ if TYPE_CHECKING:
 _ITERATIONS = 12  # of a fit on the way; the answer's own is polished
 
 
-def grow(view: View, progress: Progress | None = None) -> list[Hypothesis]:
+def grow(
+    view: View, progress: Progress | None = None, enough: Callable[[Sequence[Hypothesis]], bool] | None = None
+) -> list[Hypothesis]:
     """Add effects one after another, to the best few sets of each size, as a view of the runs shows them.
 
     Args:
         progress: called with the names of each set that is tried.
+        enough: whether no larger sets than those of a level are sought; None: they are.
 
     Returns:
         Fitted hypotheses of all sizes, best first. The growth ends where the evidence for a larger set falls or
@@ -36,7 +39,7 @@ def grow(view: View, progress: Progress | None = None) -> list[Hypothesis]:
     level, gap = [view.smallest], view.gap
     # that the runs differ by chance alone is an answer, too
     found = {first.names: first for first in level if first.effects or first.fit.problem.scatter}
-    while level:
+    while level and not (enough is not None and enough(level)):
         children = _likeliest(view.with_forms(view.larger(level, progress), level), gap, view)
         found |= {child.names: child for child in children}
         level = view.to_grow(level, going_on(children, level, gap))
@@ -170,6 +173,8 @@ def _repeating(parent: Hypothesis, kind: type[Effect]) -> Fit | None:
 
 def _likeliest(children: Sequence[Hypothesis], gap: ChannelMisfit, view: View) -> list[Hypothesis]:
     """The sets, the best of which are sought from runs that repeat exactly, too."""
+    if not view.base.problem.scatter:
+        return list(children)
     scale = Scale.of((*children, view.smallest), gap, view.base.settings.weighing)
     ranked = sorted(children, key=lambda h: -scale.weight(h))
     first = view.base.settings.search.grown_from

@@ -195,9 +195,9 @@ def settled(fitted: Fit, *, rounds: int = _ROUNDS) -> Fit:
 
 
 def likelier(fitted: Fit, repeating: Fit | None = None) -> Fit:
-    """A fit, or that which begins with runs that repeat exactly, where it is likelier.
+    """A fit, or one from runs that repeat exactly, where that is likelier.
 
-    Wide deviations hide much of what an effect does between runs, so that a fit from them may end in another minimum.
+    Wide deviations hide much of what an effect does between runs: a fit from them may end in another minimum.
 
     Args:
         fitted: a fit whose runs differ by chance.

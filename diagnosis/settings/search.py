@@ -28,6 +28,14 @@ class SearchSettings:
         BY_CHANCE,
         unit="χ²",
     )
+    beside_scatter: int = setting(
+        4,
+        "Sets in runs that repeat that are compared beside chance differences between the runs.",
+        "judgement",
+        "Time against coverage.",
+        unit="sets",
+        decision="0036",
+    )
     grown_from: int = setting(
         2,
         "Sets of each size to which another effect is added.",
@@ -253,6 +261,12 @@ class ScatterSettings:
         "Rate at which runs that differ by chance are said to drift over the campaign.",
         "convention",
         ONE_IN_1000,
+    )
+    scatter_closes: float = setting(
+        0.5,
+        "Share of what an answer leaves that chance differences between the runs must close to be a part of it.",
+        "convention",
+        "The greater part, by the word. Forms of effects are never exact.",
     )
     widths_settled: float = setting(
         1.0,

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar, Self
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.problem import Problem
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.search.clock import Clock
-from diagnosis.search.hypothesis import Hypothesis, polish
+from diagnosis.search.grow import grow
+from diagnosis.search.hypothesis import Hypothesis, Scale, polish
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
-from diagnosis.search.scatter import evident, likelier, scattered
+from diagnosis.search.scatter import evident, likelier, scattered, settled, with_deviations
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
+from diagnosis.search.weigh import UNKNOWN
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,26 +37,30 @@ class WholeRuns(View):
     @classmethod
     def after(cls, prepared: Prepared, known: Sets | None, clock: Clock) -> Self | None:
         """The first view, but of runs that are seen in stretches."""
+        del clock
         if known is not None:
             return None
         first = prepared.ringing
         moving, rested = without_long_rest(prepared.nominal.problem.data)
         if rested:  # where dry friction stops a body, χ² has many minima
-            nominal = try_fit(Problem(moving), prepared.nominal.point)
+            nominal = try_fit(replace(prepared.nominal.problem, data=moving), prepared.nominal.point)
             if nominal is not None:  # what is left may be too short: whole runs then
                 prepared = replace(prepared, nominal=nominal, rested=rested)
-        if first is not None:
+        if not prepared.nominal.problem.scatter:
             return cls(prepared, prepared.nominal, first)
-        with clock.step("scatter"):
-            base = scattered(prepared.nominal, prepared.kinds)
-        if base is None:
-            return cls(prepared, prepared.nominal)
-        return cls(prepared, base, unscattered=prepared.nominal)
+        # the runs differ as much as is stated, or more
+        base = scattered(prepared.nominal, prepared.kinds) or prepared.nominal
+        return cls(prepared, base, first, unscattered=prepared.nominal)
 
     @property
     def repeating(self) -> Fit:
         """The fit of the nominal model with runs that repeat exactly."""
         return self.base if self.unscattered is None else self.unscattered
+
+    @cached_property
+    def scattering(self) -> Fit | None:
+        """The fit of the nominal model to runs that differ by chance; None where they do not."""
+        return scattered(self.base, self.prepared.kinds)
 
     def on(self, base: Fit) -> Self:
         """The same view of runs with other noise, in which all sets are grown."""
@@ -65,8 +72,63 @@ class WholeRuns(View):
         return self.first or Hypothesis((), self.base, repeating=self.unscattered)
 
     def sets(self, clock: Clock) -> Sets:
-        """The sets that are found, and the random moments that may act beside them."""
-        found = super().sets(clock)
+        """The sets that are found, and the random moments that may act beside them.
+
+        Sets are grown in runs that repeat, until one explains every run by itself where the runs differ by chance.
+        From there on they are grown beside such differences. Where none does, and no set explains runs that repeat,
+        the likeliest of them are compared beside such differences.
+        """
+        if self.unscattered is not None or self.first is not None:
+            return self.with_moments(super().sets(clock), clock)
+        explained: list[Hypothesis] = []
+
+        def enough(level: Sequence[Hypothesis]) -> bool:
+            tried = (self._beside(one) for one in level)
+            explained.extend(one for one in tried if one is not None and one.explains_runs)
+            return bool(explained)
+
+        with clock.step("effects"):
+            grown = grow(self, clock.progress, enough)
+            scale = Scale.of((*grown, self.smallest), self.gap, self.base.settings.weighing)
+            likely = sorted(grown, key=lambda one: -scale.weight(one))[
+                : self.base.settings.search.beside_scatter
+            ]
+        if explained:
+            return self._beside_scatter(likely, explained[0], clock)
+        plain = self.with_moments(Sets(self, tuple(grown)), clock)
+        if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
+            return plain
+        beside = self._beside_scatter(likely, None, clock)
+        return plain if beside.weighed[0].effects == UNKNOWN else beside
+
+    def _beside(self, one: Hypothesis) -> Hypothesis | None:
+        """A set beside chance differences between the runs; None where they do not differ, or the fit fails."""
+        base = self.scattering
+        if base is None or not one.effects:
+            return None if base is None else Hypothesis((), base, repeating=self.base)
+        fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, base.problem.scatter))
+        return None if fitted is None else replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
+
+    def _beside_scatter(
+        self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: Clock
+    ) -> Sets:
+        """The sets beside chance differences between the runs.
+
+        Args:
+            likely: sets in runs that repeat, the likeliest first.
+            explained: the set that explains every run by itself, from which larger ones are grown; None: none does.
+        """
+        assert self.scattering is not None
+        view = replace(self, base=self.scattering, unscattered=self.base, first=explained)
+        none = Hypothesis((), self.scattering, repeating=self.base)
+        with clock.step("effects"):
+            grown = [] if explained is None else grow(view, clock.progress)
+            others = (self._beside(one) for one in likely)
+            found = {one.names: one for one in (none, *others, *grown) if one is not None}
+        return view.with_moments(Sets(view, tuple(found.values())), clock)
+
+    def with_moments(self, found: Sets, clock: Clock) -> Sets:
+        """Sets, and the random moments that may act beside them."""
         with clock.step("random moments"):
             random = weigh_random_moments(self, found.hypotheses)
             sets = without_the_random_moment(random, found.hypotheses, self.gap)
@@ -81,7 +143,16 @@ class WholeRuns(View):
         return hypothesis
 
     def finished(self, settled: Hypothesis) -> Hypothesis:
-        """The answer fitted to convergence: only now, as another view may follow."""
+        """The answer fitted to convergence: only now, as another view may follow.
+
+        Chance differences between the runs that close most of what it leaves are a part of it, too.
+        """
         polished = polish(settled)
-        fitted = evident(likelier(polished.fit))
+        found, chosen = polished.fit, polished.fit.settings.scatter
+        if found.problem.scatter:
+            fitted = evident(likelier(found))
+        else:
+            beside = scattered(found, self.prepared.kinds)
+            closes = beside is not None and beside.excess < (1.0 - chosen.scatter_closes) * found.excess
+            fitted = evident(beside) if beside is not None and closes else found
         return polished if fitted is polished.fit else replace(polished, fit=fitted)
