@@ -118,12 +118,20 @@ class RunColumns:
         return min((self.at(widths, prior) for widths in ends), key=lambda one: one.restricted)
 
     def wider(self, prior: WidthPrior, widths: Array) -> float:
-        """Probability that runs of given widths seem to differ as much more as they do, by the likelihood ratio."""
+        """Probability that runs of given widths seem to differ as much more as they do, by the likelihood ratio.
+
+        Args:
+            widths: relative, shape (kinds,).
+        """
         gain = self.at(widths, prior).found.restricted - self.likeliest(prior, widths).found.restricted
         return float(chdtrc(float(widths.size), max(gain, 0.0)))
 
     def at(self, widths: Array, prior: WidthPrior) -> Between:
-        """What given widths make of the runs."""
+        """What given widths make of the runs.
+
+        Args:
+            widths: relative, shape (kinds,).
+        """
         within = marginal(self.products, prior.most).log_information
         return Between(widths, marginal(self.products, widths), prior.cost(widths), within)
 
@@ -135,9 +143,9 @@ class Between:
     Args:
         widths: relative, shape (kinds,).
         found: the deviations integrated out.
-        prior_cost: −2 ln of the prior density of the widths, up to a constant.
+        prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
         within: ln|H| of the common parameters' normal matrix where the runs may differ most, so that they are known
-            from what happens within runs.
+            from what happens within runs; dimensionless up to a constant.
     """
 
     widths: Array

@@ -189,7 +189,8 @@ class ChannelMisfit:
         chi2: by channel, shape (6,), dimensionless.
         count: of independent values by channel, which is what noise alone gives, shape (6,).
         motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
-        scatter_cost: −2 ln of the evidence of chance differences between runs that it takes; 0 where they repeat.
+        scatter_cost: −2 ln of the evidence of chance differences between runs that it takes, dimensionless; 0 where
+            they repeat.
     """
 
     chi2: Array

@@ -26,7 +26,7 @@ class Chance:
 
     Args:
         kind: the effect of the vocabulary that it is.
-        width: standard deviation of the runs' relative deviations.
+        width: standard deviation of the runs' relative deviations, dimensionless.
         derivatives: of the nominal model.
         damping: mechanical damping of the nominal model, N m s/rad.
         shown: whether the runs show that they differ in this rather than in the others, beyond what is stated.

@@ -112,7 +112,7 @@ class Scale:
         misfit: χ² by channel, shape (6,).
         least: χ² by channel, shape (6,), 0 or less.
         chosen: how sets are weighed.
-        scatter_cost: of the nominal model, as `ChannelMisfit` has it.
+        scatter_cost: of the nominal model, as `ChannelMisfit` has it, dimensionless.
     """
 
     misfit: Array

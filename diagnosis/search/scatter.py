@@ -62,7 +62,11 @@ def without_deviations(fitted: Fit) -> tuple[Problem, Point]:
 
 
 def chance(found: Fit, kind: type[Effect], width: float) -> Chance:
-    """A chance difference beside the nominal model as it is fitted."""
+    """A chance difference beside the nominal model as it is fitted.
+
+    Args:
+        width: of the runs' deviations, relative, dimensionless.
+    """
     run = found.problem.stated(found.point.common, found.point.release[0], found.problem.data.runs[0])
     return Chance(kind, width, run.derivatives, run.mechanical_damping)
 

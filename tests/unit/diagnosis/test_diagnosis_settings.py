@@ -40,6 +40,8 @@ KNOWN_IN_SEVERAL = {
     "model_error": "a misfit that needs no cause needs no form either",
     "leak": "wherever channels are compared",
     "own_number_gain": "wherever an instant or a phase counts",
+    "chance_stds": "chance, whether of all that is left or of every channel",
+    "needless_chi2": "what a needless effect closes, of a channel or of runs by themselves",
     "even_share": "what is spread is taken off again",
     "run_rate": "the sentence states the rate",
     "interval_share": "of time, amplitude and frequency; the sentence states the share",
