@@ -125,7 +125,8 @@ def assemble(
         waterfall=closes.steps,
         disturbed=study.disturbed,
         rest=_remains(study, found, answers, closes.steps),
-        repeatability=repeatability(chosen),
+        # of an unknown cause the runs may still differ, as no effect of the vocabulary does
+        repeatability=repeatability(chosen if study.causes != UNKNOWN else study.between_runs or chosen),
         model=patched,
         found=beside_the_numbers(study, said, before, after, caveats),
     )

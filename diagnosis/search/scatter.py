@@ -27,6 +27,7 @@ from tunnel_sim.effects import Effect
 _ROUNDS = 3  # of widths and fits
 _REPEATING = 8  # iterations of a fit to runs that repeat: it is close where they do
 _FEWEST = 2  # runs that may differ from each other
+_IN_ORDER = 5  # runs that show an order
 
 _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
 
@@ -143,6 +144,32 @@ def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> K
             break
         kept[places[least]] = False
     return kept
+
+
+def only_drifts(fitted: Fit) -> bool:
+    """Whether all differences between the runs follow their order: then they are no scatter."""
+    scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
+    if not scatter or len(fitted.residuals) < _IN_ORDER:
+        return False
+    columns, prior = fitted.columns, width_prior(fitted.problem)
+    if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
+        return False
+    return all(
+        _drifts(columns, prior, int(place), chosen)
+        for place in np.flatnonzero(_shown(columns, prior, chosen))
+    )
+
+
+def _drifts(columns: RunColumns, prior: WidthPrior, place: int, chosen: ScatterSettings) -> bool:
+    """Whether the runs differ in one number in proportion to their place, and by nothing shown beside that."""
+    order = np.linspace(-0.5, 0.5, len(columns.seen))
+    beside, _ = columns.with_column(
+        [t * own[:, place] for t, own in zip(order, columns.deviations, strict=True)]
+    )
+    gain = columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
+    all_of_them = np.ones(prior.usual.size, bool)
+    left = _gain(beside, prior, all_of_them, np.arange(prior.usual.size) == place)
+    return bool(gain > chdtri(1.0, chosen.trend_rate) and left < chdtri(1.0, chosen.which_scatters_rate))
 
 
 def with_scatter(fitted: Fit, scatter: Scatter) -> Fit:

@@ -18,7 +18,7 @@ from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival
-from diagnosis.search.scatter import with_scatter
+from diagnosis.search.scatter import only_drifts, with_scatter
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 
 if TYPE_CHECKING:
@@ -53,7 +53,11 @@ class Sets:
     def weighed(self) -> list[Weighed]:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
-        sets = [h.fitted_set(self.view.repeating) for h in self.hypotheses]
+        sets = [
+            # what follows the order of the runs is no scatter, and no effect of the vocabulary
+            h.fitted_set(self.view.repeating, outside=not h.effects and only_drifts(h.fit))
+            for h in self.hypotheses
+        ]
         sets += [
             h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses
         ]

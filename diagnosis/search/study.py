@@ -85,6 +85,7 @@ class Study:
         refused: by names of refused answers, their effects that no half of the records shows.
         rivals: what was weighed from outside the vocabulary.
         disturbed: runs that were disturbed, which are left out from then on.
+        between_runs: the fit of the nominal model to runs that differ by chance; None where they do not.
         caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
         seconds: wall time by step, s.
     """
@@ -95,6 +96,7 @@ class Study:
     refused: Mapping[Names, Names] = field(default_factory=dict)
     rivals: tuple[FoundRival, ...] = ()
     disturbed: tuple[Disturbance, ...] = ()
+    between_runs: Fit | None = None
     caution: str = ""
     seconds: Mapping[str, float] = field(default_factory=dict)
 

@@ -262,12 +262,6 @@ class ScatterSettings:
         "convention",
         ONE_IN_1000,
     )
-    scatter_closes: float = setting(
-        0.5,
-        "Share of what an answer leaves that chance differences between the runs must close to be a part of it.",
-        "convention",
-        "The greater part, by the word. Forms of effects are never exact.",
-    )
     widths_settled: float = setting(
         1.0,
         "Fall of −2 ln L from which a fit is repeated with other widths.",

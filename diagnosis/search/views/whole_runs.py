@@ -8,16 +8,24 @@ from functools import cached_property
 from typing import ClassVar, Self
 
 from diagnosis.likelihood.least_squares import Fit, try_fit
+from diagnosis.likelihood.residuals import misfit
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
-from diagnosis.search.scatter import evident, likelier, scattered, settled, with_deviations
+from diagnosis.search.scatter import (
+    evident,
+    likelier,
+    scattered,
+    settled,
+    with_deviations,
+    without_deviations,
+)
 from diagnosis.search.sets import Sets
 from diagnosis.search.views.view import View
-from diagnosis.search.weigh import UNKNOWN
+from diagnosis.search.weigh import OF_MOTION, UNKNOWN, log_misfit, misfit_scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,14 +153,28 @@ class WholeRuns(View):
     def finished(self, settled: Hypothesis) -> Hypothesis:
         """The answer fitted to convergence: only now, as another view may follow.
 
-        Chance differences between the runs that close most of what it leaves are a part of it, too.
+        Chance differences between the runs are a part of it where they pay the price of an effect.
         """
         polished = polish(settled)
-        found, chosen = polished.fit, polished.fit.settings.scatter
+        found, stated = polished.fit, bool(self.prepared.nominal.problem.scatter)
+        repeats: Fit | None = found
         if found.problem.scatter:
-            fitted = evident(likelier(found))
+            fitted, repeats = likelier(found), try_fit(*without_deviations(found))
         else:
-            beside = scattered(found, self.prepared.kinds)
-            closes = beside is not None and beside.excess < (1.0 - chosen.scatter_closes) * found.excess
-            fitted = evident(beside) if beside is not None and closes else found
+            fitted = scattered(found, self.prepared.kinds) or found
+        if not stated and repeats is not None and not self._pays(fitted, repeats):
+            fitted = repeats
+        fitted = evident(fitted)
         return polished if fitted is polished.fit else replace(polished, fit=fitted)
+
+    def _pays(self, differing: Fit, repeats: Fit) -> bool:
+        """Whether chance differences close as much of what the answer leaves as an effect must.
+
+        Forms of effects are never exact, and what they leave between runs is no scatter.
+        """
+        weighing = self.base.settings.weighing
+        scale = misfit_scale(misfit(self.repeating), weighing)
+        left, without = (
+            log_misfit(misfit(one).excess, scale, OF_MOTION, weighing.leak) for one in (differing, repeats)
+        )
+        return weighing.steepness * (without - left) > weighing.set_price
