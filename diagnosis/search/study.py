@@ -17,7 +17,7 @@ from diagnosis.search.hypothesis import Hypothesis
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.rivals.rival import FoundRival
-from diagnosis.search.scatter import named
+from diagnosis.search.scatter import evident, named
 from diagnosis.search.sets import Names, Sets
 from diagnosis.search.weigh import UNKNOWN, Weighed
 from diagnosis.settings import Settings
@@ -85,7 +85,7 @@ class Study:
         refused: by names of refused answers, their effects that no half of the records shows.
         rivals: what was weighed from outside the vocabulary.
         disturbed: runs that were disturbed, which are left out from then on.
-        between_runs: the fit of the nominal model to runs that differ by chance; None where they do not.
+        between_runs: of an unknown cause, the fit of the nominal model to runs that differ; None where they do not.
         caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
         seconds: wall time by step, s.
     """
@@ -200,9 +200,16 @@ class Study:
         with clock.step("choices"):
             left = misfit(prepared.nominal)
             answers = [replace(one, choices=_choices(one, prepared.nominal, left)) for one in answers]
-        caution, refused = sets.view.caution, sets.refused
+        base = sets.view.base
         return cls(
-            prepared, gap, tuple(answers), refused, sets.rivals, caution=caution, seconds=clock.seconds
+            prepared,
+            gap,
+            tuple(answers),
+            sets.refused,
+            sets.rivals,
+            between_runs=evident(base) if answers[0].effects == UNKNOWN and base.problem.scatter else None,
+            caution=sets.view.caution,
+            seconds=clock.seconds,
         )
 
 
