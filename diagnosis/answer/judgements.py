@@ -110,7 +110,8 @@ def beside_the_numbers(
 
 def nearly(study: Study) -> Nearly | None:
     """The effects that explain most of a gap without being named; None where none do."""
-    sets, chosen = [answer for answer in study.answers if answer.effects != UNKNOWN], study.settings.words
+    chosen = study.settings.words
+    sets = [answer for answer in study.answers if answer.effects not in ((), UNKNOWN)]
     first = max(sets, key=lambda answer: (answer.probability, -answer.share), default=None)
     if study.causes != UNKNOWN or first is None or first.share > 1.0 - chosen.nearly_explains:
         return None

@@ -58,7 +58,8 @@ class WholeRuns(View):
             return cls(prepared, prepared.nominal, first)
         # the runs differ as much as is stated, or more
         base = scattered(prepared.nominal, prepared.kinds) or prepared.nominal
-        return cls(prepared, base, first, unscattered=prepared.nominal)
+        repeating = try_fit(*without_deviations(prepared.nominal)) or prepared.nominal
+        return cls(prepared, base, first, unscattered=repeating)
 
     @property
     def repeating(self) -> Fit:

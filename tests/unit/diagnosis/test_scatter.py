@@ -1,0 +1,121 @@
+"""Runs that do not repeat: scatter is named, hides no cause, is no gap where it is stated, and is no drift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from diagnosis import diagnose
+from diagnosis.search.investigate import investigate
+from tunnel_sim.vocabulary.campaign import (
+    Campaign,
+    Repeatability,
+    RigProperties,
+    Run,
+    SensorProperties,
+)
+from tunnel_sim.vocabulary.record import Record
+
+INERTIA, DAMPING, NOISE, RATE = 0.1, 0.03, 3e-4, 100.0
+SPRINGS = (16.0, 16.0, 16.0, 30.0, 30.0, 44.0, 44.0, 44.0)
+SPRING, DAMPER = 5e-4, 1e-2  # one standard deviation between runs, relative
+STIFFNESS, DAMPED = "stiffness_scatter", "damping_scatter"
+
+
+def campaign(
+    *,
+    scatter: float = 1.0,
+    drift: float = 0.0,
+    cubic: float = 0.0,
+    repeatability: Repeatability | None = None,
+) -> Campaign:
+    """Decays by SciPy's integrator, whose springs and dampers differ from run to run.
+
+    Args:
+        scatter: factor on the standard deviations.
+        drift: relative change of the damping from the first to the last run.
+        cubic: κ of a hardening spring, 1/rad².
+    """
+    rng, time = np.random.default_rng(52), np.arange(0.0, 8.0, 1.0 / RATE)
+    order = np.linspace(-0.5, 0.5, len(SPRINGS))
+    runs = []
+    for number, stiffness in enumerate(SPRINGS):
+        spring = stiffness * (1.0 + scatter * SPRING * rng.standard_normal())
+        damper = DAMPING * (1.0 + scatter * DAMPER * rng.standard_normal() + drift * order[number])
+
+        def rates(_: float, y: np.ndarray, k: float = spring, c: float = damper) -> list[float]:
+            return [y[1], -(k * (y[0] + cubic * y[0] ** 3) + c * y[1]) / INERTIA]
+
+        swing = solve_ivp(rates, (0.0, time[-1]), (0.3, 0.0), "DOP853", time, rtol=1e-10, atol=1e-12).y[0]
+        record = Record(time, swing + rng.normal(0.0, NOISE, time.size))
+        runs.append(Run(f"r{number}", record, 0.0, spring_stiffness=stiffness))
+    return Campaign(
+        "again", RigProperties(), SensorProperties(RATE), tuple(runs), repeatability=repeatability
+    )
+
+
+def test_scatter_alone_is_named_with_its_size_and_nothing_else() -> None:
+    found = diagnose(campaign())
+    assert set(found.causes) == {STIFFNESS, DAMPED}
+    assert found.repeatability is not None
+    for spread in found.repeatability.spreads:
+        width = {STIFFNESS: SPRING, DAMPED: DAMPER}[spread.effect]
+        assert spread.interval[0] < width < spread.interval[1]
+        assert 1.0 / 2.5 < spread.width / width < 2.5  # eight runs tell a standard deviation to a quarter
+
+
+def test_scatter_hides_no_cause() -> None:
+    found = diagnose(campaign(cubic=0.1))
+    assert "cubic_stiffness" in found.causes
+    assert {*found.causes} <= {"cubic_stiffness", STIFFNESS, DAMPED}
+    size = found.candidates[0].parameters["cubic_stiffness.coefficient"]
+    assert size.std is not None
+    assert abs(size.value - 0.1) < 4.0 * size.std
+
+
+def test_runs_that_repeat_show_none() -> None:
+    found = diagnose(campaign(scatter=0.0))
+    assert found.causes == ()
+    assert found.repeatability is not None
+    assert found.repeatability.spreads == ()
+
+
+def test_stated_scatter_is_no_gap_but_more_than_that_is() -> None:
+    stated = Repeatability(spring_stiffness=SPRING, mechanical_damping=DAMPER)
+    within = diagnose(campaign(repeatability=stated))
+    assert not within.gap.detected
+    assert within.causes == ()
+    beyond = diagnose(campaign(scatter=8.0, repeatability=stated))
+    assert beyond.gap.detected
+    assert set(beyond.causes) <= {STIFFNESS, DAMPED}
+    assert beyond.causes
+
+
+def test_intervals_hold_the_scatter() -> None:
+    """The inertia's standard deviation is that of a spring over the root of the number of runs, at least."""
+    study, repeats = investigate(campaign()), investigate(campaign(scatter=0.0))
+    own = study.similarity.own(1.0, "kg m2")
+    value, std = (own * one for one in (study.chosen.value("yaw_inertia"), study.chosen.std("yaw_inertia")))
+    assert std > 0.7 * INERTIA * SPRING / np.sqrt(len(SPRINGS))
+    assert abs(value - INERTIA) < 4.0 * std
+    assert repeats.similarity.own(repeats.chosen.std("yaw_inertia"), "kg m2") < 0.1 * std
+
+
+def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
+    found = diagnose(campaign(scatter=0.0, drift=0.2))
+    assert found.causes == ("unknown",)
+    assert found.repeatability is not None
+    (trend,) = found.repeatability.trends
+    assert trend.effect == DAMPED
+    assert trend.change == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
+    runs = campaign()
+    faulty = campaign(scatter=40.0).runs[4]
+    found = diagnose(replace(runs, runs=tuple(faulty if run.id == faulty.id else run for run in runs.runs)))
+    assert found.repeatability is not None
+    assert found.repeatability.outlier == faulty.id
