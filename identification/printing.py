@@ -297,6 +297,8 @@ def repeatability_lines(document: Document) -> list[str]:
 
     Runs that are no more than the coefficients need cannot show any, which is said.
     """
+    if "repeatability" not in document:  # of an earlier version
+        return []
     found, coefficients = document["repeatability"], document["parameters"]
     shown = [run for run in document["runs"] if run["omega_n"] is not None]
     if found is None:

@@ -189,6 +189,8 @@ class Campaign:
         Raises:
             TunnelError: for an id that no run has, and where no run would remain.
         """
+        if not ids:
+            return self
         known = [run.id for run in self.runs]
         for name in ids:
             if name not in known:
@@ -197,7 +199,7 @@ class Campaign:
         kept = tuple(run for run in self.runs if run.id not in ids)
         if not kept:
             raise TunnelError("every run is left out", where=self.name, remedy="leave out fewer runs")
-        return replace(self, runs=kept) if ids else self
+        return replace(self, runs=kept)
 
     def __repr__(self) -> str:
         """The runs, their conditions, and where to go from here, in three lines."""
