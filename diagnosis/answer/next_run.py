@@ -105,8 +105,9 @@ def _predict(fit: Fit, run: RunData, angle: float) -> _Prediction | None:
 
     The response to a periodic effect is of first order in its size, so that it rotates with its phase.
     """
-    # one instant, however many the runs made had
-    problem = dataclasses.replace(fit.problem, data=fit.problem.data.with_runs((run,)), instants=1)
+    # one instant, however many the runs made had, and no deviation: it may be of either sign
+    data = fit.problem.data.with_runs((run,))
+    problem = dataclasses.replace(fit.problem, data=data, instants=1, scatter=())
     turns = np.array([bool(kind.line) for kind in problem.effects if kind.own_numbers(1)], bool)
     count = int(turns.sum())
     steps = np.array([1e-4 * angle, 1e-3 * angle])

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from diagnosis import diagnose
+from diagnosis.answer.next_run import separation
 from diagnosis.search.investigate import investigate
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
@@ -102,6 +103,13 @@ def test_intervals_hold_the_scatter() -> None:
     assert std > 0.7 * INERTIA * SPRING / np.sqrt(len(SPRINGS))
     assert abs(value - INERTIA) < 4.0 * std
     assert repeats.similarity.own(repeats.chosen.std("yaw_inertia"), "kg m2") < 0.1 * std
+
+
+def test_a_further_run_is_predicted_without_a_deviation() -> None:
+    fitted = investigate(campaign(cubic=0.1)).chosen
+    assert fitted.problem.scatter
+    run = fitted.problem.data.runs[0]
+    assert separation(fitted, fitted, run, 0.3) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
