@@ -26,7 +26,7 @@ from tunnel_sim.effects import Effect
 
 _ROUNDS = 3  # of widths and fits
 _REPEATING = 8  # iterations of a fit to runs that repeat: it is close where they do
-_FEWEST = 2  # runs that may differ from each other
+_FEWEST = 3  # runs that may differ: one difference gives a width to within a factor of 16 only
 _IN_ORDER = 5  # runs that show an order
 
 _TOLERANCE = 1e-7  # drop of χ², as a share of it, at which the answer's fit has converged
@@ -35,7 +35,7 @@ Kept = NDArray[np.bool_]
 
 
 def may_scatter(kinds: Sequence[type[Effect]], data: Data) -> tuple[type[Effect], ...]:
-    """The differences that the runs could show: two of them at least have what differs, and a spring."""
+    """The differences that the runs could show: three of them at least have what differs, and a spring."""
     runs = {"always": len(data.runs), "wind_on": sum(run.wind_on for run in data.runs)}
     held = data.model.restored
     return tuple(kind for kind in kinds if kind.scatters and held and runs[kind.condition] >= _FEWEST)
