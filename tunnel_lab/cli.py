@@ -18,6 +18,7 @@ import typer
 from tunnel_lab.commands import (
     about,
     blind,
+    demo,
     diagnose,
     effects,
     experiments,
@@ -106,7 +107,7 @@ def tunnel(
 
 
 COMMANDS: dict[str, Callable[..., None]] = {
-    "demo": paper.demo,
+    "demo": demo.demo,
     "plan": simulate.plan_drive,
     "simulate": simulate.simulate,
     "import": files.import_files,
