@@ -19,7 +19,7 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
-from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, library, shown
+from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -144,8 +144,8 @@ def extras() -> Iterator[tuple[str, str]]:
 
     for extra, modules in EXTRAS.items():
         missing = [name for name in modules if find_spec(name) is None]
-        remedy = f"pip install 'virtual-wind-tunnel[{extra}]'"
-        yield f"extra {extra}", f"lacks {', '.join(missing)}: {remedy}" if missing else "installed"
+        lacks = f"lacks {', '.join(missing)}: run {installing(extra)}"
+        yield f"extra {extra}", lacks if missing else "installed"
 
 
 def self_check() -> Iterator[tuple[str, str, bool]]:

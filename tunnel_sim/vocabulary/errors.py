@@ -70,14 +70,18 @@ EXTRAS = {
 """The modules of each extra of ``pyproject.toml`` that a command needs."""
 
 
+def installing(extra: str) -> str:
+    """The command that installs an extra, one of `EXTRAS`, in a clone of the project: it is on no package index."""
+    return f".venv/bin/pip install '.[{extra}]' in the clone of the project"
+
+
 def library(name: str, use: str, extra: str, where: str = "") -> Any:
     """A library of an extra, by the name of its module and what needs it; one of `EXTRAS`."""
     try:
         return import_module(name)
     except ImportError:
         what = f"{use} needs the package {name.partition('.')[0]}"
-        remedy = f"run: pip install 'virtual-wind-tunnel[{extra}]'"
-        raise TunnelError(what, where=where, remedy=remedy) from None
+        raise TunnelError(what, where=where, remedy=f"run {installing(extra)}") from None
 
 
 def added_to(group: str) -> dict[str, EntryPoint]:
