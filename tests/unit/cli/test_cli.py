@@ -36,8 +36,23 @@ def assert_refused(outcome: Outcome, *parts: str) -> None:
 def test_no_command_shows_the_help(tunnel: Tunnel) -> None:
     status, out, err = tunnel()
     assert (status, err) == (0, "")
-    for command in COMMANDS:
-        assert f"tunnel {command}" in out
+    assert "tunnel COMMAND --help" in out
+
+
+def test_the_help_shows_every_command_once_below_its_group(tunnel: Tunnel) -> None:
+    _, out, _ = tunnel("--help")
+    shown: dict[str, list[str]] = {}
+    for line in out.splitlines():
+        if heading := re.match(r"╭─ (.+?) ─", line):
+            group = shown.setdefault(heading[1], [])
+        elif row := re.match(r"│ ([a-z]+) +\S", line):
+            group.append(row[1])
+    assert shown.pop("Options") == []
+    assert shown == {group: list(members) for group, members in cli.GROUPS.items()}
+    assert next(iter(shown.items())) == ("Start here", ["demo", "bench", "import", "diagnose", "simulate"])
+    names = [name for members in shown.values() for name in members]
+    assert sorted(names) == sorted(set(names)) == sorted([*COMMANDS, "blind"])
+    assert not any(re.search(rf"\btunnel {name}\b", out) for name in names)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -165,7 +180,7 @@ def test_help_imports_nothing_heavy_and_takes_hardly_longer_than_any_help() -> N
     )
     seconds, done = processor_time(script)
     assert done.stderr == "[]\n"
-    assert "tunnel demo" in done.stdout
+    assert "Start here" in done.stdout
     assert seconds < 2.5 * processor_time(bare)[0]
 
 
