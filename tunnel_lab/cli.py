@@ -7,11 +7,12 @@ Exit status: 0 success; 1 a check or an estimate failed; 2 bad input, with one l
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cache, partial
-from typing import Annotated, cast
+from functools import cache
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -132,7 +133,25 @@ for _group, _members in GROUPS.items():
             app.command(_name, rich_help_panel=_group)(_wider(_command))
 
 
-_whole = cache(partial(typer.main.get_command, app))  # built once however often a process calls `main`
+_MARKUP = re.compile(r"\[(?=[a-z#/@])(?!/?bold\])")
+"""A bracket that Rich would take for markup; of markup the help has headings only."""
+
+
+def _with_plain_brackets(command: Any) -> None:
+    """Show brackets in the help of a command, its options and its own commands as they are, such as ``[drive]``."""
+    for text in (command, *command.params):
+        for name in ("help", "short_help"):
+            if said := getattr(text, name, None):
+                setattr(text, name, _MARKUP.sub(r"\\[", said))
+    for own in getattr(command, "commands", {}).values():
+        _with_plain_brackets(own)
+
+
+@cache  # built once however often a process calls `main`
+def _whole() -> Any:
+    command = typer.main.get_command(app)
+    _with_plain_brackets(command)
+    return command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

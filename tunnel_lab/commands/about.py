@@ -18,6 +18,7 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.terminal.encoding import printable_json
+from tunnel_lab.terminal.inputs import ending
 from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
@@ -196,7 +197,13 @@ SCHEMAS = {
 def schema(
     document: Annotated[str, Argument(help="campaign, plan, estimate or diagnosis.")],
     out: Annotated[
-        Path | None, Option("--out", metavar="FILE", help="Write to a file instead of standard output.")
+        Path | None,
+        Option(
+            "--out",
+            callback=ending(".json"),
+            metavar="FILE.json",
+            help="Write to a file instead of standard output.",
+        ),
     ] = None,
 ) -> None:
     """Print the JSON schema of a document.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import known_estimator, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import ending, known_estimator, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -29,9 +29,9 @@ def sweep(
     out: Annotated[
         Path | None, Option("--out", "-o", metavar="FOLDER", help="Folder of the results.")
     ] = None,
-    workers: Annotated[
+    jobs: Annotated[
         int | None,
-        Option("--workers", min=1, help="Processes on this machine. Default: one for each processor."),
+        Option("--jobs", min=1, help="Processes on this machine. Default: one for each processor."),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -96,15 +96,15 @@ def sweep(
         raise TunnelError(
             f"{missing} is missing", where="sweep", remedy="give FILE --out FOLDER, or --summary FOLDER"
         )
-    if workers is not None and scheduler not in (None, "local"):
+    if jobs is not None and scheduler not in (None, "local"):
         what = "its workers are started on their own machines"
-        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --workers")
+        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --jobs")
     from tunnel_lab.experiments.runner import available_processors, lasting_processes, on_cluster
     from tunnel_lab.experiments.sweep import run_sweep
     from tunnel_lab.experiments.sweep_cases import read_sweep
 
     plan = read_sweep(file)
-    count = min(workers or available_processors(), plan.shards)
+    count = min(jobs or available_processors(), plan.shards)
 
     def say_line(line: str) -> None:
         say(f"tunnel: {line}", stderr=True)
@@ -185,7 +185,13 @@ def score(
         ),
     ] = None,
     write_baseline: Annotated[
-        Path | None, Option("--write-baseline", metavar="FILE", help="Write the trials as a baseline.")
+        Path | None,
+        Option(
+            "--write-baseline",
+            callback=ending(".parquet"),
+            metavar="FILE",
+            help="Write the trials as a baseline.",
+        ),
     ] = None,
     breakdown: Annotated[
         bool, Option("--breakdown", help="Show the bias caused by each unmodelled effect instead.")

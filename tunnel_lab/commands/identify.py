@@ -18,6 +18,7 @@ from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
     LeaveOutOption,
+    ending,
     given_campaign,
     known_estimator,
     refuse_unwritable_files,
@@ -55,7 +56,12 @@ def run(
     ] = "output_error",
     json: Annotated[
         Path | None,
-        Option("--json", metavar="FILE", help="Write the estimate as JSON; - for standard output."),
+        Option(
+            "--json",
+            callback=ending(".json"),
+            metavar="FILE",
+            help="Write the estimate as JSON; - for standard output.",
+        ),
     ] = None,
     weights: Annotated[
         Path | None,

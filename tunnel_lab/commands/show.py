@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -289,7 +290,7 @@ def bench(
     (import), state the conditions, identify, diagnose, find the run that would
     distinguish the answers, and write the report. You can go on in a terminal at
     any point. Only this machine's user can open the page: its address has a secret
-    in it. It needs the extra bench (.venv/bin/pip install '.\[bench]' in the clone
+    in it. It needs the extra bench (.venv/bin/pip install '.[bench]' in the clone
     of the project), and no network.
 
     [bold]Examples[/bold]
@@ -313,6 +314,10 @@ def bench(
         raise TunnelError("needs Linux or macOS", where="tunnel bench", remedy="use the commands")
     from tunnel_lab.bench.server import serve
 
+    if not folder.is_dir():
+        quoted = shlex.quote(str(folder))
+        remedy = f"make it with: mkdir -p {quoted}, or leave FOLDER out for the current folder"
+        raise TunnelError("there is no such folder", where=shown(folder), remedy=remedy)
     opened = (folder / CAMPAIGN_FILE).is_file()
     campaign = folder.resolve()
     serve(

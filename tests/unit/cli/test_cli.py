@@ -76,7 +76,7 @@ def test_the_version_is_the_distributions(tunnel: Tunnel) -> None:
         (["identify"], ["Missing argument"]),
         (["springs", "--colour"], ["No such option", "--colour"]),
         (["simulate", "plan.toml"], ["Missing option", "--out"]),
-        (["simulate", "plan.toml", "--out", "x", "--format", "xls"], ["xls", "parquet", "csv"]),
+        (["simulate", "plan.toml", "--out", "x", "--file-format", "xls"], ["xls", "parquet", "csv"]),
         (["simulate", "plan.toml", "--out", "x", "--seed", "-1"], ["--seed"]),
         (["simulate", "plan.toml", "--out", "x", "--seed", "one"], ["--seed"]),
         (["springs", "one.csv", "two.csv"], ["two.csv"]),
@@ -211,4 +211,3 @@ def test_options_stand_in_groups_with_room_for_their_descriptions(
             assert begins is not None, panel
             assert len(panel[0]) - begins.start() - 2 > 30, panel
             panel = []
-    assert "--delimiter" not in out

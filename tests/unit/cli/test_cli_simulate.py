@@ -36,7 +36,9 @@ def test_a_plan_becomes_a_campaign_that_can_be_identified(tunnel: Tunnel, tmp_pa
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(tunnel: Tunnel, tmp_path: Path) -> None:
     for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
-        assert tunnel("simulate", PLAN, "--out", tmp_path / name, "--seed", seed, "--format", "csv")[0] == 0
+        assert (
+            tunnel("simulate", PLAN, "--out", tmp_path / name, "--seed", seed, "--file-format", "csv")[0] == 0
+        )
     a, b, c = (contents(tmp_path / name) for name in "abc")
     assert a == b
     assert a.keys() == c.keys()
