@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -64,9 +65,14 @@ def test_every_command_explains_itself(tunnel: Tunnel, command: str) -> None:
 
 
 def test_the_version_is_the_distributions(tunnel: Tunnel) -> None:
-    from importlib.metadata import version
-
     assert tunnel("--version") == (0, f"tunnel {version('virtual-wind-tunnel')}\n", "")
+
+
+def test_the_package_runs_as_a_module_from_the_tree() -> None:
+    tree = Path(cli.__file__).parents[1]
+    words = [sys.executable, "-m", "tunnel_lab", "--version"]
+    done = subprocess.run(words, cwd=tree, capture_output=True, text=True, check=True)
+    assert done.stdout == f"tunnel {version('virtual-wind-tunnel')}\n"
 
 
 @pytest.mark.parametrize(

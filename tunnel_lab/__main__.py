@@ -1,0 +1,7 @@
+"""``python -m tunnel_lab``: the command ``tunnel`` of the source tree in which Python is started."""
+
+import sys
+
+from tunnel_lab.cli import main
+
+sys.exit(main())
