@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,9 @@ LONGEST_S = 600.0  # of a cell, on a busy machine
 
 def executed(path: Path) -> Any:
     """A notebook with the outputs of a run of all its cells, without times and without the kernel's version."""
-    import nbformat
     from nbclient import NotebookClient
 
+    nbformat: Any = import_module("nbformat")
     notebook = nbformat.read(path, as_version=4)
     kept = dict(notebook.metadata)
     resources = {"metadata": {"path": str(path.parent)}}  # where Jupyter starts a notebook
@@ -31,8 +32,7 @@ def executed(path: Path) -> Any:
 
 def main() -> None:
     """Store the outputs of the notebooks that are named, or of all."""
-    import nbformat
-
+    nbformat: Any = import_module("nbformat")
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", help="notebooks without .ipynb; default: all")
     wanted = parser.parse_args().names or sorted(path.stem for path in FOLDER.glob("*.ipynb"))
