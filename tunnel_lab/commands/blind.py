@@ -19,6 +19,7 @@ from tunnel_lab.terminal.inputs import (
     with_quiet,
 )
 from tunnel_lab.terminal.outputs import bar, console, rich_table, say, say_written, show_tables
+from tunnel_sim.vocabulary.errors import counted
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
 
@@ -156,7 +157,7 @@ def make(
             progress=progress,
             show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
-    say(f"Written: {out} ({count} campaigns), key {where}")
+    say(f"Written: {out} ({counted(count, 'campaign')}), key {where}")
     say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")
 
 

@@ -13,7 +13,7 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import ending, known_estimator, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables, table
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     from tunnel_lab.experiments.score_trials import Results
@@ -113,11 +113,12 @@ def sweep(
     with bar("cases", plan.size) as progress:
         outcome = run_sweep(plan, out, crew, progress)
     if outcome.found:
-        say(f"{outcome.found} of {plan.shards} shards were finished before")
+        say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
     estimates = plan.size * len(plan.document.estimators)
-    say(f"Written: {out} ({plan.size} cases, {plan.runs} runs, {estimates} estimates)")
+    sizes = (plan.size, "case"), (plan.runs, "run"), (estimates, "estimate")
+    say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")
     if outcome.crashes:
-        crashes = f"{outcome.crashes} estimates raised an exception"
+        crashes = f"{counted(outcome.crashes, 'estimate')} raised an exception"
         say(f"{crashes}: see status 'raised' in the results", stderr=True)
         raise typer.Exit(1)
 
@@ -145,7 +146,7 @@ def _summarise(folder: Path) -> None:
             written += save_both(drawn, target / f"{name}.png")
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
-        say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")
+        say(f"Finished: {done} of {counted(shards, 'shard')}; run the same command again for the rest\n")
     along = map(sweep_summary.axis_table, grouped.values())
     show_tables(sweep_summary.overall_table(lines), *along)
     say(sweep_summary.BRACKETS)

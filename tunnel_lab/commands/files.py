@@ -13,7 +13,7 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import ending
 from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 _column = partial(Option, rich_help_panel="Columns")
 _unit = partial(Option, rich_help_panel="Units")
@@ -176,7 +176,7 @@ def import_files(
         raise typer.Exit(1)
     write_imported(imported, out, overwrite=overwrite, picture=import_picture)
     count = len(imported.campaign.runs)
-    say(f"Written: {out} ({count} run{'s' if count > 1 else ''}, {out / 'import.png'} shows them)")
+    say(f"Written: {out} ({counted(count, 'run')}, {out / 'import.png'} shows them)")
 
 
 class ExportFormat(StrEnum):
@@ -222,4 +222,4 @@ def export(
     data = read_campaign(campaign)
     export_campaign(data, path, format.value)
     count = len(data.runs)
-    say(f"Written: {path} ({count} run{'s' if count > 1 else ''})")
+    say(f"Written: {path} ({counted(count, 'run')})")

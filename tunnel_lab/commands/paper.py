@@ -13,7 +13,7 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line, shown
 
 STIFFNESS, FREQUENCY, SPRING = "stiffness_N_m_per_rad", "frequency_Hz", "spring"
 REMEDY = f"give a CSV file with the columns {STIFFNESS} and {FREQUENCY}, and optionally {SPRING}"
@@ -136,7 +136,9 @@ def read_spring_table(path: Path) -> SpringTable:
     names, stiffness, frequency = [], [], []
     for number, (where, row) in enumerate(rows[1:], 1):
         if len(row) <= max(columns.values()):
-            raise TunnelError(f"has {len(row)} values", where=where, remedy="give one for each column")
+            raise TunnelError(
+                f"has {counted(len(row), 'value')}", where=where, remedy="give one for each column"
+            )
         name = row[columns[SPRING]].strip() if SPRING in columns else ""
         if len(name) > limits.NAME_CHARACTERS:
             what = f"the spring's name has {len(name)} characters"
@@ -145,7 +147,9 @@ def read_spring_table(path: Path) -> SpringTable:
         stiffness.append(_positive(row[columns[STIFFNESS]], where))
         frequency.append(_positive(row[columns[FREQUENCY]], where))
     if len(names) < 3:
-        raise TunnelError(f"has {len(names)} springs", where=str(path), remedy="give three or more")
+        raise TunnelError(
+            f"has {counted(len(names), 'spring')}", where=str(path), remedy="give three or more"
+        )
     return SpringTable(tuple(names), tuple(stiffness), tuple(frequency))
 
 

@@ -12,7 +12,7 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
-from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -135,7 +135,7 @@ def simulate(
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )
-    say(f"Written: {folder} ({len(campaign.runs)} runs)")
+    say(f"Written: {folder} ({counted(len(campaign.runs), 'run')})")
     if picture is not None:
         written = []
         for i, page in enumerate(trace_pages(campaign), 1):

@@ -57,6 +57,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else f"use one of {', '.join(names)}"
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things in words: "1 gap", "2 gaps"; the plural of the noun ends in s."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 EXTRAS = {
     "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
     "frames": ("pandas", "xarray"),
