@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
 
 _ABSORBED = 1e-13  # share of a column's power, below which deviations of the runs absorb all of it
@@ -194,27 +195,22 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
     return widths
 
 
-DEVIATIONS = ("wind_speed", "spring_stiffness", "mechanical_damping")
-"""What differs between runs, by the key of ``[repeatability]``; each relative to the run's own value."""
-
-
 @dataclass(frozen=True)
 class UsualWidths:
     """What is known of the widths of runs that nobody has stated: judgements on rigs in general.
 
     Args:
-        wind_speed: a good tunnel holds its speed to some tenths of a per cent; a fraction, one standard deviation.
-        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; a fraction,
-            one standard deviation.
-        mechanical_damping: bearings and cables come back to a per cent; a fraction, one standard deviation.
+        wind_speed: one standard deviation, a fraction.
+        spring_stiffness: one standard deviation, a fraction.
+        mechanical_damping: one standard deviation, a fraction.
         decades: standard deviation of log10(width), dimensionless: a rig ten times as good or bad is not unusual.
         least: least width that is considered, over the usual one; a ratio.
         most: greatest width that is considered, over the usual one; a ratio.
     """
 
-    wind_speed: float = 0.003
-    spring_stiffness: float = 0.0005
-    mechanical_damping: float = 0.01
+    wind_speed: float = USUAL_SCATTER["wind_speed"]
+    spring_stiffness: float = USUAL_SCATTER["spring_stiffness"]
+    mechanical_damping: float = USUAL_SCATTER["mechanical_damping"]
     decades: float = 1.0
     least: float = 1e-3
     most: float = 20.0
@@ -223,7 +219,7 @@ class UsualWidths:
         """What is known of the widths of some deviations.
 
         Args:
-            names: of `DEVIATIONS`.
+            names: of `SCATTERED`.
             stated: relative standard deviations that the campaign states, by name; they are used as they are.
         """
         usual = np.array([getattr(self, name) for name in names], np.float64)
