@@ -17,8 +17,8 @@ import numpy as np
 from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
-from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
+from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
@@ -218,7 +218,7 @@ def is_no_noise(fitted: Fit) -> bool:
 
 
 def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
-    """Whether a law of some kind closes more than a share of what a fit leaves, on runs held out of the law's fit."""
+    """Whether a law of some kind closes more than a share of what a fit leaves, on held-out runs."""
     unexplained = Unexplained(fitted)
     if unexplained.held_out != "runs":  # no run can be left out
         return False
