@@ -11,7 +11,7 @@ import pytest
 from identification import Estimate, RunEstimate, identify
 from identification.datasets import measured_campaign
 from identification.estimators import ENTRY_POINTS, SUMMARIES, known_estimators, make_estimator
-from tunnel_lab.terminal.inputs import known_estimator
+from tunnel_lab.terminal.inputs import chosen_estimator
 from tunnel_sim import Campaign, TunnelError
 
 
@@ -36,7 +36,7 @@ def _plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("_plugged_in")
 def test_it_is_known_and_used_by_name() -> None:
     assert known_estimators() == (*SUMMARIES, "idle", "gone", "misnamed")
-    known_estimator("idle")
+    assert chosen_estimator("idle") == "idle"
     found = identify(measured_campaign("rotary-pendulum"), "idle")
     assert (found.estimator, found.cn_beta) == ("idle", None)
 
