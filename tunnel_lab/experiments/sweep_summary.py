@@ -16,6 +16,7 @@ import numpy as np
 from identification.printing import SYMBOLS, concise, significant, unit
 from identification.scoring import Score, Trials, score
 from identification.statistics import Proportion
+from tunnel_lab.experiments.score_view import share_text
 from tunnel_lab.experiments.sweep import SCATTER_COLUMNS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
@@ -276,8 +277,8 @@ def overall_table(lines: Iterable[Line]) -> Table:
     kept = [line for line in lines if line.axis == OVERALL]
     pooled = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
     result = table(
-        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/bound", "in 95 % interval",
-        "failed", right=("trials",),
+        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/\nbound",
+        "95 % covers\n[%]", "failed\n[%]", right=("trials",),
     )  # fmt: skip
     last = ""
     for line in kept:
@@ -287,7 +288,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
         score = line.score
         result.add_row(
             line.estimator, NAMES[line.quantity], str(score.count), _figure(score.bias), _figure(score.rmse),
-            _figure(score.rmse_over_bound), _percent(score.coverage), _percent(score.failures),
+            _figure(score.rmse_over_bound), share_text(score.coverage), share_text(score.failures),
         )  # fmt: skip
     return result
 
@@ -312,10 +313,3 @@ def _figure(quantity: Quantity | None) -> str:
     if quantity is None:
         return "–"
     return f"{concise(quantity.value, quantity.std)} {'' if quantity.unit == '1' else quantity.unit}".rstrip()
-
-
-def _percent(share: Proportion | None) -> str:
-    if share is None:
-        return "–"
-    low, high = share.interval
-    return f"{100.0 * share.value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
