@@ -116,6 +116,6 @@ def _checked(found: object, name: str, campaign: Campaign) -> Estimate:
         raise TunnelError(what, where=where, remedy=f"return identification.Estimate; {remedy}")
     given, wanted = [run.id for run in found.runs], [run.id for run in campaign.runs]
     if given != wanted:
-        what = f"returned the runs {', '.join(given) or 'of none'} and not {', '.join(wanted)}"
+        what = f"returned runs {', '.join(given) or '(none)'}, not {', '.join(wanted)}"
         raise TunnelError(what, where=where, remedy=f"give a RunEstimate for each run, in order; {remedy}")
     return found

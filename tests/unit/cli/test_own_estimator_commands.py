@@ -7,14 +7,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 import pytest
 
 from identification import estimators, identify, make_estimator, register_estimator
 from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
+from tests.reference.free_decays import TWELVE, campaign
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.experiments import score_trials
+from tunnel_lab.experiments import breakdown, score_trials
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.sweep_cases import read_sweep
 from tunnel_sim import TunnelError
@@ -138,6 +140,20 @@ def test_an_exception_fails_the_check(tunnel) -> None:
     assert RAISED in err
 
 
+def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
+    sys.path.insert(0, str(folder))
+    names = [estimators.register_from(f"own_method:{kind}") for kind in ("Mine", "Broken")]
+    given = campaign(TWELVE[:4], noise=5e-4, duration=4.0, rate=200.0, rng=np.random.default_rng(1))
+    case = breakdown.BiasCase("no effect", 0.0, 0.0, 0, given, dict.fromkeys(breakdown.QUANTITIES, 1e-3))
+    rows = breakdown.break_down([case], names, 1, jobs=1)
+    mine, broken = ([row for row in rows if row["estimator"] == name] for name in names)
+    assert all(row["value"] is not None for row in mine)
+    assert {row["status"] for row in broken} == {"raised TypeError"}
+    said, traceback = score_trials.raised_lines(rows)
+    assert said == "broken raised an exception once; counted as failures. The first:"
+    assert RAISED in traceback
+
+
 def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
     words = ("sweep", "small.toml", "--out", "out", "--workers", "1", "-e", "own_method:Mine")
     done = in_a_process(*words, cwd=folder)
@@ -199,7 +215,7 @@ def test_a_class_that_no_process_can_import_is_said(folder: Path) -> None:
 
 
 def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
-    from tests.unit.driven.test_driven_motion import campaign
+    from tests.unit.driven.test_driven_motion import campaign as driven_campaign
 
     class Plain:
         name = "plain"
@@ -215,7 +231,7 @@ def test_a_driven_run_goes_to_a_class_that_takes_it() -> None:
         name = "driven"
         takes_driven = True
 
-    given = campaign(("moment_nm", None))
+    given = driven_campaign(("moment_nm", None))
     with pytest.raises(TunnelError, match=r"plain takes free decays only; .* states takes_driven = True"):
         identify(given, Plain())
     assert identify(given, Driven()).runs[0].omega_n is not None

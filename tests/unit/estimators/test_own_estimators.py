@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, EntryPoints
 from typing import ClassVar
 
@@ -56,3 +57,21 @@ def test_what_is_not_an_estimator_is_one_line(name: str, why: str) -> None:
 def test_an_unknown_name_suggests_it() -> None:
     with pytest.raises(TunnelError, match="did you mean 'idle'"):
         make_estimator("idel")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda _: {"cn_beta": 0.5}, "estimator idle: returned dict and not an Estimate"),
+        (
+            lambda campaign: Estimate(campaign.name, "idle", ()),
+            r"returned runs \(none\), not swing-1, swing-2",
+        ),
+    ],
+)
+def test_an_answer_of_another_kind_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, answer: Callable[[Campaign], object], said: str
+) -> None:
+    monkeypatch.setattr(Idle, "estimate", lambda _, campaign: answer(campaign))
+    with pytest.raises(TunnelError, match=f"{said}.*check_estimator"):
+        identify(measured_campaign("rotary-pendulum"), Idle())
