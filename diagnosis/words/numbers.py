@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from diagnosis.facts.closure import Misfit
-from identification.printing import significant, unit_mark
+from identification.printing import significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 
 _ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -20,6 +20,26 @@ def probability(value: float) -> str:
     if value >= 0.995:
         return "> 0.99"
     return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+
+
+def percent_whole(value: float) -> str:
+    """A probability in whole per cent, never rounded to 0 or 100 %, such as ``97 %`` or ``> 99 %``."""
+    if value >= 0.995:
+        return "> 99 %"
+    return f"{100.0 * value:.0f} %" if value >= 0.005 else "< 1 %"
+
+
+def for_people(value: float, std: float | None) -> str:
+    """A value to three digits, with its standard deviation where they show it, such as ``1.96 ± 0.01`` or ``1.96``.
+
+    Args:
+        value: in any unit.
+        std: its standard deviation, in the same unit; None: not known.
+    """
+    last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 0.0
+    if std is None or std < 0.5 * last:
+        return significant(value, 3)
+    return with_std(value, std)
 
 
 def part(share: float) -> str:

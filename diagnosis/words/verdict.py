@@ -10,8 +10,11 @@ from diagnosis.words.numbers import (
     CHANNELS,
     MISFITS,
     Document,
+    for_people,
+    listed,
     misfit_of,
     of_swing,
+    percent_whole,
     plain,
     probability,
     rms_shown,
@@ -213,11 +216,32 @@ def _choices(found: list[Mapping[str, Any]]) -> str:
     """Which of the springs may be off, where the runs cannot tell; empty where they can."""
     if not found:
         return ""
-    springs = (f"{_spring_error(one)} ({probability(one['probability'])})" for one in found)
+    springs = [f"{_spring_off(one)} ({percent_whole(one['probability'])})" for one in found]
+    count, each = ("two", "both") if len(found) == 2 else (str(len(found)), "them")
     return (
-        f"These runs cannot tell which spring is off: {' or '.join(springs)}. The coefficients are averaged over "
-        "these choices: add runs with a third spring, or measure the stiffness of the springs again."
+        f"One of the {count} springs is off, and these runs cannot tell which: {', or '.join(springs)}. The "
+        f"coefficients are averaged over {each}."
     )
+
+
+def choice_steps(document: Document) -> list[str]:
+    """What tells the springs apart of which one is off; none where the runs do."""
+    found = sorted(one["stiffness"] for one in document["found"]["choices"])
+    if not found:
+        return []
+    further, which = ("third", "both springs") if len(found) == 2 else ("further", "these springs")
+    springs = listed([f"{one:.4g}" for one in found])
+    return [
+        f"Add runs with a {further} spring, or measure the stiffness of {which} again ({springs} N m/rad): these "
+        "runs cannot tell which of them is off."
+    ]
+
+
+def _spring_off(found: Mapping[str, Any]) -> str:
+    """A spring that may be off, such as ``16.12 N m/rad is 1.96 ± 0.01 % softer than stated``."""
+    size = for_people(100.0 * abs(found["error"]), 100.0 * found["std"])
+    side = "stiffer" if found["error"] > 0.0 else "softer"
+    return f"{found['stiffness']:.4g} N m/rad is {size} % {side} than stated"
 
 
 def _two_springs_off(found: Mapping[str, Any]) -> str:
@@ -345,6 +369,8 @@ def next_steps(document: Document) -> list[str]:
         if remark["outcome"] != "noted"
     ]
     steps += repeat_steps(document)
+    if causes != _UNKNOWN and document.get("decided", True):
+        steps += choice_steps(document)
     if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
         words = f"Make the run that distinguishes the answers: {run_words(run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
@@ -364,8 +390,10 @@ def next_steps(document: Document) -> list[str]:
         ]
     else:
         known = {kind.name: kind.advice for kind in known_effects()}
+        springs = {kind.name for kind in known_effects() if kind.chosen_spring()}
+        to_mend = [name for name in causes if name not in springs or not document["found"]["choices"]]
         steps += [
-            *(f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in causes),
+            *(f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in to_mend),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]
