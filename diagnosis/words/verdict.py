@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from diagnosis.settings import settings_of
+from diagnosis.settings import Settings, settings_of
+from diagnosis.words.causes import advice, consequence, from_causes, known_and_open
 from diagnosis.words.numbers import (
     CHANNELS,
     MISFITS,
@@ -14,7 +15,6 @@ from diagnosis.words.numbers import (
     listed,
     misfit_of,
     of_swing,
-    percent_whole,
     plain,
     probability,
     rms_shown,
@@ -62,7 +62,7 @@ def _answer_in_words(document: Document) -> tuple[str, str]:
         return "Unexplained gap", "unknown"
     names = named_answer(causes)
     if document["ambiguous_with"]:
-        return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
+        return known_and_open(document), "open"
     if (document.get("rest") or {}).get("material"):
         return f"{names}, in part", "open"
     return names, "found"
@@ -100,7 +100,7 @@ def _answer(document: Document, rest: str) -> str:
         return " ".join(filter(None, (said, repeats)))
     size, misfit = times_noise(excess), misfit_of(document)
     if misfit is not None:
-        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}, {size}"
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}"
     closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
     if not document["decided"]:
         said = f"There is a gap ({size}), and its cause is undecided."
@@ -111,7 +111,7 @@ def _answer(document: Document, rest: str) -> str:
         said = "no effect is named as its cause" if nearly else "no effect of the vocabulary explains it"
         return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest, repeats)))
     proper = without_scatter(causes)
-    last = (closes, rest, _immaterial(found["immaterial"]))
+    last = (closes, rest, _immaterial(found["immaterial"]) or consequence(document))
     if not proper:
         said = f"There is a gap ({size}). {repeats} With these differences allowed for,"
         return " ".join(filter(None, (said, *last)))
@@ -123,8 +123,7 @@ def _answer(document: Document, rest: str) -> str:
         sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
     said = (
         f"The gap ({size}) comes {'only in part ' if document['rest']['material'] else ''}"
-        f"from {plain(*proper)} (probability {probability(document['credible'][0]['probability'])}): "
-        f"{'; '.join(sources)}."
+        f"from {from_causes(document)}: {'; '.join(sources)}."
     )
     with_all = f"With {'them' if len(proper) > 1 else 'it'} added,"
     if len(causes) > len(proper):
@@ -216,7 +215,7 @@ def _choices(found: list[Mapping[str, Any]]) -> str:
     """Which of the springs may be off, where the runs cannot tell; empty where they can."""
     if not found:
         return ""
-    springs = [f"{_spring_off(one)} ({percent_whole(one['probability'])})" for one in found]
+    springs = [f"{_spring_off(one)} ({probability(one['probability'])})" for one in found]
     count, each = ("two", "both") if len(found) == 2 else (str(len(found)), "them")
     return (
         f"One of the {count} springs is off, and these runs cannot tell which: {', or '.join(springs)}. The "
@@ -238,10 +237,10 @@ def choice_steps(document: Document) -> list[str]:
 
 
 def _spring_off(found: Mapping[str, Any]) -> str:
-    """A spring that may be off, such as ``16.12 N m/rad is 1.96 ± 0.01 % softer than stated``."""
-    size = for_people(100.0 * abs(found["error"]), 100.0 * found["std"])
+    """A spring that may be off, such as ``16.12 N m/rad is 1.96 % softer than stated``."""
+    size = for_people(100.0 * abs(found["error"]), 100.0 * found["std"], "%")
     side = "stiffer" if found["error"] > 0.0 else "softer"
-    return f"{found['stiffness']:.4g} N m/rad is {size} % {side} than stated"
+    return f"{found['stiffness']:.4g} N m/rad is {size} {side} than stated"
 
 
 def _two_springs_off(found: Mapping[str, Any]) -> str:
@@ -295,7 +294,7 @@ def _spaced(mark: str) -> str:
     return mark if mark == "°" else f" {mark}"
 
 
-LEAST_SEPARATION = 3.0
+LEAST_SEPARATION = Settings().answer.separated_by
 """Standard deviations between two answers below which a run does not distinguish them: odds of about 100:1."""
 
 
@@ -389,11 +388,10 @@ def next_steps(document: Document) -> list[str]:
             "State the effect that you suspect in a file, and diagnose again with --effects-file.",
         ]
     else:
-        known = {kind.name: kind.advice for kind in known_effects()}
-        springs = {kind.name for kind in known_effects() if kind.chosen_spring()}
-        to_mend = [name for name in causes if name not in springs or not document["found"]["choices"]]
+        of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
+        to_mend = [name for name in causes if name not in of_spring or not document["found"]["choices"]]
         steps += [
-            *(f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in to_mend),
+            *(f"{advice(document, name)}." for name in to_mend),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]

@@ -103,6 +103,20 @@ def test_numbers_told_apart_poorly_are_said_to_be(given: Document) -> None:
     assert any(step.startswith("Log the wind speed of every run") for step in next_steps(given))
 
 
+def test_a_drift_alone_is_not_said_to_be_by_chance(given: Document) -> None:
+    trend = {"effect": "wind_speed_scatter", "change": 0.0081, "std": 0.0006, "p_value": 1e-5, "left": 0.0002}
+    repeatability = given["repeatability"]
+    repeatability["trends"] = [trend | {"only": True}]
+    repeatability["spreads"] = repeatability["spreads"][:1]
+    text = scatter_words(given)
+    assert text == (
+        "The runs drift and do not scatter: the wind speed rises by 0.810 ± 0.060 % from the first to the last run "
+        "(does the lab warm up, or the fan drift?). The intervals of the coefficients allow for it."
+    )
+    repeatability["trends"] = [trend]
+    assert "by chance" in scatter_words(given)
+
+
 def test_a_drift_is_not_by_chance(given: Document) -> None:
     trend = {"effect": "wind_speed_scatter", "change": 0.0081, "std": 0.0006, "p_value": 1e-5, "left": 0.0012}
     given["repeatability"]["trends"] = [trend]
