@@ -23,6 +23,8 @@ def known_and_open(document: Document) -> str:
     known = (
         listed([*(f"{plain(name)} ({_of(document, name)})" for name in certain), *scatter]) if certain else ""
     )
+    if known and len(alternatives) == 1:
+        return known
     several = ", or ".join(f"{said} ({probability(value)})" for said, value in alternatives)
     return f"{known}, and one of: {several}" if known else several
 
@@ -37,20 +39,35 @@ def from_causes(document: Document) -> str:
 
 
 def _parted(document: Document) -> tuple[list[str], list[tuple[str, float]]]:
-    """Effects that all likely answers have, and what each of them has beside these, with its probability."""
+    """Effects that all likely answers have, and what each of them has beside these, with its probability.
+
+    What is read off the records before anything is fitted is part of every answer.
+    """
     least = settings_of(document).answer.rivals_from
     first, *others = document["candidates"]
+    causes = without_scatter(document["causes"])
     named = {*document["causes"], *document["ambiguous_with"]}
-    likely = [first] + [
-        one for one in others if one["probability"] >= least and set(one["effect"].split(" + ")) <= named
-    ]
-    sets = [without_scatter(one["effect"].split(" + ")) for one in likely]
-    certain = [name for name in sets[0] if all(name in other for other in sets)]
+    read_off = [name for name in causes if name not in first["effect"].split(" + ")]
+    likely = [one for one in others if one["probability"] >= least and _effects(one) <= named]
+    sets = [(first, causes)]
+    sets += [(one, [*read_off, *without_scatter(sorted(_effects(one)))]) for one in likely]
+    certain = [name for name in causes if all(name in names for _, names in sets)]
     alternatives = []
-    for one, names in zip(likely, sets, strict=True):
-        own = [said_size(document, one, name) or plain(name) for name in names if name not in certain]
-        alternatives.append((listed(own) if own else "nothing beside", one["probability"]))
+    for one, names in sets:
+        own = [_called(document, one, name) for name in names if name not in certain]
+        alternatives.append((listed(own) if own else "nothing else", one["probability"]))
     return certain, alternatives
+
+
+def _effects(answer: Mapping[str, Any]) -> set[str]:
+    return set(answer["effect"].split(" + "))
+
+
+def _called(document: Document, answer: Mapping[str, Any], name: str) -> str:
+    """An effect by its name; one of the springs by which it is and how far off, which its name does not say."""
+    kind = {kind.name: kind for kind in known_effects()}.get(name)
+    said = said_size(document, answer, name) if kind is not None and kind.chosen_spring() else ""
+    return said or plain(name)
 
 
 def _of(document: Document, name: str) -> str:

@@ -32,7 +32,7 @@ from diagnosis.words.scatter import (
     scattering,
     without_scatter,
 )
-from identification.printing import COEFFICIENTS, significant, with_std
+from identification.printing import COEFFICIENTS, significant
 from tunnel_sim.effects import effect_class, known_effects
 
 _UNKNOWN = ["unknown"]
@@ -248,14 +248,8 @@ def _two_springs_off(found: Mapping[str, Any]) -> str:
     beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
     return (
         f"Two springs that are not as stiff as stated would explain the gap{beside}, such as "
-        f"{' and '.join(map(_spring_error, found['springs']))}: measure their stiffness again."
+        f"{' and '.join(map(_spring_off, found['springs']))}: measure their stiffness again."
     )
-
-
-def _spring_error(found: Mapping[str, Any]) -> str:
-    """A spring and its error, such as ``16.12 N m/rad by −1.96 ± 0.01 %``."""
-    error, std = 100.0 * found["error"], 100.0 * found["std"]
-    return f"{found['stiffness']:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, std)} %"
 
 
 RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {

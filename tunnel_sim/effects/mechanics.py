@@ -74,7 +74,7 @@ class FreePlay(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
-    size = "play of ±{half_width} between spring and rod"
+    size = "play of {half_width} to each side between spring and rod"
     advice = "Take up the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
@@ -241,9 +241,7 @@ class SpringMiscalibration(Effect):
         error, stated, std = values["error"], values["spring_stiffness"], stds["error"]
         size = text(100.0 * abs(error), None if std is None else 100.0 * std, "%")
         side = "stiffer" if error > 0.0 else "softer"
-        return (
-            f"spring {stated:.4g} N m/rad is {size} {side} than stated ({stated * (1.0 + error):.4g} N m/rad)"
-        )
+        return f"spring {stated:.4g} N m/rad is {size} {side} than stated ({stated * (1.0 + error):#.4g} N m/rad)"
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
