@@ -12,13 +12,17 @@ from identification.printing import COEFFICIENTS, significant, unit_mark
 from tunnel_sim.effects import known_effects
 
 
-def known_and_open(document: Document) -> str:
+def known_and_open(document: Document, *, sized: bool = True) -> str:
     """What the likely answers have in common, each cause with its own probability, and what is open between them.
 
-    Text such as ``coulomb friction (98 %), and one of: spring 16.12 N m/rad is 1.96 % softer than stated (59 %), or
-    gravity stiffness (40 %)``.
+    Args:
+        sized: whether springs of which one is off are stated with their errors, which another sentence may do.
+
+    Returns:
+        Text such as ``coulomb friction (98 %), and one of: spring 16.12 N m/rad is 1.96 % softer than stated
+        (59 %), or gravity stiffness (40 %)``.
     """
-    certain, alternatives = _parted(document)
+    certain, alternatives = _parted(document, sized)
     scatter = [BETWEEN_RUNS] if scattering(document["causes"]) else []
     known = (
         listed([*(f"{plain(name)} ({_of(document, name)})" for name in certain), *scatter]) if certain else ""
@@ -32,13 +36,13 @@ def known_and_open(document: Document) -> str:
 def from_causes(document: Document) -> str:
     """The causes of a decided answer with their probabilities, in the middle of a sentence."""
     if document["ambiguous_with"]:
-        return known_and_open(document)
+        return known_and_open(document, sized=False)
     proper = without_scatter(document["causes"])
     likely = probability(document["credible"][0]["probability"])
     return f"{plain(*proper)} (probability {likely})"
 
 
-def _parted(document: Document) -> tuple[list[str], list[tuple[str, float]]]:
+def _parted(document: Document, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
     """Effects that all likely answers have, and what each of them has beside these, with its probability.
 
     What is read off the records before anything is fitted is part of every answer.
@@ -54,7 +58,7 @@ def _parted(document: Document) -> tuple[list[str], list[tuple[str, float]]]:
     certain = [name for name in causes if all(name in names for _, names in sets)]
     alternatives = []
     for one, names in sets:
-        own = [_called(document, one, name) for name in names if name not in certain]
+        own = [_called(document, one, name, sized) for name in names if name not in certain]
         alternatives.append((listed(own) if own else "nothing else", one["probability"]))
     return certain, alternatives
 
@@ -63,10 +67,14 @@ def _effects(answer: Mapping[str, Any]) -> set[str]:
     return set(answer["effect"].split(" + "))
 
 
-def _called(document: Document, answer: Mapping[str, Any], name: str) -> str:
+def _called(document: Document, answer: Mapping[str, Any], name: str, sized: bool) -> str:
     """An effect by its name; one of the springs by which it is and how far off, which its name does not say."""
     kind = {kind.name: kind for kind in known_effects()}.get(name)
-    said = said_size(document, answer, name) if kind is not None and kind.chosen_spring() else ""
+    if kind is None or not kind.chosen_spring():
+        return plain(name)
+    if document["found"]["choices"] and not sized:
+        return one_of_springs(document)
+    said = said_size(document, answer, name)
     return said or plain(name)
 
 
@@ -87,16 +95,19 @@ def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
     if kind is None or not given:
         return ""
     if kind.chosen_spring() and document["found"]["choices"]:
-        return " or ".join(
-            kind.phrase(
-                {"error": one["error"], "spring_stiffness": one["stiffness"]},
-                {"error": one["std"], "spring_stiffness": None},
-                for_people,
-            )
+        each = (
+            f"{one['stiffness']:.4g} N m/rad by {for_people(100.0 * one['error'], 100.0 * one['std'], '%')}"
             for one in document["found"]["choices"]
         )
+        return f"{one_of_springs(document)}, {' or '.join(each)}"
     values = {full: one["value"] for full, one in given.items()}
     return kind.phrase(values, {full: one["std"] for full, one in given.items()}, for_people)
+
+
+def one_of_springs(document: Document) -> str:
+    """That one of the springs is off that the runs cannot tell apart."""
+    count = len(document["found"]["choices"])
+    return f"one of the {'two' if count == 2 else count} springs is off"
 
 
 def _parameters(answer: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import Settings, settings_of
-from diagnosis.words.causes import advice, consequence, from_causes, known_and_open
+from diagnosis.words.causes import advice, consequence, from_causes, known_and_open, one_of_springs
 from diagnosis.words.numbers import (
     CHANNELS,
     MISFITS,
@@ -82,7 +82,7 @@ def verdict(document: Document, rest: str) -> str:
         *map(_disturbed, document.get("disturbed", ())),
         *map(_second_mode, found["second_modes"]),
         _answer(document, rest),
-        _choices(found["choices"]),
+        _choices(document),
         *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
     ]
     return " ".join(filter(None, parts))
@@ -211,15 +211,15 @@ def _second_mode(found: Mapping[str, Any]) -> str:
     )
 
 
-def _choices(found: list[Mapping[str, Any]]) -> str:
+def _choices(document: Document) -> str:
     """Which of the springs may be off, where the runs cannot tell; empty where they can."""
+    found = document["found"]["choices"]
     if not found:
         return ""
     springs = [f"{_spring_off(one)} ({probability(one['probability'])})" for one in found]
-    count, each = ("two", "both") if len(found) == 2 else (str(len(found)), "them")
     return (
-        f"One of the {count} springs is off, and these runs cannot tell which: {', or '.join(springs)}. The "
-        f"coefficients are averaged over {each}."
+        f"{one_of_springs(document).capitalize()}, and these runs cannot tell which: {', or '.join(springs)}. The "
+        f"coefficients are averaged over {'both' if len(found) == 2 else 'them'}."
     )
 
 
