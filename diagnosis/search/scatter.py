@@ -164,10 +164,7 @@ def drifts(fitted: Fit, place: int) -> bool:
         place: of the number among those that differ in the fit.
     """
     columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
-    order = np.linspace(-0.5, 0.5, len(columns.seen))
-    beside, _ = columns.with_column(
-        [t * own[:, place] for t, own in zip(order, columns.deviations, strict=True)]
-    )
+    beside, _ = columns.with_drift(place)
     gain = columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
     all_of_them = np.ones(prior.usual.size, bool)
     left = _gain(beside, prior, all_of_them, np.arange(prior.usual.size) == place)
