@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from diagnosis.settings import Settings, settings_of
+from diagnosis.settings import settings_of
 from diagnosis.words.causes import advice, consequence, from_causes, known_and_open, one_of_springs
 from diagnosis.words.numbers import (
     CHANNELS,
@@ -291,14 +291,11 @@ def _spaced(mark: str) -> str:
     return mark if mark == "°" else f" {mark}"
 
 
-LEAST_SEPARATION = Settings().answer.separated_by
-"""Standard deviations between two answers below which a run does not distinguish them: odds of about 100:1."""
-
-
 def run_to_make(document: Document) -> Document | None:
     """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
     run: Document | None = document["next_run"]
-    return run if run is not None and run["separation"] >= LEAST_SEPARATION else None
+    least = settings_of(document).answer.separated_by
+    return run if run is not None and run["separation"] >= least else None
 
 
 def unplannable(document: Document) -> str:
