@@ -19,7 +19,7 @@ from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import USED_COLUMNS, FileTable, Reader, faults
 from tunnel_sim.files.reading import check_count, frame_schema, read_frame
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, counted, library, one_line
 
 _REMEDY = "write the file again, as Parquet or as text"
 
@@ -54,7 +54,7 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
             column = column - column.min()
         values = column.cast(pl.Float64).fill_null(float("nan")).to_numpy()
         channels.append(Channel(name, values, unit))
-    said = f"Parquet file: {len(channels)} columns of {frame.height} samples"
+    said = f"Parquet file: {counted(len(channels), 'column')} of {counted(frame.height, 'sample')}"
     table = Table(tuple(channels), said=(said,))
     return [table] if runs is None else by_texts(table, runs, frame.get_column(runs))
 
@@ -110,7 +110,8 @@ def _read(content: bytes, where: str) -> list[Table]:
             kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
             body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
             headed = "names in the row above the numbers" if layout.headed else "no names of columns"
-            said = f"workbook: sheet '{name}', {width} columns, numbers from row {layout.first + 1}, {headed}"
+            columns = counted(width, "column")
+            said = f"workbook: sheet '{name}', {columns}, numbers from row {layout.first + 1}, {headed}"
             stated = described.get(name, {})
             facts = {key: cell for key, cell in stated.items() if isinstance(cell, float)}
             if hold := stated.get("drive_hold"):
@@ -178,7 +179,7 @@ def tables_of_arrays(
         for above in sorted(facts, key=len):  # the nearest group counts
             if above == "" or group == above or group.startswith(above + "/"):
                 stated |= facts[above]
-        said = f"{kind}: {len(channels)} channel{'s' if len(channels) > 1 else ''} of {length} samples"
+        said = f"{kind}: {counted(len(channels), 'channel')} of {counted(length, 'sample')}"
         tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group))))
     return tables
 
@@ -312,7 +313,8 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
                         values = channel[:].astype(np.float64)
                         columns.append(Channel(name, values, known_unit(stated) or unit))
                 part = group.name if len(groups) > 1 else ""
-                said = (f"TDMS file: group '{group.name}', {len(columns)} channels of {length} samples",)
+                size = f"{counted(len(columns), 'channel')} of {counted(length, 'sample')}"
+                said = (f"TDMS file: group '{group.name}', {size}",)
                 tables.append(Table(tuple(columns), part, facts, said))
     return tables
 

@@ -30,7 +30,7 @@ from tunnel_sim.files.importing.tables import INPUT_FACTS, Channel, Table, headi
 from tunnel_sim.files.importing.units import UNITS, kind_of
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.drive import Drive, InputColumn, checked_drive
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line, shown
 from tunnel_sim.vocabulary.record import Array, Record
 
 _LEAST_ROWS = 16
@@ -112,7 +112,7 @@ def raw_records(
                 # Stamps are decimals: a start at one of them includes it.
                 slack = 1e-9 * max(abs(end) for end in (choices.start, choices.end) if end is not None)
                 kept = (time >= first - slack) & (time <= last + slack)
-                said.append(f"{int(kept.sum())} of {time.size} samples lie from --start to --end")
+                said.append(f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end")
             driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
             time, readings = time[kept], readings[kept]
             conditions = _condition_columns(table, pair, kept, said)
@@ -122,7 +122,7 @@ def raw_records(
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
             starts = [0, *restarts(time), time.size]
             if len(starts) > 2:
-                said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
+                said.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
             for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
                 clean = cleaned(time[a:b], readings[a:b])
                 if clean.time_s.size < 2:
