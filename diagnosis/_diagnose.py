@@ -131,7 +131,7 @@ def _assembled(
     left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead)
     answer = assemble(study, *localise(study), left_out, patched, chosen.kinds)
     noted = (
-        *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test),
+        *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test, named=study.named),
         *hum_noted(study.campaign, study.prepared.hum, study.similarity),
     )
     sized = replace(

@@ -21,8 +21,8 @@ MISFIT_DEVIATIONS = 3.29
 """`MISFIT_RATE` in two-sided standard deviations of a normal distribution."""
 
 DIFFERENCE_RATE = 0.01
-"""Of saying that two scores differ, that an input moves a result, or that the runs scatter more than stated
-uncertainties explain."""
+"""Of saying that two scores differ, that an input moves a result, that the runs scatter more than stated
+uncertainties explain, or that two springs disagree which are as well known as `SPRING_AT_BEST`."""
 
 DIFFERENCE_DEVIATIONS = 2.58
 """`DIFFERENCE_RATE` in two-sided standard deviations of a normal distribution."""
@@ -35,6 +35,10 @@ of the paper in view, whose p-value is 0.06: springs 4 and 7 are flagged at this
 
 SPRING_TOLERANCE = 0.01
 """Relative standard uncertainty of a stated stiffness: weights and arm of a static calibration."""
+
+SPRING_AT_BEST = 0.003
+"""The same of a spring that is calibrated with care: a few parts in a thousand. Two springs are said to disagree
+where even such springs would not."""
 
 INERTIA_FACTOR = 1.5
 """Factor by which a nominal inertia may be off: it comes from a drawing, without the support and the air that moves

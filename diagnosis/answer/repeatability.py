@@ -13,7 +13,7 @@ from diagnosis.likelihood.between_runs import RunColumns, width_prior
 from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities
 from diagnosis.likelihood.residuals import linear_coefficients
 from diagnosis.model.chance import Scatter
-from diagnosis.search.scatter import may_scatter, usual, with_deviations, without_deviations
+from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
 from identification.campaign.between_runs import (
     RunProducts,
     WidthPrior,
@@ -145,7 +145,9 @@ class _Runs:
         # the width is known by the runs alone
         p_value = min(1.0, tried * 2.0 * float(stdtr(count - _OF_TREND, -abs(slope) / std)))
         left = float(widths[list(self.kept).index(place)])
-        return Trend(kind.name, float(slope), std, p_value, left)
+        known = [one.name for one in self.fitted.problem.scatter]
+        only = kind.name in known and drifts(self.fitted, known.index(kind.name))
+        return Trend(kind.name, float(slope), std, p_value, left, only)
 
     def run(self, index: int) -> RunRepeat:
         """One run against the model."""

@@ -36,6 +36,7 @@ class Trend:
         std: its standard deviation, dimensionless.
         p_value: that the order of the runs shows as much by chance, times the number of trends sought.
         left: standard deviation of the runs' deviations from the drift, relative, dimensionless.
+        only: whether the runs show no scatter of the number beside the drift.
     """
 
     effect: str
@@ -43,6 +44,7 @@ class Trend:
     std: float
     p_value: float
     left: float
+    only: bool = False
 
 
 @dataclass(frozen=True)

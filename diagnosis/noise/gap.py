@@ -262,16 +262,17 @@ def _beside_mode(nominal: Fit) -> Fit | None:
     return try_fit(driven[0].problem, driven[0].point) if driven else None
 
 
-def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest) -> tuple[Noted, ...]:
+def noise_noted(noise: Noise, trend: NoiseTrend, test: GapTest, *, named: bool) -> tuple[Noted, ...]:
     """What the user should know of the noise.
 
     Args:
         trend: of the noise with the motion.
+        named: whether a cause of a gap is named: noise that misbehaves would be no part of the answer.
 
     Returns:
         Where the readings' steps may be all of the gap, where the noise is coloured, and where the sampling is too
-        slow to compare it with the motion.
+        slow to compare it with the motion and no cause is named.
     """
     within = (Fact("within step"),) if test.within_step else ()
-    slow = () if trend.judged else (Fact("not judged"),)
+    slow = () if trend.judged or named else (Fact("not judged"),)
     return tuple(Noted(tuple(noise.variance), one) for one in (*within, *noise.noted(), *slow))

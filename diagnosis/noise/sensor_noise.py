@@ -318,7 +318,7 @@ class NoiseTrend:
 
 
 _WINDOW = 0.02  # s: a small part of a swing, so that large angles and large rates fall in different windows
-_FEWEST = 10  # samples in a window
+_FEWEST = 5  # samples in a window: as many as a fourth difference spans
 _SHORTEST = 5.0 * _WINDOW  # s: of a record with several windows
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit
 from diagnosis.model.parameters import Point
-from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible, restricted
+from diagnosis.model.similarity import Similarity
+from diagnosis.search.hypothesis import Hypothesis, Scale, is_plausible
 from tunnel_sim.effects import Effect
 
 
@@ -68,21 +69,32 @@ def _other_springs(chosen: Hypothesis, kind: type[Effect], name: str) -> Sequenc
     whole, found = chosen.fit, []
     problem, severity = whole.problem, f"{kind.name}.{kind.parameters()[0].name}"
     stated = dict(problem.fixed)[name]
-    rest = restricted(whole, {other.name for other in problem.effects} - {kind.name})
-    known = dict(zip(rest.problem.names, rest.point.common.tolist(), strict=True))
     for spring in problem.data.springs:
         if spring == stated:
             continue
         fixed = tuple((key, spring if key == name else value) for key, value in problem.fixed)
         other = replace(problem, fixed=fixed)
-        # with two springs the error of the other is the opposite one, and the inertia makes up for it
-        start = dict(known) | {severity: -whole.value(severity)}
-        if "yaw_inertia" in start:
-            start["yaw_inertia"] *= 1.0 - whole.value(severity)
-        point = Point(
-            np.array([start.get(key, whole.value(key)) for key in other.names]), whole.point.release
-        )
-        fitted: Fit | None = try_fit(other, point)
+        fitted: Fit | None = try_fit(other, _exchanged(whole, severity))
         if fitted is not None and np.isfinite(fitted.total) and is_plausible(fitted):
             found.append(Hypothesis(chosen.effects, fitted))
     return found
+
+
+def _exchanged(whole: Fit, severity: str) -> Point:
+    """Where another spring is off instead: with two springs the same motion, so that no fit loses its phase.
+
+    A spring (1 + x) times as stiff as stated, with all moments divided by 1 + x, is as stiff as stated, and the
+    other spring is then 1/(1 + x) times as stiff as stated. Inertia, damping and moments of effects are fitted, and
+    so are the coefficients of the air, whose pressure is stated.
+    """
+    problem, factor = whole.problem, 1.0 / (1.0 + whole.value(severity))
+    scaled, air = Similarity(moment=factor), problem.data.model.coefficient_units
+    common = whole.point.common.copy()
+    for place, one in enumerate(problem.parameters.common):
+        if one.name == severity:
+            common[place] = factor - 1.0
+        elif one.name in air:
+            common[place] *= factor
+        else:
+            common[place] = scaled.similar(common[place], one.unit)
+    return Point(common, whole.point.release)

@@ -154,14 +154,16 @@ def only_drifts(fitted: Fit) -> bool:
     columns, prior = fitted.columns, width_prior(fitted.problem)
     if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
         return False
-    return all(
-        _drifts(columns, prior, int(place), chosen)
-        for place in np.flatnonzero(_shown(columns, prior, chosen))
-    )
+    return all(drifts(fitted, int(place)) for place in np.flatnonzero(_shown(columns, prior, chosen)))
 
 
-def _drifts(columns: RunColumns, prior: WidthPrior, place: int, chosen: ScatterSettings) -> bool:
-    """Whether the runs differ in one number in proportion to their place, and by nothing shown beside that."""
+def drifts(fitted: Fit, place: int) -> bool:
+    """Whether the runs differ in one number in proportion to their place, and by nothing shown beside that.
+
+    Args:
+        place: of the number among those that differ in the fit.
+    """
+    columns, prior, chosen = fitted.columns, width_prior(fitted.problem), fitted.settings.scatter
     beside, _ = columns.with_drift(place)
     gain = columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
     all_of_them = np.ones(prior.usual.size, bool)

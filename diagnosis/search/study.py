@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from diagnosis.facts.disturbance import Disturbance
-from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.nominal import NominalModel
 from diagnosis.model.similarity import Similarity
@@ -198,8 +198,7 @@ class Study:
             whole = sets.in_whole_runs()
         answers = [_answer(one, sets, whole) for one in _excused(sets, gap.test)]
         with clock.step("choices"):
-            left = misfit(prepared.nominal)
-            answers = [replace(one, choices=_choices(one, prepared.nominal, left)) for one in answers]
+            answers = [replace(one, choices=_choices(one, sets)) for one in answers]
         base = sets.view.base
         return cls(
             prepared,
@@ -248,9 +247,29 @@ def noise_explains(nominal: Fit, test: GapTest, weighed: Sequence[Weighed]) -> b
     return nominal.chance > weighing.shares_chance or (small and not closed)
 
 
-def _choices(answer: Answer, nominal: Fit, gap: ChannelMisfit) -> tuple[Choice, ...]:
-    """The choices of a probable answer that whole runs cannot exclude."""
-    stated, least = answer.stated, nominal.settings.search.choices_from
-    if stated is None or answer.probability < least or stated.fit.problem.data is not nominal.problem.data:
+def _choices(answer: Answer, sets: Sets) -> tuple[Choice, ...]:
+    """The choices of a probable answer that the runs cannot exclude, as its coefficients are fitted."""
+    nominal = sets.view.prepared.nominal
+    chosen = answer.stated if answer.random is None else answer.random.beside
+    if chosen is None or answer.probability < nominal.settings.search.choices_from:
         return ()
-    return choices(stated, gap)
+    if all(kind.chosen_spring() is None for kind in chosen.fit.problem.effects):
+        return ()
+    gap = _gap_beside(chosen.fit, nominal, sets.view.base)
+    return () if gap is None else choices(chosen, gap)
+
+
+def _gap_beside(fit: Fit, *known: Fit) -> ChannelMisfit | None:
+    """What the nominal model leaves of the readings of a fit, in their noise; None where its fit fails.
+
+    Args:
+        known: fits of the nominal model, the first of them to whole runs.
+    """
+    data = fit.problem.data
+    for base in known:
+        if base.problem.data is data:
+            return misfit(base)
+    if len(data.runs) != len(known[0].problem.data.runs):
+        return None
+    fitted = try_fit(replace(known[0].problem, data=data), known[0].point)
+    return None if fitted is None else misfit(fitted)

@@ -198,6 +198,13 @@ class AnswerSettings:
         "judgement",
         decision="0028",
     )
+    separated_by: float = setting(
+        3.0,
+        "Separation of two answers by a run from which it distinguishes them.",
+        "convention",
+        "Odds of about 100:1.",
+        unit="std",
+    )
     hidden_stds: float = setting(
         2.0, "Largest size of an effect that could hide, from its likeliest size.", "convention", unit="std"
     )

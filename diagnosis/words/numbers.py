@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from diagnosis.facts.closure import Misfit
-from identification.printing import significant, unit_mark
+from identification.printing import significant, unit_mark, with_std
 from tunnel_sim.effects import known_effects
 
 _ORDINALS = ("half", "third", "quarter", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -16,10 +16,28 @@ _CARDINALS = ("", "", "two", "three", "four", "five", "six", "seven", "eight", "
 
 
 def probability(value: float) -> str:
-    """A probability to two decimals, never rounded to 0 or 1, such as ``0.97`` or ``> 0.99``."""
+    """A probability in whole per cent, never rounded to 0 or 100 %, such as ``97 %`` or ``> 99 %``."""
     if value >= 0.995:
-        return "> 0.99"
-    return f"{value:.2f}" if value >= 0.005 else "< 0.01"
+        return "> 99 %"
+    return f"{100.0 * value:.0f} %" if value >= 0.005 else "< 1 %"
+
+
+def for_people(value: float, std: float | None, unit: str) -> str:
+    """A value to three digits, with its standard deviation where they show it, such as ``1.96 ± 0.12 %``.
+
+    Args:
+        value: in the unit; radians are shown in degrees.
+        std: its standard deviation, in the same unit; None: not known.
+        unit: as effects and documents write it.
+    """
+    if unit == "rad":
+        mark, factor = unit_shown(unit)
+        value, std = factor * value, None if std is None else factor * std
+    else:
+        mark = "" if unit == "1" else f" {unit if unit == '%' else unit_mark(unit)}"
+    last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 0.0
+    shown = significant(value, 3) if std is None or std < 0.5 * last else with_std(value, std)
+    return f"{shown.replace('-', '−') if shown.startswith('-') else shown}{mark}"
 
 
 def part(share: float) -> str:

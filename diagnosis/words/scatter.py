@@ -108,14 +108,20 @@ def repeats_words(document: Document) -> str:
 
 
 def scatter_words(document: Document) -> str:
-    """By how much the runs differ by chance, and what that means; empty where they do not."""
+    """By how much the runs differ by chance or drift, and what that means; empty where they do not."""
     spreads = spreads_of(document)
     shown = [one for one in spreads if one["shown"]]
     if not shown:
         return stated_words(document)
     trends = {one["effect"]: one for one in document["repeatability"].get("trends", ())}
-    parts = "; ".join(_differs(one, trends) for one in shown)
-    said = [f"{_start(document)}: {parts}. {_MEANT}", *map(trend_words, trends.values())]
+    drifting = {effect for effect, one in trends.items() if one.get("only")}
+    said = []
+    if scattered := [one for one in shown if one["effect"] not in drifting]:
+        parts = "; ".join(_differs(one, trends) for one in scattered)
+        said.append(f"{_start(document)}: {parts}. {_MEANT}")
+    said += map(trend_words, trends.values())
+    if not scattered:
+        said.append("The intervals of the coefficients allow for it.")
     return " ".join([*said, *_told_apart(spreads, settings_of(document).words)])
 
 
@@ -145,9 +151,12 @@ def trend_words(trend: Mapping[str, Any]) -> str:
     number = SCATTERS[trend["effect"]]
     change, std = 100.0 * abs(trend["change"]), 100.0 * trend["std"]
     goes = "rises" if trend["change"] > 0.0 else "falls"
+    moved = f"{NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the last run"
+    if trend.get("only"):
+        return f"The runs drift and do not scatter: {moved} ({_DRIFTS[number]})."
     return (
-        f"That is not all by chance: {NUMBERS[number]} {goes} by {with_std(change, std)} % from the first to the "
-        f"last run ({_DRIFTS[number]}), and differs by {percent_of(trend['left'])} beside that."
+        f"That is not all by chance: {moved} ({_DRIFTS[number]}), and differs by {percent_of(trend['left'])} "
+        "beside that."
     )
 
 

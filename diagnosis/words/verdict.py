@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import settings_of
+from diagnosis.words.causes import advice, consequence, from_causes, known_and_open, one_of_springs
 from diagnosis.words.numbers import (
     CHANNELS,
     MISFITS,
     Document,
+    for_people,
+    listed,
     misfit_of,
     of_swing,
     plain,
@@ -29,7 +32,7 @@ from diagnosis.words.scatter import (
     scattering,
     without_scatter,
 )
-from identification.printing import COEFFICIENTS, significant, with_std
+from identification.printing import COEFFICIENTS, significant
 from tunnel_sim.effects import effect_class, known_effects
 
 _UNKNOWN = ["unknown"]
@@ -59,7 +62,7 @@ def _answer_in_words(document: Document) -> tuple[str, str]:
         return "Unexplained gap", "unknown"
     names = named_answer(causes)
     if document["ambiguous_with"]:
-        return f"{names}, or {' or '.join(plain(n) for n in document['ambiguous_with'])}", "open"
+        return known_and_open(document), "open"
     if (document.get("rest") or {}).get("material"):
         return f"{names}, in part", "open"
     return names, "found"
@@ -79,7 +82,7 @@ def verdict(document: Document, rest: str) -> str:
         *map(_disturbed, document.get("disturbed", ())),
         *map(_second_mode, found["second_modes"]),
         _answer(document, rest),
-        _choices(found["choices"]),
+        _choices(document),
         *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
     ]
     return " ".join(filter(None, parts))
@@ -97,7 +100,7 @@ def _answer(document: Document, rest: str) -> str:
         return " ".join(filter(None, (said, repeats)))
     size, misfit = times_noise(excess), misfit_of(document)
     if misfit is not None:
-        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}, {size}"
+        size = f"{rms_shown(misfit, excess)} root mean square, {of_swing(misfit, excess)}"
     closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
     if not document["decided"]:
         said = f"There is a gap ({size}), and its cause is undecided."
@@ -108,7 +111,7 @@ def _answer(document: Document, rest: str) -> str:
         said = "no effect is named as its cause" if nearly else "no effect of the vocabulary explains it"
         return " ".join(filter(None, (f"There is a gap ({size}), and {said}.", nearly, rest, repeats)))
     proper = without_scatter(causes)
-    last = (closes, rest, _immaterial(found["immaterial"]))
+    last = (closes, rest, _immaterial(found["immaterial"]) or consequence(document))
     if not proper:
         said = f"There is a gap ({size}). {repeats} With these differences allowed for,"
         return " ".join(filter(None, (said, *last)))
@@ -120,8 +123,7 @@ def _answer(document: Document, rest: str) -> str:
         sources.append(f"{CHANNELS[kind.channel]}{wind}{f' ({plain(name)})' if len(proper) > 1 else ''}")
     said = (
         f"The gap ({size}) comes {'only in part ' if document['rest']['material'] else ''}"
-        f"from {plain(*proper)} (probability {probability(document['credible'][0]['probability'])}): "
-        f"{'; '.join(sources)}."
+        f"from {from_causes(document)}: {'; '.join(sources)}."
     )
     with_all = f"With {'them' if len(proper) > 1 else 'it'} added,"
     if len(causes) > len(proper):
@@ -212,15 +214,36 @@ def _second_mode(found: Mapping[str, Any]) -> str:
     )
 
 
-def _choices(found: list[Mapping[str, Any]]) -> str:
+def _choices(document: Document) -> str:
     """Which of the springs may be off, where the runs cannot tell; empty where they can."""
+    found = document["found"]["choices"]
     if not found:
         return ""
-    springs = (f"{_spring_error(one)} ({probability(one['probability'])})" for one in found)
+    springs = [f"{_spring_off(one)} ({probability(one['probability'])})" for one in found]
     return (
-        f"These runs cannot tell which spring is off: {' or '.join(springs)}. The coefficients are averaged over "
-        "these choices: add runs with a third spring, or measure the stiffness of the springs again."
+        f"{one_of_springs(document).capitalize()}, and these runs cannot tell which: {', or '.join(springs)}. The "
+        f"coefficients are averaged over {'both' if len(found) == 2 else 'them'}."
     )
+
+
+def choice_steps(document: Document) -> list[str]:
+    """What tells the springs apart of which one is off; none where the runs do."""
+    found = sorted(one["stiffness"] for one in document["found"]["choices"])
+    if not found:
+        return []
+    further, which = ("third", "both springs") if len(found) == 2 else ("further", "these springs")
+    springs = listed([f"{one:.4g}" for one in found])
+    return [
+        f"Add runs with a {further} spring, or measure the stiffness of {which} again ({springs} N m/rad): these "
+        "runs cannot tell which of them is off."
+    ]
+
+
+def _spring_off(found: Mapping[str, Any]) -> str:
+    """A spring that may be off, such as ``16.12 N m/rad is 1.96 % softer than stated``."""
+    size = for_people(100.0 * abs(found["error"]), 100.0 * found["std"], "%")
+    side = "stiffer" if found["error"] > 0.0 else "softer"
+    return f"{found['stiffness']:.4g} N m/rad is {size} {side} than stated"
 
 
 def _two_springs_off(found: Mapping[str, Any]) -> str:
@@ -228,14 +251,8 @@ def _two_springs_off(found: Mapping[str, Any]) -> str:
     beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
     return (
         f"Two springs that are not as stiff as stated would explain the gap{beside}, such as "
-        f"{' and '.join(map(_spring_error, found['springs']))}: measure their stiffness again."
+        f"{' and '.join(map(_spring_off, found['springs']))}: measure their stiffness again."
     )
-
-
-def _spring_error(found: Mapping[str, Any]) -> str:
-    """A spring and its error, such as ``16.12 N m/rad by −1.96 ± 0.01 %``."""
-    error, std = 100.0 * found["error"], 100.0 * found["std"]
-    return f"{found['stiffness']:.4g} N m/rad by {'+' if error > 0.0 else ''}{with_std(error, std)} %"
 
 
 RIVALS: Mapping[str, Callable[[Mapping[str, Any]], str]] = {
@@ -274,14 +291,11 @@ def _spaced(mark: str) -> str:
     return mark if mark == "°" else f" {mark}"
 
 
-LEAST_SEPARATION = 3.0
-"""Standard deviations between two answers below which a run does not distinguish them: odds of about 100:1."""
-
-
 def run_to_make(document: Document) -> Document | None:
     """The run that distinguishes the answers; None where none is proposed, or the best one would not."""
     run: Document | None = document["next_run"]
-    return run if run is not None and run["separation"] >= LEAST_SEPARATION else None
+    least = settings_of(document).answer.separated_by
+    return run if run is not None and run["separation"] >= least else None
 
 
 def unplannable(document: Document) -> str:
@@ -348,6 +362,8 @@ def next_steps(document: Document) -> list[str]:
         if remark["outcome"] != "noted"
     ]
     steps += repeat_steps(document)
+    if causes != _UNKNOWN and document.get("decided", True):
+        steps += choice_steps(document)
     if (run := run_to_make(document)) is not None and document["ambiguous_with"]:
         words = f"Make the run that distinguishes the answers: {run_words(run)}."
         steps.append(f"{words} Add it to the campaign and diagnose again.")
@@ -366,9 +382,10 @@ def next_steps(document: Document) -> list[str]:
             "State the effect that you suspect in a file, and diagnose again with --effects-file.",
         ]
     else:
-        known = {kind.name: kind.advice for kind in known_effects()}
+        of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
+        to_mend = [name for name in causes if name not in of_spring or not document["found"]["choices"]]
         steps += [
-            *(f"{known.get(name) or f'Repair or model what {plain(name)} stands for'}." for name in causes),
+            *(f"{advice(document, name)}." for name in to_mend),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",
         ]

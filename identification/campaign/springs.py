@@ -17,6 +17,7 @@ from identification.policy import (
     DIFFERENCE_DEVIATIONS,
     LEAST_SPRING_RESOLUTION,
     LEAST_SPRING_SPREAD,
+    SPRING_AT_BEST,
     SPRING_FLAG_RATE,
 )
 from identification.printing import with_std
@@ -111,6 +112,8 @@ def fit_springs(
 def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | None:
     """That the two springs of a campaign give different inertias; None where they agree, or there are others.
 
+    Two springs of which each is known to `SPRING_AT_BEST` are said to disagree at `DIFFERENCE_RATE`.
+
     Args:
         campaign: states the stiffnesses.
         runs: the estimates, of which the natural frequencies of free decays with the wind off are compared.
@@ -131,7 +134,8 @@ def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | Non
     stds = [float(np.sqrt(sum(each.std**2 for each in several))) / len(several) for several in (one, other)]
     apart = abs(means[0] / means[1] - 1.0)
     std = float(np.hypot(stds[0] / means[0], stds[1] / means[1]))
-    if stiff / soft < 1.0 + LEAST_SPRING_SPREAD or apart < LEAST_SPRING_SPREAD + DIFFERENCE_DEVIATIONS * std:
+    allowed = DIFFERENCE_DEVIATIONS * float(np.hypot(std, np.sqrt(2.0) * SPRING_AT_BEST))
+    if stiff / soft < 1.0 + LEAST_SPRING_SPREAD or apart < allowed:
         return None
     return Remark(
         Outcome.NOTED,
@@ -139,7 +143,7 @@ def pair_remark(campaign: Campaign, runs: Sequence[RunEstimate]) -> Remark | Non
         f"with the wind off the springs of {soft:g} and {stiff:g} N m/rad give inertias that differ by "
         f"{with_std(100.0 * apart, 100.0 * std)} %: one of them is not as stiff as stated, or another moment, such "
         "as gravity's, acts; two springs cannot tell which",
-        "add runs with a third spring, or measure both stiffnesses again",
+        "add runs with a third spring, or measure the stiffness of both springs again",
     )
 
 

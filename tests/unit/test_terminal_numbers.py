@@ -61,11 +61,11 @@ def test_answers(given: Document) -> None:
     assert len(listed) == 4
     for cells, candidate in zip(listed, given["candidates"], strict=False):
         assert cells[0] == candidate["effect"]
-        assert cells[1] == f"{candidate['probability']:.2f}"
+        assert cells[1] == f"{100.0 * candidate['probability']:.0f} %"
         fitted = candidate["effect"] not in ("none", "unknown")
         assert_shows(cells[2], [100 * candidate["closed"]] if fitted else [])
     assert_shows(last[0], [3])
-    assert last[1] == "< 0.01"
+    assert last[1] == "< 1 %"
 
 
 def test_several_effects_of_an_answer_have_a_line_each(given: Document) -> None:
@@ -96,7 +96,7 @@ def test_parameters_of_the_answer(given: Document) -> None:
 
 def test_effects_among_the_causes(given: Document) -> None:
     line = inclusion_line(given)
-    assert line.endswith(": quadratic_damping 0.93, coulomb_friction 0.07")
+    assert line.endswith(": quadratic_damping 93 %, coulomb_friction 7 %")
     assert line.index("quadratic_damping") < line.index("coulomb_friction")
     assert inclusion_line(given | {"inclusion": {"free_play": 0.009}}) == ""
 
@@ -128,7 +128,7 @@ def test_answers_that_have_no_probability_are_counted_with_theirs(given: Documen
     *listed, last = rows(candidates_table(given))
     assert len(listed) == 1
     assert_shows(last[0], [6])
-    assert last[1] == "0.03"
+    assert last[1] == "3 %"
     for candidate in given["candidates"]:
         candidate["probability"] = 0.005
     assert len(rows(candidates_table(given))) == 7  # six and the rest
@@ -196,7 +196,7 @@ def test_noise_and_confirmation(given: Document) -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.996, "> 0.99"), (0.994, "0.99"), (0.006, "0.01"), (0.004, "< 0.01")],
+    [(0.996, "> 99 %"), (0.994, "99 %"), (0.006, "1 %"), (0.004, "< 1 %")],
 )
 def test_probabilities(value: float, text: str) -> None:
     assert probability(value) == text

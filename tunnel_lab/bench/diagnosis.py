@@ -373,7 +373,7 @@ class _Rivals:
         self._place = ui.element("div").props("role=status aria-live=polite")
 
     async def _find(self) -> None:
-        from diagnosis.words.verdict import LEAST_SEPARATION, too_close
+        from diagnosis.words.verdict import run_to_make, too_close
 
         self._place.clear()
         with self._fault.around():
@@ -393,7 +393,7 @@ class _Rivals:
             if run is None:
                 raise TunnelError(_NO_SPRING, remedy="state spring_stiffness on the page Conditions")
             with self._place:
-                if run["separation"] < LEAST_SEPARATION:
+                if run_to_make({"next_run": run}) is None:
                     ui.label(too_close(run))
                 else:
                     show_run(run)

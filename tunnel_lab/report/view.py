@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from diagnosis.words.causes import said_size
 from diagnosis.words.numbers import (
     ACTS_WHEN,
     Document,
@@ -81,7 +82,8 @@ def facts(document: Document) -> list[Fact]:
             listed.append(_misfit_fact(document, label, after, typeset(noise_powers(after))))
         listed.append(Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"]))
     if document["candidates"]:
-        whose = "answer" if decided else "most probable answer"
+        rivals = decided and document["ambiguous_with"]
+        whose = "likeliest of these sets" if rivals else "answer" if decided else "most probable answer"
         first = document["candidates"][0]["probability"]
         listed.append(Fact(f"Probability of the {whose}", probability(first)))
     return listed
@@ -124,6 +126,7 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
         {
             "name": plain(name),
             "acts": acts_on(document, name),
+            "size": typeset(said_size(document, answer, name)),
             "parameters": [
                 (plain(full.rpartition(".")[2]), estimate(value))
                 for full, value in answer["parameters"].items()
@@ -139,7 +142,14 @@ def causes_found(document: Document) -> list[dict[str, Any]]:
         widths = [(plain(SCATTERS[one["effect"]]), width_text(one)) for one in spreads]
         closed = closes.get(scatter[0], "").removesuffix(", all together")
         found.append(
-            {"name": BETWEEN_RUNS, "acts": "by chance", "parameters": widths, "does": "", "closes": closed}
+            {
+                "name": BETWEEN_RUNS,
+                "acts": "by chance",
+                "size": "",
+                "parameters": widths,
+                "does": "",
+                "closes": closed,
+            }
         )
     return found
 

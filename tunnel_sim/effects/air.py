@@ -83,6 +83,7 @@ class UnsteadyAeroLag(Effect):
     place = 12
     channel = "damping"
     condition = "wind_on"
+    size = "an aerodynamic moment that lags by {lag}"
     advice = "Model the lag of the aerodynamic moment"
     equation = (
         "Ka x instead of Ka β, with τ ẋ = β − x, τ = a l/V; for a < 0 a phase lead: Ka (2β − x) with |τ|"
@@ -131,6 +132,7 @@ class FlowMisalignment(Effect):
     place = 15
     channel = "forcing"
     condition = "wind_on"
+    size = "flow that is {angle} askew"
     advice = "Align the rig with the flow"
     equation = "moment Ka βf added; general form: βf (V/20 m/s)^n for βf"
     signature = (
@@ -163,6 +165,7 @@ class WindSpeedOffset(Effect):
     place = 23
     channel = "calibration"
     condition = "wind_on"
+    size = "wind speeds that are off by {offset}"
     advice = "Calibrate the wind speed"
     equation = "true speed = stated speed + ΔV; general form: ΔV (V/20 m/s)^n for ΔV"
     signature = "The aerodynamic stiffness is not proportional to the square of the stated speed."

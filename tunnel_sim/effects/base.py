@@ -41,6 +41,7 @@ Condition = Literal["always", "wind_on"]
 
 #: Parameters of the moment law by name.
 Law: TypeAlias = Mapping[str, float]
+Text: TypeAlias = Callable[[float, float | None, str], str]
 
 #: What a run draws at random for an effect: nothing, a phase in rad, or random numbers, shape (n,).
 Drawn: TypeAlias = float | Array | None
@@ -75,7 +76,9 @@ class Effect:
     - ``turns``: the parameter whose sign changes where the angle is counted from half a turn away; empty: none.
     - ``resembles``: channels that its residual may point to beside its own.
     - ``tries``: how many starting points of a fit are worth trying.
-    - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own.
+    - ``size``: its size as a person says it, with the names of parameters in braces; empty: they are listed.
+    - ``advice``: what to do about it, a clause without its full stop; empty for an effect of one's own. The name of
+      a parameter in braces stands for its value.
     - ``caveat``: how to read the coefficients that are reported with it.
     """
 
@@ -103,6 +106,7 @@ class Effect:
     turns: ClassVar[str] = ""
     resembles: ClassVar[tuple[Channel, ...]] = ()
     tries: ClassVar[int] = 1
+    size: ClassVar[str] = ""
     advice: ClassVar[str] = ""
     caveat: ClassVar[str] = ""
 
@@ -172,6 +176,22 @@ class Effect:
     def chosen_spring(cls) -> str | None:
         """Name of the parameter that is a spring's stiffness; None where there is none."""
         return next((info.name for info in cls.parameters() if info.chosen_spring), None)
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
+        """Its size as a person says it, such as ``dry friction of 0.0040 N m``; empty without ``size``.
+
+        Args:
+            values: of its parameters, in their units.
+            stds: standard deviations of these, in the same units; None where not known.
+            text: writes a value with its standard deviation and its unit.
+        """
+        said = cls.size
+        for info in cls.parameters():
+            if info.name in values:
+                shown = text(values[info.name], stds.get(info.name), info.unit)
+                said = said.replace(f"{{{info.name}}}", shown)
+        return said
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, cos, exp, isclose, log, pi, sqrt
 
-from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect
+from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Text
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.expression import parse
@@ -74,6 +74,7 @@ class FreePlay(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
+    size = "play of {half_width} to each side between spring and rod"
     advice = "Take up the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."
@@ -94,6 +95,7 @@ class GravityStiffness(Effect):
     place = 7
     channel = "stiffness"
     condition = "always"
+    size = "gravity of up to {stiffness}"
     advice = "Model gravity's sine, or level the axis and balance the body on it"
     equation = "−Kg sin(β − βg)"
     signature = (
@@ -144,6 +146,7 @@ class RodFlexibility(Effect):
     place = 8
     channel = "stiffness"
     condition = "always"
+    size = "a rod that twists by {compliance}"
     advice = "Stiffen the rod, or put the sensor at the body's end"
     equation = (
         "s Izz θ̈ + Cr θ̇ + Kr θ = Krod φ + Crod φ̇; (1 − s) Izz β̈ = Ka β + Ca β̇ − Krod φ − Crod φ̇; φ = β − θ, "
@@ -214,7 +217,7 @@ class SpringMiscalibration(Effect):
     channel = "calibration"
     condition = "always"
     on_spring = True
-    advice = "Measure the stiffness of that spring again"
+    advice = "Measure the stiffness of the spring of {spring_stiffness} again"
     equation = "(1 + x) Kr instead of the stated Kr, in the runs of one spring"
     signature = (
         "All runs of one spring lie off the line of stiffness against squared frequency by the same relative "
@@ -231,6 +234,14 @@ class SpringMiscalibration(Effect):
         "Kr", "N m/rad", "stated stiffness of the spring concerned",
         scale=16.12, lower=0.0, upper=1e6, chosen_spring=True,
     )  # fmt: skip
+
+    @classmethod
+    def phrase(cls, values: Mapping[str, float], stds: Mapping[str, float | None], text: Text) -> str:
+        """The spring, and by how much it is softer or stiffer than stated."""
+        error, stated, std = values["error"], values["spring_stiffness"], stds["error"]
+        size = text(100.0 * abs(error), None if std is None else 100.0 * std, "%")
+        side = "stiffer" if error > 0.0 else "softer"
+        return f"spring {stated:.4g} N m/rad is {size} {side} than stated ({stated * (1.0 + error):#.4g} N m/rad)"
 
     @classmethod
     def trials(cls, campaign: Circumstances) -> Sequence[Trial]:
@@ -261,6 +272,7 @@ class CoulombFriction(Effect):
     place = 1
     channel = "damping"
     condition = "always"
+    size = "dry friction of {friction_moment}"
     advice = "Free the bearing and the potentiometer of their dry friction"
     equation = (
         "−Tc sgn β̇; rest while the other moments stay within ±Tc; general form: −Tc z/zs, ż = β̇ − |β̇| z/zs"
@@ -308,6 +320,7 @@ class QuadraticDamping(Effect):
     place = 2
     channel = "damping"
     condition = "always"
+    size = "a damping moment of {coefficient} that grows with the square of the rate"
     advice = "Model the damping that grows with the rate"
     equation = "−C2 |β̇| β̇; general form: |β̇|^n sgn β̇ for |β̇| β̇"
     signature = "The damping ratio falls in proportion to the amplitude."
@@ -334,6 +347,7 @@ class StructuralDamping(Effect):
     channel = "damping"
     condition = "always"
     on_spring = True
+    size = "hysteretic damping with a loss factor of {loss_factor}"
     advice = "Model the hysteretic loss: the same share of the energy per cycle at every frequency"
     equation = (
         "−(η Kr/ωn) β̇ with ωn = √(Kr/Izz); general form: with an after-effect −m (2η/π) Kr β0 ln((t + 1/ωn)/T) of "

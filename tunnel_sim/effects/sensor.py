@@ -73,6 +73,7 @@ class SensorHysteresis(Effect):
     place = 18
     channel = "sensor"
     condition = "always"
+    size = "backlash of {half_width} to each side at the sensor"
     advice = "Take up the backlash between rod and sensor"
     equation = "y follows β when pushed: play of half width w; general form: mean of two plays, (1 ± k) w"
     signature = (
@@ -110,6 +111,7 @@ class SensorDrift(Effect):
     place = 19
     channel = "sensor"
     condition = "always"
+    size = "a zero that drifts by {drift} over a run"
     advice = "Let the sensor warm up, and record its zero before and after each run"
     equation = f"y = β + d t/T over a run of length T; general form: {EQUATION} for t/T"
     signature = (
@@ -141,6 +143,7 @@ class SensorClipping(Effect):
     place = 21
     channel = "sensor"
     condition = "always"
+    size = "a sensor that clips beyond {limit}"
     advice = "Widen the sensor's range, or release from smaller angles"
     equation = "|y| ≤ L; general form: |y − c| ≤ L, approached exponentially within k L of the limit"
     signature = "The peaks of the largest swings are flat; all other readings are unchanged."
@@ -193,6 +196,7 @@ class SensorQuantisation(Effect):
     place = 17
     channel = "sensor"
     condition = "always"
+    size = "readings in steps of {step}"
     advice = "State the sensor's real resolution, or use a finer one"
     equation = "y = q round(y/q); a step finer than the stated resolution does nothing"
     signature = (
@@ -221,6 +225,7 @@ class DroppedSamples(Effect):
     place = 25
     channel = "calibration"
     condition = "always"
+    size = "{lost_time} of lost samples in every run"
     advice = "Replace the logger, or state the time of every sample"
     equation = (
         "y(t) = β(t) until the instant and β(t + τ) after it, shared out over one sample interval; "
@@ -288,6 +293,7 @@ class MainsHum(Effect):
     place = 20
     channel = "sensor"
     condition = "always"
+    size = "mains hum of {amplitude} at {frequency}"
     advice = "Shield the sensor's cable, or ground it at one end only"
     equation = "y = β + a sin(2π f t + φ), φ drawn for every run"
     signature = "A spectral line at the mains frequency in every run, independent of the motion."
@@ -427,6 +433,7 @@ class InputDelay(Effect):
     place = 26
     channel = "calibration"
     condition = "always"
+    size = "an input that acts {delay} later than recorded"
     advice = (
         "Record input and angle with one clock and equal filters, or correct the stamps of the input by τ"
     )

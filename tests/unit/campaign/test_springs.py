@@ -1,14 +1,17 @@
 """The paper's Table II, and the rule that flags springs held to its stated false-alarm rate."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from identification import identify
-from identification.campaign.springs import fit_springs, wind_off_line
+from identification.campaign.springs import fit_springs, pair_remark, wind_off_line
 from identification.datasets import paper_springs
-from identification.policy import SPRING_FLAG_RATE
+from identification.estimate import Quantity, RunEstimate
+from identification.policy import DIFFERENCE_RATE, SPRING_AT_BEST, SPRING_FLAG_RATE
 from tests.unit.gap_campaigns import campaign
 from tunnel_sim.effects import effect_from
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -101,9 +104,37 @@ def test_wind_off_line_needs_two_springs_for_an_intercept():
     assert intercept.value == pytest.approx(-0.5)
 
 
+WHOLE = campaign(duration=0.1)
+STILL = replace(WHOLE, runs=tuple(run for run in WHOLE.runs if not run.wind_on))
+
+
+def two_springs(errors, frequency_std, rng=None):
+    """What is said of two wind-off runs whose springs are off by relative errors, and whose frequencies scatter."""
+    found = []
+    for run, error in zip(STILL.runs, errors, strict=True):
+        chance = 0.0 if rng is None else frequency_std * rng.standard_normal()
+        omega = float(np.sqrt(run.spring_stiffness * (1.0 + error) / 0.1) * (1.0 + chance))
+        found.append(RunEstimate(run.id, omega_n=Quantity(omega, omega * frequency_std, "rad/s")))
+    return pair_remark(STILL, found)
+
+
+def test_a_spring_two_per_cent_off_is_named_where_friction_spreads_the_frequencies():
+    assert two_springs((0.0, 0.02), 2e-3) is not None
+    assert two_springs((0.02, 0.0), 2e-3) is not None
+    assert two_springs((0.0, 0.0), 2e-3) is None
+
+
+def test_springs_calibrated_with_care_disagree_at_the_stated_rate():
+    rng, trials = np.random.default_rng(7), 1000
+    errors = SPRING_AT_BEST * rng.standard_normal((trials, 2))
+    alarms = sum(two_springs(error, 1e-3, rng) is not None for error in errors)
+    low, high = binom.ppf([1e-3, 1.0 - 1e-3], trials, DIFFERENCE_RATE)
+    assert low <= alarms <= high
+
+
 @pytest.mark.parametrize(("error", "said"), [(0.02, True), (-0.02, True), (0.003, False)])
 def test_two_springs_that_disagree_are_named(error, said):
-    """Two springs cannot tell which of them is off; below a per cent no spring is known as well."""
+    """Two springs cannot tell which of them is off; within a per cent no two springs are known."""
     off = effect_from("spring_miscalibration", {"spring_stiffness": 44.84, "error": error})
     words = [one.what for one in identify(campaign(off)).remarks if "give inertias that differ" in one.what]
     assert bool(words) == said

@@ -231,8 +231,16 @@ def test_a_record_that_rests_has_finite_statistics():
 
 
 def test_too_slow_a_sampling_has_no_trend():
-    trend = noise_trend(decays(rate=250.0))
-    assert not trend.judged
+    assert not noise_trend(decays(rate=200.0)).judged
+
+
+def test_a_window_that_holds_a_fourth_difference_has_a_trend():
+    """Half the power in the motion's second half shows at 7 samples a window, as of 3 Hz at 500 Hz."""
+    slow = decays(rate=350.0)
+    assert noise_trend(slow).judged
+    rng = np.random.default_rng(2)
+    louder = with_records(slow, lambda _t, y: y + 0.02 * y * rng.standard_normal(y.size))
+    assert noise_trend(louder).amplitude_z > noise_trend(slow).amplitude_z + 5.0
 
 
 def test_records_of_a_few_windows_have_no_trend():

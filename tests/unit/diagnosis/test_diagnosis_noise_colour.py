@@ -242,14 +242,20 @@ def test_what_is_said_of_the_noise():
     slow = NoiseTrend(0.0, 0.0, 0.0, judged=False)
     data = coloured(campaign(), "pink")
     _, noise, found = judged(data)
-    said = [one.fact for one in noise_noted(noise, slow, found)]
+    said = [one.fact for one in noise_noted(noise, slow, found, named=False)]
     assert [one.kind for one in said] == ["coloured", "not judged"]
     assert said[0].figures["std_rad"] == noise.std
     low, high = noise.colour.frequency[[0, -1]]
     assert said[0].figures["frequency_ratio"] == high / low
     within = dataclasses.replace(found, within_step=True)
-    assert noise_noted(noise, slow, within)[0].fact == Fact("within step")
-    assert noise_noted(campaign_noise(campaign(), Settings().noise), NoiseTrend(0.0, 0.0, 0.0), found) == ()
+    assert Fact("not judged") not in [one.fact for one in noise_noted(noise, slow, found, named=True)]
+    assert noise_noted(noise, slow, within, named=False)[0].fact == Fact("within step")
+    assert (
+        noise_noted(
+            campaign_noise(campaign(), Settings().noise), NoiseTrend(0.0, 0.0, 0.0), found, named=False
+        )
+        == ()
+    )
 
 
 def test_a_band_is_steady_as_often_as_stated_and_empty_parts_do_not_count():

@@ -119,6 +119,8 @@ def test_what_follows_the_order_of_the_runs_is_no_scatter() -> None:
     (trend,) = found.repeatability.trends
     assert trend.effect == DAMPED
     assert trend.change == pytest.approx(0.2, abs=0.01)
+    assert trend.only
+    assert "by chance" not in found.verdict
 
 
 def test_a_run_far_beyond_the_others_is_an_outlier() -> None:

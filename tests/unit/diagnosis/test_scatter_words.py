@@ -38,7 +38,7 @@ def alone(given: Document) -> Document:
 def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document) -> None:
     text = verdict(given, "What remains is small.")
     assert (
-        "comes from quadratic damping (probability 0.91): the damping, with the wind on and off. Beside it"
+        "comes from quadratic damping (probability 91 %): the damping, with the wind on and off. Beside it"
         in text
     )
     assert (
@@ -47,18 +47,18 @@ def test_causes_proper_come_first_and_the_scatter_has_a_sentence(given: Document
     ) in text
     assert "the intervals of the coefficients allow for them" in text
     assert "With it added and these differences allowed for, 98.8 % of the gap closes" in text
-    assert text.endswith("What remains is small.")
+    assert "What remains is small. Cnβ rises by" in text
     assert headline(given) == ("quadratic damping, and scatter between runs", "found")
     given["causes"].append("coulomb_friction")
     assert "Beside them the runs differ by chance: " in verdict(given, "")
     given["causes"].pop()
-    assert "quadratic damping, and scatter between runs (probability 0.91)" in diagnosis_brief(given)
+    assert "quadratic damping, and scatter between runs (probability 91 %)" in diagnosis_brief(given)
 
 
 def test_scatter_alone_is_said_to_be_all(given: Document) -> None:
     text = verdict(alone(given), "")
     assert (
-        "The runs differ from each other by chance, and by nothing else (probability 0.91): the wind" in text
+        "The runs differ from each other by chance, and by nothing else (probability 91 %): the wind" in text
     )
     assert "comes from" not in text
     assert headline(given) == ("Scatter between runs", "found")
@@ -103,6 +103,20 @@ def test_numbers_told_apart_poorly_are_said_to_be(given: Document) -> None:
     assert any(step.startswith("Log the wind speed of every run") for step in next_steps(given))
 
 
+def test_a_drift_alone_is_not_said_to_be_by_chance(given: Document) -> None:
+    trend = {"effect": "wind_speed_scatter", "change": 0.0081, "std": 0.0006, "p_value": 1e-5, "left": 0.0002}
+    repeatability = given["repeatability"]
+    repeatability["trends"] = [trend | {"only": True}]
+    repeatability["spreads"] = repeatability["spreads"][:1]
+    text = scatter_words(given)
+    assert text == (
+        "The runs drift and do not scatter: the wind speed rises by 0.810 ± 0.060 % from the first to the last run "
+        "(does the lab warm up, or the fan drift?). The intervals of the coefficients allow for it."
+    )
+    repeatability["trends"] = [trend]
+    assert "by chance" in scatter_words(given)
+
+
 def test_a_drift_is_not_by_chance(given: Document) -> None:
     trend = {"effect": "wind_speed_scatter", "change": 0.0081, "std": 0.0006, "p_value": 1e-5, "left": 0.0012}
     given["repeatability"]["trends"] = [trend]
@@ -128,7 +142,7 @@ def test_undecided_answers_share_the_scatter(given: Document) -> None:
         "channels": {"damping": 0.9, "calibration": 0.9},
     }
     text = undecided_words(given)
-    assert "quadratic damping (0.50) or scatter between runs (0.40)." in text
+    assert "quadratic damping (50 %) or scatter between runs (40 %)." in text
     assert "wind speed scatter" not in text
     assert "Whatever the cause, the runs differ from each other by chance: " in verdict(given, "")
 
@@ -149,7 +163,7 @@ def test_tables_state_widths_in_per_cent(given: Document) -> None:
     assert candidates_table(given).rows[0][0] == "quadratic_damping +\nscatter between runs"
     assert waterfall_table(given).rows[1][0] == "scatter between runs"
     given["inclusion"] |= {"wind_speed_scatter": 0.99, CAUSE: 0.93}
-    assert inclusion_line(given).endswith("wind_speed_scatter 0.99")
+    assert inclusion_line(given).endswith("wind_speed_scatter 99 %")
     assert width_text({"width": 0.003, "interval": [0.003, 0.003]}) == "0.30 %"
 
 

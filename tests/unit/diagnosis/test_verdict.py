@@ -16,6 +16,7 @@ from diagnosis.likelihood.least_squares import fit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.result import GapSummary, ParameterEstimate, RunGap
 from diagnosis.settings import Settings
+from diagnosis.words.causes import said_size
 from diagnosis.words.tables import gap_table, parameters_table
 from diagnosis.words.verdict import headline, next_steps, undecided_words, verdict
 from tests.unit.diagnosis_document import campaign, document
@@ -49,7 +50,12 @@ def answer_of(
     one["found"] |= {"both_winds": both_winds, **found}
     summary = gap(True) if size is None else size
     decided = decision(answers, Settings().answer).to_json_dict()
-    return one | {"causes": list(causes), "gap": summary.to_json_dict(), **decided}
+    return one | {
+        "causes": list(causes),
+        "ambiguous_with": [],
+        "gap": summary.to_json_dict(),
+        **decided,
+    }
 
 
 def said(*causes: str, **changes: Any) -> str:
@@ -71,7 +77,7 @@ def test_the_runs_of_the_closure_are_named(held_out, closed_on):
 
 def test_the_gap_is_said_in_degrees_and_of_the_swing_first():
     # 0.002 rad · √2 = 0.16206°, over 0.1 rad 2.8 %
-    words = "(0.162° root mean square, 2.8 % of the swing, 2.00 times the noise power)"
+    words = "(0.162° root mean square, 2.8 % of the swing)"
     assert f"The gap {words} comes from" in said("coulomb_friction")
     assert f"There is a gap {words}" in said("unknown")
     found = gap(True).to_json_dict()["misfit"]
@@ -90,7 +96,8 @@ def test_the_page_states_the_gap_and_what_closes_as_the_verdict_does(excess):
     words = view.typeset(given["verdict"])
     before, _, closed, probability = view.facts(given | {"candidates": [{"probability": 0.9}]})
     assert f"{before.value} root mean square, " in words
-    assert before.note.rpartition("; ")[2] in words
+    assert before.note.split("; ")[1] in words
+    assert "times the noise power" not in words
     assert f"{closed.value} of the gap closes" in words
     assert f"(probability {probability.value})" in words
 
@@ -129,7 +136,7 @@ def test_where_no_run_could_be_held_out_nothing_says_that_one_was():
 
 def test_every_cause_of_several_is_named_with_what_it_acts_on():
     text = said("coulomb_friction", "cubic_stiffness", "mains_hum", both_winds=False)
-    assert "from coulomb friction, cubic stiffness and mains hum (probability 0.90)" in text
+    assert "from coulomb friction, cubic stiffness and mains hum (probability 90 %)" in text
     for words in ("the damping (coulomb friction)", "the restoring moment (cubic stiffness)", "(mains hum)"):
         assert words in text
     assert "With them added" in text
@@ -167,9 +174,9 @@ def test_below_one_half_no_set_is_named_as_the_cause():
     text = said(*causes, answers=UNDECIDED)
     assert "its cause is undecided" in text
     assert "comes from" not in text
-    assert "The likely answers contain coulomb friction (0.93)." in text
-    assert "coulomb friction and gravity stiffness (0.35), " in text
-    assert "with probability 0.93 together" in text
+    assert "The likely answers contain coulomb friction (93 %)." in text
+    assert "coulomb friction and gravity stiffness (35 %), " in text
+    assert "with probability 93 % together" in text
     assert "comes from" in said(*causes, answers=((" + ".join(causes), 0.5), ("unknown", 0.5)))
 
 
@@ -183,7 +190,7 @@ def test_of_many_likely_answers_five_are_said_and_the_others_counted():
         "gravity_stiffness",
     )
     text = said(*names[:1], answers=tuple((name, 1.0 / 6.0) for name in names))
-    assert "mains hum (0.17), coulomb friction (0.17) or 1 more." in text
+    assert "mains hum (17 %), coulomb friction (17 %) or 1 more." in text
     assert "gravity" not in text
 
 
@@ -192,7 +199,7 @@ def test_where_no_effect_is_common_the_channel_may_be():
     found = decision(answers, Settings().answer)
     assert not found.effects
     assert found.channels == pytest.approx({"damping": 0.91})
-    assert "act on the damping (0.91)" in said("coulomb_friction", answers=answers)
+    assert "act on the damping (91 %)" in said("coulomb_friction", answers=answers)
     apart = said(
         "coulomb_friction", answers=(("coulomb_friction", 0.4), ("free_play", 0.4), ("unknown", 0.2))
     )
@@ -253,8 +260,8 @@ NEARLY = {
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({}, " (probability 0.30): too little to name it."),
-        ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (0.20)."),
+        ({}, " (probability 30 %): too little to name it."),
+        ({"rival": ["coulomb_friction"], "rival_probability": 0.2}, ", and coulomb friction as much (20 %)."),
         ({"noisy": True}, " of it, but the noise misbehaves and may be all of a gap as small as this."),
         (
             {"misfit": ["zero", "harmonics"]},
@@ -274,15 +281,20 @@ OFF = {"stiffness": 16.12, "error": -0.01961, "std": 0.0001, "probability": 0.5}
 
 def test_springs_that_may_be_off_are_said_with_what_would_tell():
     text = said("spring_miscalibration", choices=[OFF, OFF | {"stiffness": 44.84, "error": 0.02}])
-    assert "16.12 N m/rad by -1.961 ± 0.010 % (0.50) or 44.84 N m/rad by +2.000 ± 0.010 % (0.50)" in text
-    assert "add runs with a third spring" in text
+    assert (
+        "16.12 N m/rad is 1.961 ± 0.010 % softer than stated (50 %), or 44.84 N m/rad is 2.000 ± 0.010 % stiffer "
+        "than stated (50 %)"
+    ) in text
     both = {
         "kind": "two springs off",
         "springs": [OFF, OFF | {"stiffness": 21.0}],
         "beside": ["coulomb_friction"],
     }
     text = said("unknown", rivals=[both])
-    assert "would explain the gap beside coulomb friction, such as 16.12 N m/rad by" in text
+    assert (
+        "would explain the gap beside coulomb friction, such as 16.12 N m/rad is 1.961 ± 0.010 % softer than "
+        "stated and 21 N m/rad"
+    ) in text
     assert text.endswith(": measure their stiffness again.")
 
 
@@ -333,3 +345,67 @@ def test_a_change_of_two_per_cent_is_not_immaterial():
     found = immaterial(before, after, Settings().words)
     assert found == pytest.approx({"cn_beta": 0.0004 / 0.5004, "cn_r": 0.0003 / 0.1003})
     assert immaterial(before, after | estimates(cn_r=-0.102), Settings().words) == {}
+
+
+def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
+    one = document() | {
+        "causes": ["coulomb_friction", "spring_miscalibration"],
+        "ambiguous_with": ["gravity_stiffness"],
+        "inclusion": {"coulomb_friction": 0.98, "spring_miscalibration": 0.59, "gravity_stiffness": 0.40},
+    }
+    sizes = {"error": (-0.0196076, 1.7e-6, "1"), "spring_stiffness": (16.12, None, "N m/rad")}
+    parameters = {
+        f"spring_miscalibration.{name}": {"value": value, "std": std, "unit": unit}
+        for name, (value, std, unit) in sizes.items()
+    }
+    one["candidates"] = [
+        {
+            "effect": "coulomb_friction + spring_miscalibration",
+            "probability": 0.584,
+            "parameters": parameters,
+        },
+        {"effect": "coulomb_friction + gravity_stiffness", "probability": 0.396, "parameters": {}},
+        {"effect": "coulomb_friction", "probability": 0.02, "parameters": {}},
+    ]
+    words = (
+        "coulomb friction (98 %), and one of: spring 16.12 N m/rad is 1.96 % softer than stated (15.80 N m/rad) "
+        "(58 %), or gravity stiffness (40 %)"
+    )
+    assert headline(one) == (words, "open")
+    assert f" of the swing) comes from {words}: the damping" in verdict(one, "")
+    assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
+    one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
+    springs = (
+        "one of the two springs is off, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by 2.000 ± 0.010 %"
+    )
+    assert (
+        headline(one)[0]
+        == f"coulomb friction (98 %), and one of: {springs} (58 %), or gravity stiffness (40 %)"
+    )
+    assert "and one of: one of the two springs is off (58 %), or gravity stiffness (40 %): the" in verdict(
+        one, ""
+    )
+
+
+def test_what_the_causes_change_is_said_in_per_cent():
+    one = answer_of("coulomb_friction")
+    values = {"cn_beta": (0.590, 0.537), "cn_r": (-0.2, -0.204)}
+    for place, when in enumerate(("before", "after")):
+        for name, pair in values.items():
+            one["coefficients"][when][name]["value"] = pair[place]
+    assert "Cnβ falls by 9 % (0.590 → 0.537) and Cnr rises by 2 % (−0.200 → −0.204)." in verdict(one, "")
+    one["found"]["immaterial"] = {"cn_beta": 0.001}
+    assert "Cnβ falls by" not in verdict(one, "")
+
+
+def test_effects_say_their_sizes_as_a_person_would():
+    given = {"value": 0.0039991, "std": 4.1e-6, "unit": "N m"}
+    one = {"effect": "coulomb_friction", "probability": 0.9, "parameters": {"friction_moment": given}}
+    assert said_size(document(), one, "coulomb_friction") == "dry friction of 0.00400 N m"
+    given |= {"value": 0.0123, "std": 0.0012, "unit": "rad"}
+    one = {"effect": "free_play", "probability": 0.9, "parameters": {"half_width": given}}
+    assert (
+        said_size(document(), one, "free_play")
+        == "play of 0.705 ± 0.069° to each side between spring and rod"
+    )
+    assert said_size(document(), one, "cubic_stiffness") == ""

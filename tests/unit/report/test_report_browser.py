@@ -376,3 +376,21 @@ def test_the_summary_is_written_as_a_file_of_one_page(tmp_path: Path) -> None:
     path = write_summary(given, campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1
+
+
+BREAKS = """(what) => {
+  const one = document.querySelector(what);
+  const style = getComputedStyle(one);
+  return [style.breakBefore, style.breakAfter];
+}"""
+
+
+def test_no_printed_page_ends_with_a_heading_or_holds_the_footer_alone(opened: Opened) -> None:
+    opened.page.emulate_media(media="print")
+    for heading in ("h2", "h3", "summary", "caption"):
+        assert opened.page.evaluate(BREAKS, heading)[1] == "avoid", heading
+    assert opened.page.evaluate(BREAKS, "summary + *")[0] == "avoid"
+    assert opened.page.evaluate(BREAKS, "footer")[0] == "avoid"
+    opened.page.emulate_media(media="screen")
+    printed = {paper: pages(opened.page.pdf(format=paper)) for paper in ("A4", "Letter")}
+    assert max(printed.values()) <= 10, printed

@@ -99,7 +99,7 @@ def test_the_head_of_the_page(given: Document) -> None:
     assert before.note.startswith("root mean square; ")
     assert_shows(share.value, [100 * gap["closed"]])
     assert share.note == gap["closed_on"]
-    assert probability.value == "0.91"
+    assert probability.value == "91 %"
     calm = view.facts(given | {"rest": given["rest"] | {"significant": False}})[1]
     assert calm.value == "within the noise"
     assert_shows(calm.note, [gap["excess_after"]])
@@ -119,7 +119,7 @@ def test_what_is_left_has_one_form_in_a_tile(given: Document, value: float) -> N
     assert view.facts(calm)[1].note == noise_powers(value)
 
 
-@pytest.mark.parametrize(("value", "text"), [(0.9634, "0.96"), (0.9951, "> 0.99"), (0.5712, "0.57")])
+@pytest.mark.parametrize(("value", "text"), [(0.9634, "96 %"), (0.9951, "> 99 %"), (0.5712, "57 %")])
 def test_a_probability_has_one_form_in_tile_sentence_chart_and_tables(
     given: Document, value: float, text: str
 ) -> None:
@@ -252,7 +252,7 @@ def test_answers_weighed(given: Document, page: Sections) -> None:
 
 
 def test_effects_among_the_causes(page: Sections) -> None:
-    assert "with probability: quadratic damping 0.93, coulomb friction 0.07." in page.texts["which"]
+    assert "with probability: quadratic damping 93 %, coulomb friction 7 %." in page.texts["which"]
     assert "free play" not in page.texts["which"]
 
 
@@ -278,11 +278,9 @@ def test_a_p_value_is_never_zero(given: Document) -> None:
 def test_answers_left_out_are_counted(given: Document) -> None:
     assert len(view.candidate_rows(given)) == 4
     # 0.4 + 0.05 + 0.03 thousandths
-    assert other_answers(given).startswith(
-        "3 more answers have together a probability of less than 0.01. The"
-    )
+    assert other_answers(given).startswith("3 more answers have together a probability of less than 1 %. The")
     likely = given["candidates"][:4] + [{**given["candidates"][6], "probability": 0.0095}] * 5
-    words = "5 more answers have together a probability of 0.05, none of them more than 0.01. The"
+    words = "5 more answers have together a probability of 5 %, none of them more than 1 %. The"
     assert other_answers(given | {"candidates": likely}).startswith(words)
     few = given | {"candidates": given["candidates"][:2]}
     assert other_answers(few) == ""

@@ -1,0 +1,161 @@
+"""The causes as a person says them: what is certain first, then what is open; their sizes, and what they change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from diagnosis.settings import settings_of
+from diagnosis.words.numbers import Document, for_people, listed, plain, probability
+from diagnosis.words.scatter import BETWEEN_RUNS, scattering, without_scatter
+from identification.printing import COEFFICIENTS, significant, unit_mark
+from tunnel_sim.effects import known_effects
+
+
+def known_and_open(document: Document, *, sized: bool = True) -> str:
+    """What the likely answers have in common, each cause with its own probability, and what is open between them.
+
+    Args:
+        sized: whether springs of which one is off are stated with their errors, which another sentence may do.
+
+    Returns:
+        Text such as ``coulomb friction (98 %), and one of: spring 16.12 N m/rad is 1.96 % softer than stated
+        (59 %), or gravity stiffness (40 %)``.
+    """
+    certain, alternatives = _parted(document, sized)
+    scatter = [BETWEEN_RUNS] if scattering(document["causes"]) else []
+    known = (
+        listed([*(f"{plain(name)} ({_of(document, name)})" for name in certain), *scatter]) if certain else ""
+    )
+    if known and len(alternatives) == 1:
+        return known
+    several = ", or ".join(f"{said} ({probability(value)})" for said, value in alternatives)
+    return f"{known}, and one of: {several}" if known else several
+
+
+def from_causes(document: Document) -> str:
+    """The causes of a decided answer with their probabilities, in the middle of a sentence."""
+    if document["ambiguous_with"]:
+        return known_and_open(document, sized=False)
+    proper = without_scatter(document["causes"])
+    likely = probability(document["credible"][0]["probability"])
+    return f"{plain(*proper)} (probability {likely})"
+
+
+def _parted(document: Document, sized: bool) -> tuple[list[str], list[tuple[str, float]]]:
+    """Effects that all likely answers have, and what each of them has beside these, with its probability.
+
+    What is read off the records before anything is fitted is part of every answer.
+    """
+    least = settings_of(document).answer.rivals_from
+    first, *others = document["candidates"]
+    causes = without_scatter(document["causes"])
+    named = {*document["causes"], *document["ambiguous_with"]}
+    read_off = [name for name in causes if name not in first["effect"].split(" + ")]
+    likely = [one for one in others if one["probability"] >= least and _effects(one) <= named]
+    sets = [(first, causes)]
+    sets += [(one, [*read_off, *without_scatter(sorted(_effects(one)))]) for one in likely]
+    certain = [name for name in causes if all(name in names for _, names in sets)]
+    alternatives = []
+    for one, names in sets:
+        own = [_called(document, one, name, sized) for name in names if name not in certain]
+        alternatives.append((listed(own) if own else "nothing else", one["probability"]))
+    return certain, alternatives
+
+
+def _effects(answer: Mapping[str, Any]) -> set[str]:
+    return set(answer["effect"].split(" + "))
+
+
+def _called(document: Document, answer: Mapping[str, Any], name: str, sized: bool) -> str:
+    """An effect by its name; one of the springs by which it is and how far off, which its name does not say."""
+    kind = {kind.name: kind for kind in known_effects()}.get(name)
+    if kind is None or not kind.chosen_spring():
+        return plain(name)
+    if document["found"]["choices"] and not sized:
+        return one_of_springs(document)
+    said = said_size(document, answer, name)
+    return said or plain(name)
+
+
+def _of(document: Document, name: str) -> str:
+    """The probability that an effect is among the causes, whatever acts beside it."""
+    return probability(document.get("inclusion", {}).get(name, document["candidates"][0]["probability"]))
+
+
+def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
+    """The size of an effect of an answer as a person says it; empty for an effect without such a phrase.
+
+    Args:
+        answer: one of the candidates.
+        name: of the effect.
+    """
+    kind = {kind.name: kind for kind in known_effects()}.get(name)
+    given = _parameters(answer, name)
+    if kind is None or not given:
+        return ""
+    if kind.chosen_spring() and document["found"]["choices"]:
+        each = (
+            f"{one['stiffness']:.4g} N m/rad by {for_people(100.0 * one['error'], 100.0 * one['std'], '%')}"
+            for one in document["found"]["choices"]
+        )
+        return f"{one_of_springs(document)}, {' or '.join(each)}"
+    values = {full: one["value"] for full, one in given.items()}
+    return kind.phrase(values, {full: one["std"] for full, one in given.items()}, for_people)
+
+
+def one_of_springs(document: Document) -> str:
+    """That one of the springs is off that the runs cannot tell apart."""
+    count = len(document["found"]["choices"])
+    return f"one of the {'two' if count == 2 else count} springs is off"
+
+
+def _parameters(answer: Mapping[str, Any], name: str) -> dict[str, Mapping[str, Any]]:
+    """The parameters of one effect of an answer, by their own names."""
+    alone = answer["effect"] == name
+    return {
+        full.rpartition(".")[2]: given
+        for full, given in answer["parameters"].items()
+        if full.partition(".")[0] == name or (alone and "." not in full)
+    }
+
+
+def advice(document: Document, name: str) -> str:
+    """What to do about a cause, with the values that it names, without a full stop."""
+    said = {kind.name: kind.advice for kind in known_effects()}.get(name)
+    if not said:
+        return f"Repair or model what {plain(name)} stands for"
+    values = _parameters(document["candidates"][0], name)
+    shown = {full: f"{one['value']:.4g} {unit_mark(one['unit'])}" for full, one in values.items()}
+    for full, text in shown.items():
+        said = said.replace(f"{{{full}}}", text)
+    return said
+
+
+def consequence(document: Document) -> str:
+    """What the causes do to the coefficients, in a sentence, such as ``Cnβ falls by 9 % (0.590 → 0.537)``.
+
+    Empty where no coefficient is known before and after, or no cause is named.
+    """
+    before, after, said = document["coefficients"]["before"], document["coefficients"]["after"], []
+    if not document["causes"] or document["causes"] == ["unknown"]:
+        return ""
+    for name, one in before.items():
+        two = after.get(name)
+        if two is None or not one["value"] or not all(g.get("determined", True) for g in (one, two)):
+            continue
+        label = COEFFICIENTS.get(name, name)
+        share = 100.0 * (abs(two["value"]) / abs(one["value"]) - 1.0)
+        values = f"{_digits(one['value'])} → {_digits(two['value'])}"
+        if one["value"] * two["value"] < 0.0:
+            said.append(f"{label} changes its sign ({values})")
+        elif abs(share) < 0.5:
+            said.append(f"{label} changes by less than 1 %")
+        else:
+            said.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
+    return f"{listed(said)}." if said else ""
+
+
+def _digits(value: float) -> str:
+    """A coefficient to three digits."""
+    return f"{'−' if value < 0.0 else ''}{significant(abs(value), 3)}"
