@@ -234,15 +234,22 @@ def columns_of(session: Session) -> list[Column]:
             except TunnelError:  # it has to be chosen first
                 pairs = []
             for channel in table.channels:
-                found.setdefault(channel.name, _column(channel, pairs, choices))
+                found.setdefault(channel.name, _column(channel, table.channels, pairs, choices))
     return list(found.values())
 
 
-def _column(channel: Channel, pairs: list[ColumnPair], choices: ImportChoices) -> Column:
+def _column(
+    channel: Channel, channels: Sequence[Channel], pairs: list[ColumnPair], choices: ImportChoices
+) -> Column:
     import numpy as np
 
-    from tunnel_sim.files.importing.columns import guessed_angle_unit, guessed_time_unit, is_stated, is_time
-    from tunnel_sim.files.importing.conditions import condition_of
+    from tunnel_sim.files.importing.columns import (
+        guessed_angle_unit,
+        guessed_time_unit,
+        is_time,
+        stated_input,
+    )
+    from tunnel_sim.files.importing.condition_names import condition_of
     from tunnel_sim.files.importing.tables import is_input
 
     role: Role
@@ -250,7 +257,7 @@ def _column(channel: Channel, pairs: list[ColumnPair], choices: ImportChoices) -
         role, used, stated = "time", True, choices.time_unit
     elif condition_of(channel.name, channel.unit) is not None:
         return Column(channel.name, channel.unit, "a condition of the runs", "condition", True)
-    elif is_input(channel) or is_stated(channel, choices):
+    elif is_input(channel) or channel is stated_input(channels, choices):
         return Column(channel.name, channel.unit, "the input of a driven run", "input", True)
     else:
         used = any(channel is pair.reading for pair in pairs)

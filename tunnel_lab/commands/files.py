@@ -71,7 +71,9 @@ def import_files(
     settings: Annotated[
         list[str] | None,
         _condition(
-            "--set", metavar="KEY=NUMBER", help="A condition of all runs, or a size. May be repeated."
+            "--set",
+            metavar="KEY=NUMBER",
+            help="A condition of all runs, or a size; or KEY=NAME of what states it. May be repeated.",
         ),
     ] = None,
     start: Annotated[float | None, _runs("--start", help="Leave out earlier samples, s.")] = None,
@@ -131,8 +133,11 @@ def import_files(
     if preview is not None:
         refuse_unwritable(preview)
     words: dict[str, float] = {}
+    names: dict[str, str] = {}
     for word in settings or ():
-        words |= parse_setting(word, "--set").model_dump(exclude_none=True)
+        numbers, columns = parse_setting(word, "--set")
+        words |= numbers.model_dump(exclude_none=True)
+        names |= columns.model_dump(exclude_none=True)
     stated = {
         "angle": tuple(angle or ()) or None,
         "unit": unit,
@@ -151,6 +156,7 @@ def import_files(
         "delimiter": delimiter,
         "decimal": decimal,
         "conditions": words or None,
+        "stated_by": names or None,
     }
     kept = {} if recipe is None else read_recipe(recipe).model_dump(exclude_defaults=True)
     given = kept | {key: value for key, value in stated.items() if value is not None}

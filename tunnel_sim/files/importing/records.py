@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, write_campaign
 from tunnel_sim.files.importing.cleaning import (
@@ -21,20 +23,24 @@ from tunnel_sim.files.importing.cleaning import (
     stated_piece,
 )
 from tunnel_sim.files.importing.columns import read_calibration, stem
-from tunnel_sim.files.importing.conditions import (
+from tunnel_sim.files.importing.condition_names import (
     OF_CAMPAIGN,
     OF_REPEATABILITY,
     RIG_KEYS,
     RUN_KEYS,
     SPREAD_KEYS,
     Conditions,
+)
+from tunnel_sim.files.importing.conditions import (
     ConditionTable,
     ImportChoices,
+    Unstated,
     from_name,
     name_pattern,
 )
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
 from tunnel_sim.files.importing.source import Source, read_source
+from tunnel_sim.files.importing.stated import Hint, name_hints
 from tunnel_sim.files.plausible import checked_record, plausible_values
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.files.toml_input import one_line, shown, validate
@@ -129,7 +135,7 @@ def read_records(
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
         raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
-    ids = [raw.id for raw in raws]
+    ids, hints = [raw.id for raw in raws], name_hints(files)
     parts = []
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
@@ -138,7 +144,7 @@ def read_records(
         pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             run = label if len(pieces) == 1 else f"{label}-{number}"
-            parts.append(_part(run, raw, piece, choices, table))
+            parts.append(_part(run, raw, piece, choices, table, hints[raw.source]))
     count = sum(part.piece.last - part.piece.first for part in parts)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
     campaign = _campaign(parts, choices, name or one_line(files[0].stem), raws[0].quantity)
@@ -159,13 +165,19 @@ def read_records(
         said.append(
             "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
         )
+    said += [] if table is None else table.said
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
     return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said))
 
 
 def _part(
-    name: str, raw: RawRecord, piece: RecordPiece, choices: ImportChoices, table: ConditionTable | None
+    name: str,
+    raw: RawRecord,
+    piece: RecordPiece,
+    choices: ImportChoices,
+    table: ConditionTable | None,
+    named: Sequence[Hint],
 ) -> ImportedRun:
     where = f"{shown(raw.source)}, run '{name}'"
     stretch = choices.stretch_of(raw.source.name, name)
@@ -180,35 +192,18 @@ def _part(
     rest = choices.rest if stretch.rest is None else stretch.rest
     if rest is not None:
         reading = from_rest(reading, rest, sensor.unit, said, where)
-    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
-    in_table = {} if table is None else table.of(raw.source, name)
-    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
-    measured = raw.measured(float(time[0]), float(time[-1]), said)
-    stated = raw.stated | measured | raw.named | in_table | given
+    stated, hints = _stated(raw, raw.rows(float(time[0]), float(time[-1])), name, choices, table, said)
     sizes = {key: stated.pop(key) for key in OF_CAMPAIGN if key in stated}
     sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
     validate(Conditions, stated | sizes, raw.source)
     plausible_values(stated | sizes, where)
-    if "wind_speed" not in stated:
-        if _WIND_ON.search(f"{raw.source.stem} {name}"):
-            what = "the name says that the wind is on, but not how fast"
-            remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
-            raise TunnelError(what, where=where, remedy=remedy)
-        said.append("wind_speed is not stated: wind-off is assumed")
+    _check_wind(raw, name, stated, [*hints, *named], said, where)
     rig = choices.conditions
     scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
     if "air_density" not in stated and needs_density(stated.get("wind_speed", 0.0), *scales):
         what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
-        raise TunnelError(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
-    drive = None
-    if raw.input is not None:
-        column, values = raw.input
-        order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
-        hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
-        gain = gain if column == "drive" else None
-        said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
-        said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
-        drive = Drive(column, values[kept], hold, gain)
+        raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
+    drive = _drive(raw, kept, said)
     without_spring_needs_drive(stated.get("spring_stiffness"), drive, where)
     time = from_zero(time)
     try:
@@ -225,6 +220,64 @@ def _part(
         return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
     run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
     return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
+
+
+def _stated(
+    raw: RawRecord,
+    rows: NDArray[np.bool_],
+    run: str,
+    choices: ImportChoices,
+    table: ConditionTable | None,
+    said: list[str],
+) -> tuple[dict[str, float], list[Hint]]:
+    """Conditions and sizes of a run, by key, and what the file holds that looks like one and is not used.
+
+    Args:
+        rows: which rows of the record are the run's, shape (n,).
+    """
+    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
+    in_table = {} if table is None else table.of(raw.source, run)
+    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
+    found = {**raw.stated.numbers, **raw.stated.measured(rows, said), **raw.named, **in_table, **given}
+    return found, raw.stated.unused(rows)
+
+
+def _check_wind(
+    raw: RawRecord,
+    run: str,
+    stated: Mapping[str, float],
+    hints: Sequence[Hint],
+    said: list[str],
+    where: str,
+) -> None:
+    """Say what looks like a condition and is not used; refuse to assume wind-off beside a hint of a wind."""
+    open_ones = [hint for hint in hints if hint.key not in stated]
+    said += [hint.words for hint in open_ones]
+    if "wind_speed" in stated:
+        return
+    wind_off = "--set wind_speed=0 states wind-off"
+    for hint in open_ones:
+        if hint.key == "wind_speed" and hint.value != 0.0:
+            what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
+            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
+    if _WIND_ON.search(f"{raw.source.stem} {run}"):
+        what = "the name says that the wind is on, but not how fast"
+        remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
+        raise Unstated(what, where=where, remedy=remedy)
+    said.append("wind_speed is not stated: wind-off is assumed")
+
+
+def _drive(raw: RawRecord, kept: slice, said: list[str]) -> Drive | None:
+    """The input of a run; None of a free decay."""
+    if raw.input is None:
+        return None
+    column, values = raw.input
+    order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
+    hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
+    gain = gain if column == "drive" else None
+    said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
+    said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
+    return Drive(column, values[kept], hold, gain)
 
 
 def _campaign(
