@@ -14,14 +14,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, write_campaign
-from tunnel_sim.files.importing.cleaning import (
-    RecordPiece,
-    find_runs,
-    from_rest,
-    from_zero,
-    resolution,
-    stated_piece,
-)
+from tunnel_sim.files.importing.cleaning import from_rest, from_zero, resolution
 from tunnel_sim.files.importing.columns import read_calibration, stem
 from tunnel_sim.files.importing.condition_names import (
     OF_CAMPAIGN,
@@ -39,6 +32,7 @@ from tunnel_sim.files.importing.conditions import (
     name_pattern,
 )
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
+from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate, stated_piece
 from tunnel_sim.files.importing.source import Source, read_source
 from tunnel_sim.files.importing.stated import Hint, name_hints
 from tunnel_sim.files.plausible import checked_record, plausible_values
@@ -59,6 +53,11 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array, Record
 
 _JUDGED = 500_000  # samples in which the cycles of a long record are counted
+_FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
+    "angle": find_runs,
+    "rate": find_runs_of_rate,
+}
+"""How releases are found; in accelerations a hand that holds the body does not show."""
 _WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
 
 
@@ -140,8 +139,9 @@ def read_records(
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
         time, reading = raw.cleaned.time_s, raw.cleaned.reading
-        cut = choices.cut and raw.quantity == "angle" and not raw.whole and raw.input is None
-        pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
+        find = _FINDERS.get(raw.quantity)
+        cut = choices.cut and not raw.whole and raw.input is None
+        pieces = find(time, reading) if cut and find is not None else [RecordPiece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             run = label if len(pieces) == 1 else f"{label}-{number}"
             parts.append(_part(run, raw, piece, choices, table, hints[raw.source]))
@@ -186,7 +186,8 @@ def _part(
     time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
     said = []
     if piece.first:
-        said.append(f"begins at {time[0]:.4g} s, where the body is released")
+        at = "at the largest rate after the release" if raw.quantity == "rate" else "where the body is released"
+        said.append(f"begins at {time[0]:.4g} s, {at}")
     if piece.last < raw.cleaned.time_s.size:
         said.append(f"ends at {time[-1]:.4g} s, with the motion or before the next run")
     rest = choices.rest if stretch.rest is None else stretch.rest
