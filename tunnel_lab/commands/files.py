@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from tunnel_lab.terminal.inputs import LeaveOutOption, split_names
 from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -81,6 +82,7 @@ def import_files(
     rest: Annotated[
         float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
     ] = None,
+    leave_out: LeaveOutOption = None,
     cut: Annotated[
         bool | None, _runs("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
     ] = None,
@@ -152,6 +154,7 @@ def import_files(
         "start": start,
         "end": end,
         "rest": rest,
+        "leave_out": split_names(leave_out) or None,
         "cut": cut,
         "delimiter": delimiter,
         "decimal": decimal,

@@ -79,6 +79,9 @@ class ImportChoices(StrictModel):
     rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
     input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
     input_as: InputColumn | None = optional("'moment_nm', 'drive' or 'base_rad'")
+    leave_out: tuple[OneLine, ...] = Field(
+        default=(), strict=False, description="a list of names of runs or files"
+    )
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
         default=(),
