@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from nicegui import events, ui
@@ -166,10 +167,19 @@ def _write(session: Session, document: dict[str, Any]) -> None:
     write_whole(path, campaign_text(document, comments).encode())
 
 
-def restore(session: Session, before: Cells) -> None:
-    """State again what was stated before a campaign was written anew; errors as of `save`."""
+def restore(
+    session: Session, before: Cells, held: Mapping[str, Mapping[str, float]] = MappingProxyType({})
+) -> None:
+    """State again what was stated before a campaign was written anew; errors as of `save`.
+
+    Args:
+        held: what the files state and the campaign takes only beside an air density, by row and key.
+    """
     kept = {
-        row: {key: before.get(row, {}).get(key) or text for key, text in cells.items()}
+        row: {
+            key: before.get(row, {}).get(key) or _texts(held.get(row, {}), (key,))[key] or text
+            for key, text in cells.items()
+        }
         for row, cells in stated(session).items()
     }
     save(session, kept)

@@ -31,6 +31,8 @@ FIELDS = {
     "end": "Leave out samples after",
     "rest": "Reading at rest",
     "name": "Conditions in the file names",
+    "set": "Conditions of all runs",
+    "leave-out": "Leave out",
     "delimiter": "Delimiter of a text file",
     "decimal": "Decimal sign of a text file",
     "no-cut": "Cut records at releases",

@@ -123,7 +123,7 @@ def read_records(
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
         raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
-    ids, hints = [raw.id for raw in raws], name_hints(files)
+    ids, hints = [raw.id for raw in raws], name_hints([source.path for source in sources])
     parts = []
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
