@@ -45,6 +45,8 @@ MISSING = {
     "reference_length": "needed for Cnβ and Cnr",
 }
 """What is missing without these; the others are optional, or required (`faults`)."""
+_OF_JOINT = "0 for a joint without a spring"
+"""The stiffness of a driven run in still air."""
 _MOST_ROWS = 20  # of a table without a scroll bar
 _MOST_LINES = 8  # of faults that are listed
 _PASTE = """(event) => {
@@ -225,6 +227,7 @@ class ConditionsPage:
         self._session, self._frame = session, frame
         self._cells = typed(session)
         self._runs = [row for row in self._cells if row != RIG]
+        self._driven = all("drive_hold" in run for run in _document(session)["runs"])
         ui.label(
             "Type, or paste a block from a spreadsheet into a cell. Valid values are saved at once in "
             f"{session.campaign / 'campaign.toml'}; nothing else of the campaign changes."
@@ -337,8 +340,9 @@ class ConditionsPage:
         cells = self._cells
         wrong = save(self._session, cells)
         windy = any(cells[run]["wind_speed"].strip() not in ("", "0") for run in self._runs)
+        words = MISSING | ({"spring_stiffness": _OF_JOINT} if self._driven and not windy else {})
         missing = {
-            (row, key): MISSING[key]
+            (row, key): words[key]
             for row, texts in cells.items()
             for key, text in texts.items()
             if key in MISSING and not text.strip() and (row != RIG or windy)

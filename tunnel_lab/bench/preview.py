@@ -399,6 +399,7 @@ def show_choices(
 ) -> None:
     """The fields of the choices; a changed one calls with its name and new value, None: found from the files."""
     from tunnel_sim.files.importing.tables import UNITS
+    from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
 
     now = choices_of(session)
     angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
@@ -415,6 +416,9 @@ def show_choices(
             ("unit", angle),
             ("time", columns),
             ("time_unit", list(UNITS["time"])),
+            ("input", [*columns, "none"]),
+            ("input_as", list(INPUT_COLUMNS)),
+            ("input_hold", list(HOLDS)),
         ):
             several = key == "angle"
             value = list(now.angle) if several else getattr(now, key)

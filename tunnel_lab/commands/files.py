@@ -41,6 +41,10 @@ def import_files(
         str | None,
         _column("--input-as", metavar="COLUMN", help="What the input is: moment_nm, drive or base_rad."),
     ] = None,
+    input_hold: Annotated[
+        str | None,
+        _column("--input-hold", metavar="HOLD", help="The input between its samples: zero (held) or linear."),
+    ] = None,
     time: Annotated[
         str | None, _column("--time", metavar="NAME", help="Column of the times, by name or number.")
     ] = None,
@@ -145,6 +149,7 @@ def import_files(
         "unit": unit,
         "input": drive,
         "input_as": input_as,
+        "input_hold": input_hold,
         "time": time,
         "time_unit": time_unit,
         "rate": rate,

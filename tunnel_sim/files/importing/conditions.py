@@ -31,7 +31,7 @@ from tunnel_sim.files.toml_input import (
     read_document,
     validate,
 )
-from tunnel_sim.vocabulary.drive import InputColumn
+from tunnel_sim.vocabulary.drive import Hold, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
 
@@ -79,6 +79,7 @@ class ImportChoices(StrictModel):
     rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
     input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
     input_as: InputColumn | None = optional("'moment_nm', 'drive' or 'base_rad'")
+    input_hold: Hold | None = optional("'zero' or 'linear'")
     leave_out: tuple[OneLine, ...] = Field(
         default=(), strict=False, description="a list of names of runs or files"
     )

@@ -110,7 +110,7 @@ def imported_run(
     elif windy:
         what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
         raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
-    drive = _drive(raw, kept, said)
+    drive = _drive(raw, kept, choices, said)
     without_spring_needs_drive((stated | held).get("spring_stiffness"), drive, where)
     time = from_zero(time)
     try:
@@ -171,17 +171,20 @@ def _check_wind(
         what = "the name says that the wind is on, but not how fast"
         remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
         raise Unstated(what, where=where, remedy=remedy)
-    said.append("wind_speed is not stated: wind-off is assumed")
+    if raw.input is None:
+        said.append("wind_speed is not stated: wind-off is assumed")
 
 
-def _drive(raw: RawRecord, kept: slice, said: list[str]) -> Drive | None:
+def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:
     """The input of a run; None of a free decay."""
     if raw.input is None:
         return None
     column, values = raw.input
     order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
-    hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
+    hold: Hold = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else "linear")
     gain = gain if column == "drive" else None
-    said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
+    if choices.input_hold is None:
+        asked = "linear between samples is assumed; --input-hold zero if a controller holds each command"
+        said.append(f"drive_hold = {hold} from the file" if order in (0.0, 1.0) else f"drive_hold: {asked}")
     said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
     return Drive(column, values[kept], hold, gain)

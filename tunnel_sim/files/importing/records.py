@@ -230,6 +230,12 @@ _RUN = {
     "air_density": "kg/m3: needed for Cnβ and Cnr",
     "release_angle": "rad, nominal; optional",
 }
+_RIG_OF_JOINT = {"yaw_inertia": "kg m2, nominal inertia about the joint; optional"}
+_RUN_OF_JOINT = {
+    "spring_stiffness": "N m/rad: 0 for a joint without a spring",
+    "drive_gain": "N m per unit of a column drive; estimated where it is not stated",
+}
+"""Of driven runs in still air: no coefficient of the wind is sought in them."""
 ORIGINAL = "# Original: "
 _RUNS_HEAD = "# What the files do not say about the runs: fill it in, and remove the # before it."
 
@@ -295,11 +301,20 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too."""
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
-    unknown = [f"# {key} =   # {why}" for key, why in _RIG.items() if key not in rig]
+    joint = _is_joint(document)
+    unknown = [
+        f"# {key} =   # {why}" for key, why in (_RIG_OF_JOINT if joint else _RIG).items() if key not in rig
+    ]
     head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)])]
     head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
     blocks = []
     for run in document["runs"]:
-        unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
+        wanted = _RUN_OF_JOINT if joint else _RUN
+        unknown = [f"# {key} =   # {why}" for key, why in wanted.items() if key not in run]
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
     return "\n".join([*originals, *head, *blocks])
+
+
+def _is_joint(document: Mapping[str, Any]) -> bool:
+    """Whether all runs are driven, and none is in wind."""
+    return all("drive_hold" in run and not run.get("wind_speed") for run in document["runs"])
