@@ -16,6 +16,7 @@ import typer
 from typer import Option
 
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
@@ -48,6 +49,8 @@ def given_campaign(path: Path) -> Campaign:
 
     try:
         imported = read_records([path])
+    except HoldsTurningPoints:
+        raise
     except TunnelError as error:
         remedy = f"tunnel import takes options: {error.remedy}"
         raise TunnelError(error.what, where=error.where, remedy=remedy) from None

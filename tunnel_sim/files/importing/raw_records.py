@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from tunnel_sim.files.importing.cleaning import Cleaned, cleaned, restarts, without_overflow
 from tunnel_sim.files.importing.columns import (
     Calibration,
+    ColumnPair,
     find_pairs,
     in_radians,
     in_seconds,
@@ -21,11 +23,19 @@ from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.inputs import at_times, find_input
 from tunnel_sim.files.importing.source import Source
 from tunnel_sim.files.importing.stated import Stated, of_short_table, stated_in
-from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS
+from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
+from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.drive import InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
+
+_STD = re.compile(
+    r"(?i)(d|delta|δ|Δ|σ|sigma|s|u|e|err|error|std|sd|unc|uncertainty|fehler)[ _.(]?(?=[^\W\d_])"
+)
+"""Begins the name of a column of uncertainties."""
+_LONGEST_SWING = 60.0  # s: longer half periods are in milliseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +111,11 @@ def raw_records(
                 said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
             for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
                 clean = cleaned(time[a:b], readings[a:b])
+                if quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):
+                    rows = np.flatnonzero(kept)[a:b]
+                    raise HoldsTurningPoints(
+                        _turning_points(name, table, pair, rows, clean, unit, said, choices), where
+                    )
                 if clean.time_s.size < 2:
                     raise TunnelError("fewer than two samples", where=where, remedy="leave it out")
                 given = None
@@ -133,3 +148,39 @@ def raw_records(
                     )
                 )
     return found
+
+
+def _turning_points(
+    name: str,
+    table: Table,
+    pair: ColumnPair,
+    rows: NDArray[np.intp],
+    clean: Cleaned,
+    unit: str,
+    said: Sequence[str],
+    choices: ImportChoices,
+) -> TurningPoints:
+    """The turning points that a table holds, with the standard deviations that its columns state.
+
+    Args:
+        unit: of the angle, for a column of uncertainties that names none that is known.
+    """
+    time, said = clean.time_s, [*table.said, *said]
+    if pair.time is not None and not pair.time.unit and choices.time_unit is None:
+        # The step of a clock is short, and half a period of a swing is not.
+        size = float(np.median(np.diff(np.sort(pair.time.values[rows]))))
+        own = "s" if size < _LONGEST_SWING else "ms"
+        time = time * size * UNITS["time"][own] / float(np.median(np.diff(time)))
+        said = [line for line in said if "no unit of the times" not in line]
+        said.append(f"no unit of the times in the file: half periods of {size:.4g} are taken as {own}")
+    found: dict[str, Array] = {}
+    for channel in table.channels:
+        mark = _STD.match(channel.name)
+        values = channel.values[rows]
+        if mark is None or values.shape != time.shape or not (values > 0.0).all():
+            continue
+        kind = kind_of(channel.unit) or ("time" if names_a_time(channel.name[mark.end() :]) else "angle")
+        if kind in ("time", "angle"):
+            factor = UNITS[kind].get(channel.unit) or (1.0 if kind == "time" else UNITS[kind].get(unit, 1.0))
+            found.setdefault(kind, values * factor)
+    return TurningPoints(name, time, clean.reading, found.get("time"), found.get("angle"), tuple(said))

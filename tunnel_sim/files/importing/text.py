@@ -199,7 +199,7 @@ def read_text_tables(
     check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
     cells = lines * dialect.width
     check_count(cells, limits.CELLS, "cells", where, "leave out columns that are not needed")
-    layout = find_layout([dialect.split(line) for line in head], head, dialect.decimal, dialect.width)
+    layout = find_layout([_cells(line, dialect) for line in head], head, dialect.decimal, dialect.width)
     sample = [dialect.split(line) for line in body if line.strip()]
     if layout is None:
         what = f"no numbers in the first {len(head)} lines"
@@ -246,6 +246,17 @@ def read_text_tables(
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
+
+
+def _cells(line: str, dialect: Dialect) -> list[str]:
+    """The cells of a line of the head, which may have names between other delimiters than the numbers below."""
+    own = dialect.split(line)
+    if len(own) != 1 or dialect.width < 2:
+        return own
+    others = (
+        Dialect(sign, dialect.decimal, dialect.width).split(line) for sign in _NAMES.values() if sign != " "
+    )
+    return next((cells for cells in others if len(cells) == dialect.width and all(cells)), own)
 
 
 def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bool:
