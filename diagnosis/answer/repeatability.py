@@ -133,9 +133,7 @@ class _Runs:
         count = sum(run.wind_on or kind.condition == "always" for run in runs)
         if count < _FEWEST:
             return None
-        order = np.linspace(-0.5, 0.5, len(runs))
-        change = [t * one[:, place] for t, one in zip(order, self.columns.deviations, strict=True)]
-        columns, size = self.columns.with_column(change)
+        columns, size = self.columns.with_drift(place)
         products = RunProducts.of(
             [one[:, self.kept] for one in columns.deviations], columns.common, columns.seen
         )

@@ -12,12 +12,15 @@ class Disturbance:
     Args:
         run: id of the run.
         at_s: the instant, by the time stamps of the run, s.
-        kept_until_s: up to when the run is used, by the same stamps, s; None where the run is left out.
+        kept_until_s: up to when the run is used, by the same stamps, s; None where the run is left out, or used
+            as a whole.
         p_value: probability of as large a jump among all runs and instants, if chance and what acts in all runs
             were all, a fraction.
+        used: whether the run is used as a whole, since the other runs do not determine the model.
     """
 
     run: str
     at_s: float
     kept_until_s: float | None
     p_value: float
+    used: bool = False

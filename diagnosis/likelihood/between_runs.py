@@ -106,6 +106,18 @@ class RunColumns:
         rows = zip(self.seen, self.common, self.deviations, found.deviations, strict=True)
         return [z - j @ found.common - d @ e for z, j, d, e in rows]
 
+    def with_drift(self, place: int) -> tuple[RunColumns, float]:
+        """The columns with a drift of one number: its deviation is in proportion to a run's place in the campaign.
+
+        Args:
+            place: of the number among the deviations.
+
+        Returns:
+            The columns, and the norm of that of a drift by 1 from the first run to the last.
+        """
+        order = np.linspace(-0.5, 0.5, len(self.seen))
+        return self.with_column([t * own[:, place] for t, own in zip(order, self.deviations, strict=True)])
+
     def likeliest(self, prior: WidthPrior, start: Array | None = None) -> Between:
         """The likeliest widths and what they make of the runs."""
         first = prior.usual if start is None else np.clip(start, prior.least, prior.most)

@@ -8,7 +8,6 @@ none.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -46,10 +45,12 @@ def prepared_undisturbed(
     with clock.step("where"):
         disturbed = disturbances(measured, prepared.nominal)
     if disturbed:
-        with suppress(TunnelError):  # the others do not determine the model
+        try:
             kept = undisturbed(measured, disturbed)
             return *prepared_and_tested(kept, model.of(kept), kinds, clock, settings), disturbed
-    return prepared, test, ()
+        except TunnelError:  # the others do not determine the model
+            disturbed = tuple(replace(one, kept_until_s=None, used=True) for one in disturbed)
+    return prepared, test, disturbed
 
 
 def disturbances(measured: Campaign, nominal: Fit) -> tuple[Disturbance, ...]:

@@ -18,6 +18,7 @@ from scipy.special import fdtrc
 
 from diagnosis.likelihood.ceiling import Unexplained
 from diagnosis.likelihood.least_squares import Fit, FitError, by_run, fit, fit_at, try_fit
+from diagnosis.likelihood.paths import COMMON
 from diagnosis.likelihood.residuals import CHANNELS, ChannelMisfit, misfit
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
@@ -78,15 +79,15 @@ def weigh_random_moments(view: View, hypotheses: Sequence[Hypothesis]) -> list[R
     Returns:
         The random moment with the best set of effects beside it. It must lower −2 ln L beside the same set by more
         than a needless effect may, and be steady noise, alike in all runs in the wind. Empty where none passes,
-        where the likeliest is of a kind that may not be named, or where no random moment in the wind could leave
-        little enough of the gap.
+        where the likeliest is of a kind that may not be named, where no random moment in the wind could leave
+        little enough of the gap, and where one law closes nearly all that the sets leave.
     """
     nominal, able = view.base, view.able
     allowed = {kind.random: kind for kind in view.prepared.kinds if kind.random}
     chosen = nominal.settings.moment
     scale = Scale.of(hypotheses, view.gap, nominal.settings.weighing)
     best = max([Hypothesis((), nominal), *hypotheses], key=scale.weight)
-    if not allowed or not _may_act(best, scale):
+    if not allowed or not _may_act(best, scale) or is_no_noise(best.fit):
         return []
     top = _settled(best, view)
     for number in range(chosen.further_effects + 1):
@@ -205,11 +206,24 @@ def obeys_a_law(fitted: Fit) -> bool:
         Whether the law of the wind (`diagnosis.likelihood.paths.wind`) closes enough on runs held out of its fit,
         beyond chance.
     """
+    return _closed_by_a_law(fitted, ["wind"], fitted.settings.moment.law_share)
+
+
+def is_no_noise(fitted: Fit) -> bool:
+    """Whether nearly all that a fit leaves would be closed by one law of any kind, the same in all runs.
+
+    What remains for a random moment is then too small to be what the sets lack, and none is sought.
+    """
+    return _closed_by_a_law(fitted, list(COMMON), fitted.settings.moment.no_noise_share)
+
+
+def _closed_by_a_law(fitted: Fit, kinds: Sequence[str], share: float) -> bool:
+    """Whether a law of some kind closes more than a share of what a fit leaves, on held-out runs."""
     unexplained = Unexplained(fitted)
     if unexplained.held_out != "runs":  # no run can be left out
         return False
-    closed, chosen = unexplained.common("wind").ceiling, fitted.settings.moment
-    return closed.closed - chosen.law_stds * closed.std > chosen.law_share
+    found, stds = (unexplained.common(kind).ceiling for kind in kinds), fitted.settings.moment.law_stds
+    return any(one.closed - stds * one.std > share for one in found)
 
 
 def overdispersion(fitted: Fit, kind: type[Effect]) -> float:

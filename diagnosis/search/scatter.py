@@ -162,10 +162,7 @@ def only_drifts(fitted: Fit) -> bool:
 
 def _drifts(columns: RunColumns, prior: WidthPrior, place: int, chosen: ScatterSettings) -> bool:
     """Whether the runs differ in one number in proportion to their place, and by nothing shown beside that."""
-    order = np.linspace(-0.5, 0.5, len(columns.seen))
-    beside, _ = columns.with_column(
-        [t * own[:, place] for t, own in zip(order, columns.deviations, strict=True)]
-    )
+    beside, _ = columns.with_drift(place)
     gain = columns.likeliest(prior).likelihood - beside.likeliest(prior).likelihood
     all_of_them = np.ones(prior.usual.size, bool)
     left = _gain(beside, prior, all_of_them, np.arange(prior.usual.size) == place)

@@ -231,6 +231,12 @@ class RandomMomentSettings:
         "convention",
         "The greater part, by the word.",
     )
+    no_noise_share: float = setting(
+        0.9,
+        "Share of what is left that one law must close on held-out runs for no random moment to be sought.",
+        "judgement",
+        "At most a tenth of what is left is then another in every run.",
+    )
     law_stds: float = setting(2.0, "Scatter by which that share must be exceeded.", "convention", unit="std")
 
 

@@ -191,6 +191,9 @@ def _immaterial(changes: Mapping[str, float]) -> str:
 def _disturbed(found: Mapping[str, Any]) -> str:
     """A run that was disturbed, and how much of it is used."""
     kept = found["kept_until_s"]
+    if found["used"]:
+        why = "the other runs do not determine the model"
+        return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s, and is used all the same: {why}."
     without = "without this run" if kept is None else f"without what it recorded from {kept:.4g} s on"
     return f"Run {found['run']} was disturbed at {found['at_s']:.4g} s; the answer is {without}."
 

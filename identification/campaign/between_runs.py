@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER
 from tunnel_sim.vocabulary.record import Array
 
 _ABSORBED = 1e-13  # share of a column's power, below which deviations of the runs absorb all of it
@@ -194,28 +195,23 @@ def likeliest_widths(runs: RunProducts, prior: WidthPrior, start: Array | None =
     return widths
 
 
-DEVIATIONS = ("wind_speed", "spring_stiffness", "mechanical_damping")
-"""What differs between runs, by the key of ``[repeatability]``; each relative to the run's own value."""
-
-
 @dataclass(frozen=True)
 class UsualWidths:
     """What is known of the widths of runs that nobody has stated: judgements on rigs in general.
 
     Args:
-        wind_speed: a good tunnel holds its speed to some tenths of a per cent; a fraction, one standard deviation.
-        spring_stiffness: a spring that is clamped again comes back to some hundredths of a per cent; a fraction,
-            one standard deviation.
-        mechanical_damping: bearings and cables come back to a per cent; a fraction, one standard deviation.
-        decades: standard deviation of log10(width), dimensionless: a rig ten times as good or bad is not unusual.
+        wind_speed: one standard deviation, a fraction.
+        spring_stiffness: one standard deviation, a fraction.
+        mechanical_damping: one standard deviation, a fraction.
+        decades: standard deviation of log10(width), dimensionless: one rig in twenty is ten times as good or bad.
         least: least width that is considered, over the usual one; a ratio.
         most: greatest width that is considered, over the usual one; a ratio.
     """
 
-    wind_speed: float = 0.003
-    spring_stiffness: float = 0.0005
-    mechanical_damping: float = 0.01
-    decades: float = 1.0
+    wind_speed: float = USUAL_SCATTER["wind_speed"]
+    spring_stiffness: float = USUAL_SCATTER["spring_stiffness"]
+    mechanical_damping: float = USUAL_SCATTER["mechanical_damping"]
+    decades: float = 0.5
     least: float = 1e-3
     most: float = 20.0
 
@@ -223,7 +219,7 @@ class UsualWidths:
         """What is known of the widths of some deviations.
 
         Args:
-            names: of `DEVIATIONS`.
+            names: of `SCATTERED`.
             stated: relative standard deviations that the campaign states, by name; they are used as they are.
         """
         usual = np.array([getattr(self, name) for name in names], np.float64)
@@ -237,6 +233,7 @@ class UsualWidths:
 _GRID = 15  # widths in each direction
 _REACH = (40.0, 8.0)  # how far below and above the likeliest width the grid reaches, as ratios
 _AT_ONCE = 1500  # points of the grid
+_NEGLIGIBLE = 1e-4  # density, of the greatest, below which a second grid does not reach
 
 
 def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float]) -> Array:
@@ -249,23 +246,43 @@ def width_quantiles(runs: RunProducts, prior: WidthPrior, levels: Sequence[float
         Widths, shape (levels, k); a width that is stated is as stated at every level.
     """
     best = likeliest_widths(runs, prior)
-    axes = []
-    for width, free, least, most in zip(best, prior.free, prior.least, prior.most, strict=True):
-        low, high = max(least, width / _REACH[0]), min(most, width * _REACH[1])
-        axes.append(np.geomspace(low, high, _GRID) if free and high > low else np.array([width]))
-    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
-    parts = [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
-    cost = np.concatenate([_restricted(runs, part) for part in parts])
-    cost += np.array([prior.cost(point) for point in points])
-    density = np.exp(-0.5 * (cost - cost.min())).reshape([axis.size for axis in axes])
+    limits = [
+        (max(least, width / _REACH[0]), min(most, width * _REACH[1])) if free else (width, width)
+        for width, free, least, most in zip(best, prior.free, prior.least, prior.most, strict=True)
+    ]
+    axes = _axes(limits)
+    density = _density(runs, prior, axes)
+    for k, axis in enumerate(axes):  # once more where it is
+        inside = np.flatnonzero(_along(density, k) > _NEGLIGIBLE * _along(density, k).max())
+        limits[k] = float(axis[max(inside[0] - 1, 0)]), float(axis[min(inside[-1] + 1, axis.size - 1)])
+    axes = _axes(limits)
+    density = _density(runs, prior, axes)
     found = np.empty((len(levels), best.size))
     for k, axis in enumerate(axes):
-        others = tuple(j for j in range(len(axes)) if j != k)
-        share = density.sum(axis=others)
+        share = _along(density, k)
         total = np.concatenate([[0.0], np.cumsum(0.5 * (share[1:] + share[:-1]))])
         level = total / total[-1] if axis.size > 1 else np.ones(1)
         found[:, k] = np.exp(np.interp(levels, level, np.log(axis)))
     return found
+
+
+def _axes(limits: Sequence[tuple[float, float]]) -> list[Array]:
+    """Widths of each number between its limits, even in the logarithm; one where the limits are one."""
+    return [np.geomspace(low, high, _GRID) if high > low else np.array([low]) for low, high in limits]
+
+
+def _density(runs: RunProducts, prior: WidthPrior, axes: Sequence[Array]) -> Array:
+    """Density of the logarithms of the widths over a grid, 1 at its greatest, of the axes' shape."""
+    points = np.stack([one.ravel() for one in np.meshgrid(*axes, indexing="ij")], axis=1)
+    parts = [points[i : i + _AT_ONCE] for i in range(0, len(points), _AT_ONCE)]
+    cost = np.concatenate([_restricted(runs, part) for part in parts])
+    cost += np.array([prior.cost(point) for point in points])
+    return np.asarray(np.exp(-0.5 * (cost - cost.min())).reshape([axis.size for axis in axes]), np.float64)
+
+
+def _along(density: Array, place: int) -> Array:
+    """The density along one axis, the others integrated out."""
+    return np.asarray(density.sum(axis=tuple(j for j in range(density.ndim) if j != place)), np.float64)
 
 
 def _restricted(runs: RunProducts, widths: Array) -> Array:

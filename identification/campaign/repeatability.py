@@ -25,7 +25,6 @@ from scipy.special import chdtrc, chdtri, ndtri
 
 from identification import policy
 from identification.campaign.between_runs import (
-    DEVIATIONS,
     Marginal,
     RunProducts,
     UsualWidths,
@@ -36,6 +35,7 @@ from identification.campaign.between_runs import (
 from identification.campaign.derivatives import Design
 from identification.estimate import Quantity, RunScatter
 from identification.statistics import inverse, student_factor
+from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Repeatability, Run
 from tunnel_sim.vocabulary.record import Array
 
@@ -44,7 +44,7 @@ _ZERO = 1e-9  # width, relative to the usual one, that counts as none
 
 
 def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Array]:
-    """What each of `DEVIATIONS` does to every run's values by its relative size, shape (m, 3).
+    """What each of `SCATTERED` does to every run's values by its relative size, shape (m, 3).
 
     Args:
         design: of the runs, with the gains of inputs where there are driven ones.
@@ -58,7 +58,7 @@ def moves_of(runs: Sequence[Run], design: Design, parameters: Array) -> list[Arr
         runs, design.links, design.stiffness_loads, design.damping_loads, strict=True
     ):
         spring = (run.spring_stiffness or 0.0) * stiff
-        move = np.zeros((len(link), len(DEVIATIONS)))
+        move = np.zeros((len(link), len(SCATTERED)))
         move[:2, 0] = -0.5 * damping * air, -2.0 * load * aero
         move[1, 1] = spring
         move[0, 2] = 0.5 * still
@@ -76,7 +76,7 @@ class MeasuredRuns:
         links: by run, shape (m, p): what common parameters φ make of (a, k), or of (a, k, g) with driven runs.
         seen: by run, shape (m,).
         weights: inverse covariance of its noise by run, shape (m, m).
-        moves: by run, what each of `DEVIATIONS` moves by its relative size, shape (m, 3).
+        moves: by run, what each of `SCATTERED` moves by its relative size, shape (m, 3).
     """
 
     links: Sequence[Array]
@@ -110,7 +110,7 @@ class MeasuredRuns:
         """The runs with a noise of at least what the least widths do, so that no width exceeds it by all digits.
 
         Args:
-            least: relative, of each of `DEVIATIONS`, shape (3,).
+            least: relative, of each of `SCATTERED`, shape (3,).
         """
         weights = []
         for weight, move in zip(self.weights, self.moves, strict=True):
@@ -127,7 +127,7 @@ class MeasuredRuns:
 
         Args:
             start: φ, shape (p,).
-            used: places of the deviations in `DEVIATIONS`, shape (k,).
+            used: places of the deviations in `SCATTERED`, shape (k,).
         """
         rows = zip(self.links, self.seen, self.weights, self.moves, strict=True)
         of_runs = [(j, z - j @ start, w, d[:, used]) for j, z, w, d in rows]
@@ -146,7 +146,7 @@ class Scatter:
     """Scatter between runs, and the common parameters of greatest likelihood under it.
 
     Args:
-        names: of `DEVIATIONS`, those that the runs show.
+        names: of `SCATTERED`, those that the runs show.
         widths: relative standard deviations, shape (k,).
         uncertain: covariance of ln(widths), shape (k, k); zero of a stated one.
         stated: those that the campaign states.
@@ -262,13 +262,13 @@ def scatter_between(
     """
     stated = {} if repeatability is None else repeatability.stated
     usual = usual or UsualWidths()
-    measured = measured.floored(usual.prior(DEVIATIONS, {}).least)
+    measured = measured.floored(usual.prior(SCATTERED, {}).least)
     pairs = list(zip(measured.moves, measured.weights, strict=True))
     power = np.sum([np.einsum("mk,mn,nk->k", move, weight, move) for move, weight in pairs], axis=0)
-    shown = [place for place, name in enumerate(DEVIATIONS) if power[place] > 0.0]
+    shown = [place for place, name in enumerate(SCATTERED) if power[place] > 0.0]
     if not shown:
         return None
-    names = [DEVIATIONS[place] for place in shown]
+    names = [SCATTERED[place] for place in shown]
     prior = usual.prior(names, stated)
     runs = measured.about(start, np.array(shown))
     kept = np.arange(len(names))

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.campaign.between_runs import DEVIATIONS
 from identification.campaign.combination import with_gains
 from identification.campaign.derivatives import Design, build_design, derivatives, has_size
 from identification.campaign.repeatability import moves_of
@@ -26,6 +25,7 @@ from identification.signal.driven_fit import normal_equations
 from identification.signal.filter import discretised, steady_filters
 from identification.signal.free_decay import Decay
 from identification.statistics import eliminate, inverse
+from tunnel_sim.vocabulary.between_runs import SCATTERED
 from tunnel_sim.vocabulary.campaign import Campaign, Repeatability, Run
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
@@ -224,7 +224,7 @@ def _with_deviations(
     distribution (Woodbury's identity).
     """
     stated = {} if repeatability is None else repeatability.stated
-    widths = np.array([stated.get(name, 0.0) for name in DEVIATIONS])
+    widths = np.array([stated.get(name, 0.0) for name in SCATTERED])
     used = np.flatnonzero(widths)
     links = []
     for place, (link, move) in enumerate(zip(linked.links, moves_of(runs, linked, parameters), strict=True)):

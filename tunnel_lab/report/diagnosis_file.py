@@ -142,7 +142,7 @@ class DiagnosisDocument(Document):
     cautions: list[str] = Field(description="caveats")
     disturbed: list[Table] = Field(
         default_factory=list,
-        description="runs that were disturbed: run, at_s, kept_until_s (null: left out), p_value",
+        description="runs that were disturbed: run, at_s, kept_until_s (null: left out, or used), p_value, used",
     )
     remarks: list[Table] = Field(description="of the examination: outcome, runs, what, remedy")
     seconds: dict[str, float] = Field(description="wall time by step, s")

@@ -14,7 +14,7 @@ import numpy as np
 from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.between_runs import WIDEST_SCATTER
+from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER, WIDEST_SCATTER
 
 
 def _spread(meaning: str, scale: float) -> Any:
@@ -62,7 +62,9 @@ class WindSpeedScatter(BetweenRuns):
     references = ("Barlow, Rae & Pope, Low-Speed Wind Tunnel Testing, Wiley 1999",)
     example = (0.05,)
 
-    spread: float = _spread("standard deviation of the speed between runs, relative", 0.003)
+    spread: float = _spread(
+        "standard deviation of the speed between runs, relative", USUAL_SCATTER["wind_speed"]
+    )
 
     @classmethod
     def departure(
@@ -91,7 +93,9 @@ class StiffnessScatter(BetweenRuns):
     references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
     example = (0.02,)
 
-    spread: float = _spread("standard deviation of the stiffness between runs, relative", 0.0005)
+    spread: float = _spread(
+        "standard deviation of the stiffness between runs, relative", USUAL_SCATTER["spring_stiffness"]
+    )
 
     @classmethod
     def departure(
@@ -117,7 +121,10 @@ class DampingScatter(BetweenRuns):
     references = ("Ewins, Modal Testing: Theory, Practice and Application, Research Studies Press 2000",)
     example = (0.2,)
 
-    spread: float = _spread("standard deviation of the mechanical damping between runs, relative", 0.01)
+    spread: float = _spread(
+        "standard deviation of the mechanical damping between runs, relative",
+        USUAL_SCATTER["mechanical_damping"],
+    )
 
     @classmethod
     def departure(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 
@@ -10,8 +11,15 @@ import numpy as np
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
-SCATTERED = ("wind_speed", "spring_stiffness", "mechanical_damping")
-"""The numbers of a run that may differ from what is stated or from the other runs."""
+USUAL_SCATTER: Mapping[str, float] = {
+    "wind_speed": 0.003,  # a good tunnel holds its speed to some tenths of a per cent
+    "spring_stiffness": 0.0005,  # a spring that is clamped again comes back to some hundredths
+    "mechanical_damping": 0.01,  # bearings and cables come back to a per cent
+}
+"""What may differ between runs, and by how much it does in a usual rig: one standard deviation, relative."""
+
+SCATTERED = tuple(USUAL_SCATTER)
+"""Those numbers, in the order of a campaign's ``[repeatability]``."""
 
 WIDEST_SCATTER = 0.2
 """Greatest standard deviation between runs, relative: a deviation that reverses the sign has five of them."""

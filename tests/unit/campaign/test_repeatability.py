@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from identification import identify
-from identification.campaign.between_runs import DEVIATIONS, UsualWidths
+from identification.campaign.between_runs import UsualWidths
 from identification.campaign.repeatability import ratio_limit
 from identification.estimate import Estimate
 from identification.printing import repeatability_lines
@@ -34,8 +34,8 @@ def steady():
 
 def test_the_usual_widths_are_those_of_the_vocabulary():
     scales = {kind.scatters: kind.parameters()[0].scale for kind in known_effects() if kind.scatters}
-    assert {name: getattr(UsualWidths(), name) for name in DEVIATIONS} == scales
-    assert DEVIATIONS == SCATTERED == tuple(one.name for one in fields(Repeatability))
+    assert {name: getattr(UsualWidths(), name) for name in SCATTERED} == scales
+    assert tuple(one.name for one in fields(Repeatability)) == SCATTERED
 
 
 @pytest.mark.parametrize("widths", [1, 2, 3])
@@ -66,7 +66,7 @@ def test_an_inertia_of_runs_that_scatter_is_not_said_to_be_known_to_their_noise(
 
 def test_the_widths_come_out_and_the_runs_own_deviations_are_their_frequency_and_damping(scattered):
     found = identify(scattered, "matrix_pencil").repeatability
-    for name, true in zip(DEVIATIONS, USUAL, strict=True):
+    for name, true in zip(SCATTERED, USUAL, strict=True):
         low, high = getattr(found, name).interval
         assert low < true < high
     # springs of 0.05 % move the frequency of still runs by half of it; the wind adds to that of the others
@@ -90,7 +90,7 @@ def test_a_stated_repeatability_is_used_as_it_is(steady, estimator):
 def test_a_scatter_within_what_is_stated_adds_nothing_to_it(scattered):
     plain = identify(scattered, "matrix_pencil")
     stated = identify(replace(scattered, repeatability=Repeatability(*USUAL)), "matrix_pencil")
-    assert stated.repeatability.stated == DEVIATIONS
+    assert stated.repeatability.stated == SCATTERED
     for name in COEFFICIENTS:  # widths that are known need no wider distribution than the normal
         assert 0.3 < getattr(stated, name).std / getattr(plain, name).std < 1.5
 

@@ -23,7 +23,7 @@ from diagnosis.search.process_noise import (
     of_all_runs,
     with_response,
 )
-from diagnosis.search.random_moments import obeys_a_law, weigh_random_moments, wind_off_excess
+from diagnosis.search.random_moments import is_no_noise, obeys_a_law, weigh_random_moments, wind_off_excess
 from diagnosis.settings import Settings
 from tests.marks import slow
 from tests.unit.gap_campaigns import (
@@ -171,13 +171,18 @@ def test_a_law_that_is_missing_is_no_random_moment(monkeypatch):
     assert obeys_a_law(base)
     assert weigh_random_moments(whole_runs(base, BOTH), []) == []
     monkeypatch.setattr(random_moments, "obeys_a_law", lambda _: False)
+    assert is_no_noise(base)  # so that none is even sought
+    assert weigh_random_moments(whole_runs(base, BOTH), []) == []
+    monkeypatch.setattr(random_moments, "is_no_noise", lambda _: False)
     assert [answer.effects for answer in weigh_random_moments(whole_runs(base, BOTH), [])] == [("buffeting",)]
 
 
 @pytest.mark.parametrize("bandwidth", [0.05, slow(0.5), 10.0])
 def test_a_random_moment_obeys_no_law(bandwidth):
     for seed in range(2):
-        assert not obeys_a_law(nominal(buffeted(campaign(), 0.01, bandwidth, seed)))
+        blown = nominal(buffeted(campaign(), 0.01, bandwidth, seed))
+        assert not obeys_a_law(blown)
+        assert not is_no_noise(blown)
 
 
 def test_buffeting_is_offered_where_it_blows(windy):

@@ -15,11 +15,12 @@ from diagnosis import diagnose
 from diagnosis.by_hand import ByHand
 from diagnosis.diagnosable import choose
 from diagnosis.facts.disturbance import Disturbance
+from diagnosis.search import disturbed as disturbed_runs
 from diagnosis.search.disturbed import beyond_the_others, disturbances, undisturbed
 from diagnosis.search.investigate import nominal_study
 from diagnosis.settings import Settings
 from diagnosis.where.jumps import Jumps, jumps
-from diagnosis.words.verdict import headline, next_steps
+from diagnosis.words.verdict import headline, next_steps, verdict
 from identification.examination.examine import examine
 from identification.status import Outcome
 from tests.unit.diagnosis_document import document
@@ -32,6 +33,7 @@ from tunnel_reference.severity import read_and_fit, simulate_motions
 from tunnel_sim.effects import Effect, effect_class, effect_from, known_effects
 from tunnel_sim.files.campaign_folder import read_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 CHOSEN = Settings().selection
@@ -197,13 +199,30 @@ def test_by_hand_the_same_runs_are_used() -> None:
 
 
 def test_the_words_say_what_is_left_out_and_what_to_do() -> None:
-    one = {"run": "run_7", "at_s": 5.04321, "kept_until_s": None, "p_value": 1e-9}
+    one = {"run": "run_7", "at_s": 5.04321, "kept_until_s": None, "p_value": 1e-9, "used": False}
     given = document() | {"disturbed": [one, one | {"run": "r8", "kept_until_s": 4.5}]}
     assert headline(given)[0].endswith("; runs run_7, r8 disturbed")
     assert next_steps(given)[:2] == [
         "Repeat run run_7, which was disturbed at 5.043 s.",
         "Repeat run r8, which was disturbed at 5.043 s.",
     ]
+
+
+def test_a_run_without_which_the_model_is_not_determined_is_used_and_named(monkeypatch) -> None:
+    first = disturbed_runs.prepared_and_tested
+
+    def of_all_runs_only(given, *rest):
+        if len(given.runs) < 4 or any(run.record.time_s[-1] < 9.0 for run in given.runs):
+            raise TunnelError("cannot fit", where="runs", remedy="add runs")
+        return first(given, *rest)
+
+    monkeypatch.setattr(disturbed_runs, "prepared_and_tested", of_all_runs_only)
+    struck = with_blow(campaign(), 5e-3, 4.0, "r2")
+    assert max(run.record.time_s[-1] for run in struck.runs) > 9.0
+    found = diagnose(struck).to_json_dict()
+    (one,) = found["disturbed"]
+    assert (one["run"], one["kept_until_s"], one["used"]) == ("r2", None, True)
+    assert "is used all the same: the other runs do not determine the model." in verdict(found, "")
 
 
 def test_rows_too_few_for_the_harmonics_are_not_judged() -> None:
