@@ -97,7 +97,7 @@ class _OfLaw(NominalModel):
         if actuator is not None and actuator.servo[1] != 0.0:
             gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring]
         elif self.law.hangs:
-            gone[_OF_GEAR] = [kind for kind in kinds if "free_play" in kind.law_terms]
+            gone[_OF_GEAR] = [kind for kind in kinds if kind.parts]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
         return gone | super().untried(campaign, left)
 

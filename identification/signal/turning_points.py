@@ -22,7 +22,12 @@ _RATE = 0.01
 
 @dataclass(frozen=True)
 class Fitted:
-    """A value with its standard deviation, in one unit."""
+    """An estimated number.
+
+    Args:
+        value: in the unit of the quantity.
+        std: its standard deviation, in the same unit.
+    """
 
     value: float
     std: float

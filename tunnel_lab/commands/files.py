@@ -110,7 +110,7 @@ def import_files(
 ) -> None:
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
-    Text of any dialect, Excel, MAT, TDMS, HDF5 and Parquet are read. Columns, units,
+    Text of any dialect, Excel, MAT, TDMS, HDF5, Parquet and JSON are read. Columns, units,
     sample rate, runs and releases are found; what was found, and why, is printed
     before anything is written. Options correct what was found wrongly; a recipe also
     states delimiter and decimal sign of a text file. The campaign gets a picture

@@ -35,10 +35,10 @@ from tunnel_lab.terminal.outputs import (
     show_tables,
 )
 from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints
 
 if TYPE_CHECKING:
     from identification.estimators import Estimator
+    from tunnel_sim.vocabulary.turning_points import TurningPoints
 
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
@@ -119,6 +119,7 @@ def run(
     """
     from identification import identify
     from tunnel_sim.files.writing import json_text, write_json
+    from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
     for name in (estimator, *(models or ())):
         known_estimator(name)

@@ -16,7 +16,6 @@ import typer
 from typer import Option
 
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
-from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
@@ -46,6 +45,7 @@ def given_campaign(path: Path) -> Campaign:
         remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
         raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)
     from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
+    from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
     try:
         imported = read_records([path])

@@ -74,6 +74,7 @@ class FreePlay(Effect):
     channel = "stiffness"
     condition = "always"
     on_spring = True
+    parts = True
     advice = "Take up the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."

@@ -52,13 +52,13 @@ def test_identify_gives_frequency_and_damping(
     assert json.loads(tunnel("identify", path, "--json", "-")[1]) == document
 
 
-@pytest.mark.parametrize("command", ["diagnose", "import", "compare"])
+@pytest.mark.parametrize("command", ["diagnose", "import"])
 def test_other_commands_say_what_can_be_done(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = table(tmp_path, "t [s]\tangle [deg]\tdt [s]\tdangle [deg]")
-    rest = {"import": ("--out", "rig", "--yes"), "compare": (path,)}.get(command, ())
+    rest = ("--out", "rig", "--yes") if command == "import" else ()
     status, out, err = tunnel(command, path, *rest)
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "holds 60 turning points" in err

@@ -25,7 +25,7 @@ _NAMES = ("columns", "names", "fields", "channels", "header", "spalten")
 """Members that name the columns of a matrix beside them."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Found:
     """What a document holds so far, by path with ``/`` between members."""
 

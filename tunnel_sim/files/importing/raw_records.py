@@ -65,7 +65,12 @@ class RawRecord:
     input_facts: Mapping[str, float] = field(default_factory=dict)
 
     def rows(self, first: float, last: float) -> NDArray[np.bool_]:
-        """Which rows of the record lie from one time to another, s; shape (n,)."""
+        """Which rows of the record are those of a run, shape (n,).
+
+        Args:
+            first: time of its first sample, s.
+            last: time of its last sample, s.
+        """
         return (self.clock >= first) & (self.clock <= last)
 
 

@@ -44,7 +44,7 @@ def find_runs(time_s: Array, reading: Array, drift: float = 0.0) -> list[RecordP
     Args:
         time_s: increasing, shape (n,), s.
         reading: shape (n,).
-        drift: a size up to which its centre may wander.
+        drift: up to which its centre may wander, in the unit of the reading.
     """
     whole = [RecordPiece(0, reading.size)]
     noise = max(_noise_of(reading), drift)
