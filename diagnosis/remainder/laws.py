@@ -32,7 +32,8 @@ def stated_law(
     """The law of a proposal in the measured campaign's units; None where it closes too little of held-out data.
 
     Args:
-        closed: the share that it closes there, and ``std`` its standard deviation.
+        closed: the share that it closes there.
+        std: its standard deviation, a share.
     """
     if closed < base.settings.remainder.formula_closes:
         return None
