@@ -9,6 +9,7 @@ from tunnel_sim.lazy import lazy_names
 
 if TYPE_CHECKING:
     from identification._identify import identify
+    from identification.checking import check_estimator
     from identification.datasets import (
         MEASURED_CAMPAIGNS,
         measured_campaign,
@@ -17,16 +18,17 @@ if TYPE_CHECKING:
         paper_windows,
     )
     from identification.estimate import Estimate, NoiseLevel, Quantity, RunEstimate, WindowEstimate
-    from identification.estimators import ALL_ESTIMATORS, Estimator, make_estimator
+    from identification.estimators import ALL_ESTIMATORS, Estimator, make_estimator, register_estimator
     from identification.status import Remark, Status
 else:
     __getattr__, __dir__ = lazy_names(
         __name__,
         {
             "._identify": "identify",
+            ".checking": "check_estimator",
             ".datasets": "MEASURED_CAMPAIGNS measured_campaign paper_derivatives paper_springs paper_windows",
             ".estimate": "Estimate NoiseLevel Quantity RunEstimate WindowEstimate",
-            ".estimators": "ALL_ESTIMATORS Estimator make_estimator",
+            ".estimators": "ALL_ESTIMATORS Estimator make_estimator register_estimator",
             ".status": "Remark Status",
         },
     )
@@ -42,10 +44,12 @@ __all__ = [
     "RunEstimate",
     "Status",
     "WindowEstimate",
+    "check_estimator",
     "identify",
     "make_estimator",
     "measured_campaign",
     "paper_derivatives",
     "paper_springs",
     "paper_windows",
+    "register_estimator",
 ]

@@ -8,7 +8,13 @@ from pathlib import Path
 
 from identification.campaign.springs import pair_remark
 from identification.estimate import Estimate, RunEstimate, Status, by_severity
-from identification.estimators import Estimator, make_estimator
+from identification.estimators import (
+    SUMMARIES,
+    Estimator,
+    estimators_of_driven_runs,
+    make_estimator,
+    takes_driven,
+)
 from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
@@ -36,8 +42,8 @@ def identify(
     Args:
         campaign: the runs of one rig; angles in rad, stiffness in N m/rad, speed in m/s. Or its folder, or one file
             of a data logger.
-        estimator: a name of `identification.estimators.ALL_ESTIMATORS`, or an estimator with its own
-            settings, such as ``OutputError(cycles_per_window=5)``.
+        estimator: a name of `identification.estimators.known_estimators`, or an estimator with its own
+            settings, such as ``OutputError(cycles_per_window=5)``, or of one's own.
         leave_out: ids of runs to leave out, which a remark names.
         throw: raise when there is no result at all; otherwise the estimate's status says so.
         progress: called with the number of runs that are identified, and of all; None: nothing is reported.
@@ -59,18 +65,22 @@ def identify(
         if run.drive is None:
             continue
         where = f"{campaign.name}, run '{run.id}'"
-        if chosen.name not in DRIVEN_ESTIMATORS:
-            raise TunnelError(
-                f"the run is driven, and {chosen.name} takes free decays only",
-                where=where,
-                remedy=f"use {' or '.join(DRIVEN_ESTIMATORS)}, or leave the driven runs out",
-            )
+        if not takes_driven(chosen):
+            remedy = f"use {' or '.join(estimators_of_driven_runs())}, or leave the driven runs out"
+            if chosen.name not in SUMMARIES:
+                remedy += "; a class that uses their inputs states takes_driven = True"
+            what = f"the run is driven, and {chosen.name} takes free decays only"
+            raise TunnelError(what, where=where, remedy=remedy)
         checked_drive(run.drive, run.record, where, judged=campaign.sensor.plausible is not False)
         refuse_untreated(run.drive, run.spring_stiffness, campaign.sensor.quantity or "angle", where)
     examined = examine(campaign).accepted()
     left = examined.campaign
     with shown_by(progress):
-        found = chosen.estimate(left) if left.runs else Estimate(campaign.name, chosen.name, ())
+        found = (
+            _checked(chosen.estimate(left), chosen.name, left)
+            if left.runs
+            else Estimate(campaign.name, chosen.name, ())
+        )
     found = widened_by_contradictions(found, left, examined.remarks)
     estimate = as_angles(found, campaign.sensor)
     if examined.remarks:  # they belong to the estimate, and so does every run of the campaign, in its order
@@ -98,5 +108,14 @@ def identify(
     return estimate
 
 
-DRIVEN_ESTIMATORS = ("output_error", "filter_error", "bayesian", "frequency_response")
-"""Names of the estimators that take the input of driven runs."""
+def _checked(found: object, name: str, campaign: Campaign) -> Estimate:
+    """What an estimator returned, which may be of one's own."""
+    where, remedy = f"estimator {name}", "identification.check_estimator(...) checks a class"
+    if not isinstance(found, Estimate):
+        what = f"returned {type(found).__name__} and not an Estimate"
+        raise TunnelError(what, where=where, remedy=f"return identification.Estimate; {remedy}")
+    given, wanted = [run.id for run in found.runs], [run.id for run in campaign.runs]
+    if given != wanted:
+        what = f"returned runs {', '.join(given) or '(none)'}, not {', '.join(wanted)}"
+        raise TunnelError(what, where=where, remedy=f"give a RunEstimate for each run, in order; {remedy}")
+    return found

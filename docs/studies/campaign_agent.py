@@ -59,6 +59,34 @@ def make(count: int, **arguments: Any) -> NormalizeObservation:
     return NormalizeObservation(gymnasium.vector.SyncVectorEnv([one] * count))
 
 
+def model_of(envs: NormalizeObservation, seed: int, **changes: Any) -> Any:
+    """Stable-Baselines3's PPO with the settings of the packaged agent.
+
+    Args:
+        envs: normalised, in parallel.
+        seed: of network and environments.
+        **changes: other settings.
+    """
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from tunnel_sim.envs.stable_baselines import BaselinesVecEnv
+
+    settings: dict[str, Any] = {
+        "n_steps": 128,
+        "batch_size": 256,
+        "n_epochs": 10,
+        "learning_rate": lambda left: 1e-3 * (0.25 + 0.75 * left),
+        "gamma": 1.0,  # an episode ends within 12 runs
+        "gae_lambda": 0.95,
+        "ent_coef": 0.005,
+        "policy_kwargs": {"net_arch": [64, 64]},
+        "seed": TRAINED_FROM + seed,
+        "device": "cpu",
+    }
+    return PPO("MlpPolicy", VecMonitor(BaselinesVecEnv(envs)), **settings | changes)
+
+
 def train(steps: int, seed: int) -> Agent:
     """Train by proximal policy optimisation (Schulman et al., arXiv 1707.06347).
 
@@ -66,28 +94,10 @@ def train(steps: int, seed: int) -> Agent:
         steps: runs to make in all (number).
     """
     import torch
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.vec_env import VecMonitor
-
-    from tunnel_sim.envs.stable_baselines import BaselinesVecEnv
 
     torch.set_num_threads(1)  # the network is so small that a second thread only costs time
     envs = make(CAMPAIGNS, **TRAINING)
-    model = PPO(
-        "MlpPolicy",
-        VecMonitor(BaselinesVecEnv(envs)),
-        n_steps=128,
-        batch_size=256,
-        n_epochs=10,
-        learning_rate=lambda left: 1e-3 * (0.25 + 0.75 * left),
-        gamma=1.0,  # an episode ends within 12 runs
-        gae_lambda=0.95,
-        ent_coef=0.005,
-        policy_kwargs={"net_arch": [64, 64]},
-        seed=TRAINED_FROM + seed,
-        verbose=1,
-        device="cpu",
-    )
+    model = model_of(envs, seed, verbose=1)
     model.learn(steps)
     parts = (*model.policy.mlp_extractor.policy_net, model.policy.action_net)
     linear = [part for part in parts if hasattr(part, "weight")]

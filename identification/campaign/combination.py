@@ -185,6 +185,7 @@ class RunByRun(ABC):
     """An estimator that identifies each run by itself and then combines the runs."""
 
     name: ClassVar[str]
+    takes_driven: ClassVar[bool] = False
 
     def estimate(self, campaign: Campaign) -> Estimate:
         """Identify every run, then the campaign from those that could be identified.

@@ -1,4 +1,4 @@
-"""The estimators, one per file, and their registry.
+"""The estimators, one per file, and their registry, with those of installed packages and registered ones.
 
 To add one, write a frozen dataclass with the members of `Estimator`, whose fields are its settings, and add a
 line to `SUMMARIES`. The file has the estimator's name, and the class has that name in CamelCase, as in
@@ -7,11 +7,16 @@ line to `SUMMARIES`. The file has the estimator's name, and the class has that n
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, ClassVar, Protocol, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar, cast
 
-from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading
+from tunnel_sim.vocabulary.errors import TunnelError, added_to, did_you_mean, loading, one_line
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -19,7 +24,11 @@ if TYPE_CHECKING:
 
 
 class Estimator(Protocol):
-    """An identification method with its settings."""
+    """An identification method with its settings.
+
+    A class that also states ``takes_driven = True`` gets the driven runs of a campaign, with their inputs; without
+    it a campaign with driven runs is refused.
+    """
 
     name: ClassVar[str]
 
@@ -55,17 +64,70 @@ DRIVEN_ONLY: tuple[str, ...] = ("frequency_response",)
 """Those that do not take free decays."""
 
 ALL_ESTIMATORS: tuple[str, ...] = tuple(name for name in SUMMARIES if name not in DRIVEN_ONLY)
-"""Those that take free decays."""
+"""The packaged ones that take free decays."""
 
 
 ENTRY_POINTS = "tunnel.estimators"
 """Group of the entry points by which an installed package adds estimators: the name, and a class that needs no
 arguments."""
 
+KindT = TypeVar("KindT", bound=type[Any])
+
+_registered: dict[str, type[Any]] = {}
+_REMEDY = "state a name and a method estimate(campaign), and let the class need no arguments"
+
+
+def register_estimator(kind: KindT) -> KindT:
+    """Add an estimator of one's own by its name; as a decorator too.
+
+    Args:
+        kind: a class with the members of `Estimator` that needs no arguments. It replaces an earlier one of the
+            same name.
+
+    Raises:
+        TunnelError: when it is not such a class, or has the name of a packaged estimator.
+    """
+    where = f"estimator {one_line(getattr(kind, 'name', kind))}"
+    name = getattr(kind, "name", None)
+    if (
+        not isinstance(kind, type)
+        or not callable(getattr(kind, "estimate", None))
+        or not isinstance(name, str)
+    ):
+        raise TunnelError("is not a class of an estimator", where=where, remedy=_REMEDY)
+    if not name.isidentifier():
+        raise TunnelError("is not a name for an estimator", where=where, remedy="use letters, digits and _")
+    if name in SUMMARIES:
+        raise TunnelError("is the name of a packaged estimator", where=where, remedy="choose another name")
+    try:
+        kind()
+    except Exception as error:
+        what = f"cannot be made without arguments ({type(error).__name__}: {one_line(error)})"
+        raise TunnelError(what, where=where, remedy="give each setting a default") from error
+    _registered[name] = kind
+    return kind
+
+
+def register_from(word: str) -> str:
+    """Register the class that a word names as ``module:Class``, and return the name of the estimator.
+
+    Args:
+        word: the module is imported as Python does: from the folders of ``sys.path``.
+
+    Raises:
+        TunnelError: when the module or class cannot be loaded, or is not an estimator.
+    """
+    module, _, place = word.partition(":")
+    with loading(word, "give it as module:Class, and correct the module"):
+        kind = import_module(module)
+        for part in place.split("."):
+            kind = getattr(kind, part)
+    return str(register_estimator(cast("type[Any]", kind)).name)
+
 
 def known_estimators() -> tuple[str, ...]:
-    """The names of all estimators: the packaged ones, then those that installed packages add."""
-    return (*SUMMARIES, *(name for name in added_to(ENTRY_POINTS) if name not in SUMMARIES))
+    """The names of all estimators: the packaged ones, those of installed packages, then registered ones."""
+    return tuple(dict.fromkeys((*SUMMARIES, *added_to(ENTRY_POINTS), *_registered)))
 
 
 def make_estimator(name: str) -> Estimator:
@@ -78,6 +140,8 @@ def make_estimator(name: str) -> Estimator:
         TunnelError: when there is no such estimator, naming the closest one; or when an installed package states
             something else than an estimator of that name.
     """
+    if name in _registered:
+        return cast("Estimator", _registered[name]())
     if name in SUMMARIES:
         kind = name.title().replace("_", "")
         return cast("Estimator", getattr(import_module(f"{__name__}.{name}"), kind)())
@@ -86,10 +150,86 @@ def make_estimator(name: str) -> Estimator:
         raise TunnelError(
             f"no estimator {name!r}", where="identify", remedy=did_you_mean(name, known_estimators())
         )
-    with loading(ENTRY_POINTS, name):
+    with loading(f"entry point {ENTRY_POINTS}: {name}"):
         estimator = added[name].load()()
         if getattr(estimator, "name", None) != name or not callable(getattr(estimator, "estimate", None)):
             raise TunnelError(
                 f"is not an estimator named {name}", remedy="state its name and its method estimate"
             )
     return cast("Estimator", estimator)
+
+
+def free_decay_estimators() -> tuple[str, ...]:
+    """The names of all estimators but those that take driven runs only."""
+    return tuple(name for name in known_estimators() if name not in DRIVEN_ONLY)
+
+
+def takes_driven(estimator: Estimator) -> bool:
+    """Whether an estimator takes the input of driven runs: its class attribute ``takes_driven``; False without."""
+    return bool(getattr(estimator, "takes_driven", False))
+
+
+def estimators_of_driven_runs() -> tuple[str, ...]:
+    """The names of all estimators that take driven runs; those that cannot be loaded are left out."""
+    found = []
+    for name in known_estimators():
+        with suppress(TunnelError):
+            found += [name] if takes_driven(make_estimator(name)) else []
+    return tuple(found)
+
+
+def summary_of(name: str) -> str:
+    """One line on an estimator: that of `SUMMARIES`, or the first line of the docstring of one's own."""
+    if name in SUMMARIES:
+        return SUMMARIES[name]
+    with suppress(TunnelError):
+        text = (type(make_estimator(name)).__doc__ or "").strip()
+        return text.partition("\n")[0].removesuffix(".")
+    return "cannot be loaded"
+
+
+@dataclass(frozen=True)
+class Own:
+    """An estimator of one's own as other processes find it.
+
+    Args:
+        place: ``module:Class`` of a registered one that other processes can import; empty of one of an installed
+            package, and of a class from a prompt, a notebook or the inside of a function.
+        code: the first digits of the SHA-256 of the file of its module; empty where it has none.
+    """
+
+    name: str
+    place: str
+    code: str
+
+    def register(self) -> None:
+        """Make it known in this process.
+
+        Raises:
+            TunnelError: when this process cannot import it.
+        """
+        if self.name in known_estimators():
+            return
+        if not self.place:
+            raise TunnelError(
+                "other processes cannot import its class",
+                where=f"estimator {self.name}",
+                remedy="write it at the top level of a file, or use 0 processes",
+            )
+        register_from(self.place)
+
+
+def own_estimators(names: Iterable[str]) -> tuple[Own, ...]:
+    """Those of some estimators that are not packaged ones."""
+    found = []
+    for name in names:
+        if name in SUMMARIES:
+            continue
+        kind = _registered.get(name) or type(make_estimator(name))
+        module = sys.modules.get(kind.__module__)
+        file = getattr(module, "__file__", None)
+        importable = file is not None and getattr(module, kind.__qualname__, None) is kind
+        place = f"{kind.__module__}:{kind.__qualname__}" if name in _registered and importable else ""
+        code = "" if file is None else hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
+        found.append(Own(name, place, code))
+    return tuple(found)

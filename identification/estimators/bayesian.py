@@ -338,6 +338,7 @@ class Bayesian(RunByRun):
     """
 
     name = "bayesian"
+    takes_driven = True
     blocks_per_cycle: int = 20
     seed: int = 0
 

@@ -48,6 +48,7 @@ class FilterError(RunByRun):
     """
 
     name = "filter_error"
+    takes_driven = True
     blocks_per_cycle: int = 24
 
     def _run(self, run: Run, sensor: SensorProperties) -> Found:

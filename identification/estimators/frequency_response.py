@@ -47,6 +47,7 @@ class FrequencyResponse(RunByRun):
     """
 
     name = "frequency_response"
+    takes_driven = True
     segments: int = 4
     least_coherence: float = 0.5
 

@@ -52,6 +52,7 @@ class OutputError:
     """
 
     name: ClassVar[str] = "output_error"
+    takes_driven: ClassVar[bool] = True
     cycles_per_window: int | None = None
 
     def estimate(self, campaign: Campaign) -> Estimate:

@@ -8,6 +8,8 @@ import pytest
 from test_tutorials import printed, steps
 
 from docs.studies.campaign_agent import fill
+from docs.studies.learning_curves import curves, from_csv
+from docs.studies.learning_curves import fill as filled_with_curves
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "how-to" / "train-an-agent.md"
@@ -17,6 +19,39 @@ def test_the_page_shows_the_stored_episodes() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert fill(page, DOCS) == page
     assert "| trained |" in page
+
+
+def test_the_page_shows_the_stored_curves() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    points = from_csv((DOCS / "how-to" / "train-an-agent-curves.csv").read_text(encoding="utf-8"))
+    assert filled_with_curves(page, points) == page
+    assert "| 25,600 |" in page
+    assert len(points) == 33
+
+
+def test_what_the_page_says_of_the_curves_is_in_the_data() -> None:
+    points = from_csv((DOCS / "how-to" / "train-an-agent-curves.csv").read_text(encoding="utf-8"))
+    of = {(one.environment, one.policy, one.seed, one.steps): one for one in points}
+    resonant, greedy = of["FreeDecay-v0", "resonant", 0, 0], of["Campaign-v0", "greedy", 0, 0]
+    for seed in (0, 1):
+        line = [one for one in points if one.seed == seed and one.policy == "trained"]
+        runs = {one.steps: one for one in line if one.environment == "FreeDecay-v0"}
+        gained = {count: one.nats - runs[0].nats for count, one in runs.items()}
+        assert all(abs(gain) < 0.4 for count, gain in gained.items() if count <= 12_800)
+        assert all(gain > 1.4 for count, gain in gained.items() if count > 50_000)
+        assert abs(runs[102_400].nats - resonant.nats) < 1.96 * runs[102_400].std_error
+    assert of["Campaign-v0", "trained", 1, 32_768].nats > greedy.nats
+    assert of["Campaign-v0", "trained", 0, 32_768].nats < greedy.nats
+
+
+def test_the_curves_are_drawn() -> None:
+    points = from_csv((DOCS / "how-to" / "train-an-agent-curves.csv").read_text(encoding="utf-8"))
+    drawn = curves(points)
+    assert [axes.get_title("left") or axes.get_title() for axes in drawn.axes] == [
+        "FreeDecay-v0",
+        "Campaign-v0",
+    ]
+    assert (DOCS / "images" / "train-an-agent-curves.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_the_first_example_prints_what_is_shown(tmp_path: Path) -> None:

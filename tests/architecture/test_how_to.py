@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,8 @@ import pytest
 from test_readme import BLOCK, HOW_TO, ROOT, assert_same, output_of, sessions, toml_block
 from test_tutorials import printed, steps
 
+from identification import estimators
+from tunnel_lab.cli import main
 from tunnel_lab.experiments.score_trials import packaged_baseline
 
 PAGES = HOW_TO
@@ -92,6 +96,30 @@ def test_a_rival_is_added_in_one_class(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-a-rival.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
     assert len(shown) == 3
+
+
+def test_an_estimator_is_added_in_one_class(tmp_path: Path) -> None:
+    page = PAGES / "add-an-estimator.md"
+    shown = steps(page)
+    assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)
+    assert [bool(text) for _, text in shown] == [False, True, True]
+
+
+def test_the_commands_of_the_added_estimator_take_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The commands of the page, but for their folders and grids: the class is found in the current folder."""
+    page = PAGES / "add-an-estimator.md"
+    (tmp_path / "zero_crossings.py").write_text(steps(page)[0][0], encoding="utf-8")
+    given = re.findall(r"^tunnel (\w+) .*(?:-e|--estimator) (\S+:\S+)", page.read_text("utf-8"), re.MULTILINE)
+    assert {word for _, word in given} == {"zero_crossings:ZeroCrossings"}
+    assert {command for command, _ in given} == {"identify", "score", "sweep"}
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.setattr(estimators, "_registered", {})
+    record = ROOT / "identification" / "data" / "measured" / "kvlcc2-roll-decay-0kn"
+    assert main(["identify", str(record), "--estimator", given[0][1], "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["estimator"] == "zero_crossings"
 
 
 @pytest.mark.slow

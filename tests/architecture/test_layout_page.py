@@ -11,6 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from docs.studies import layout
+from identification import check_estimator
 from identification.datasets import measured_campaign
 from tunnel_sim.effects import effect_class, registry
 
@@ -62,6 +63,10 @@ def test_the_effect_is_registered(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_estimator_finds_the_frequency() -> None:
     found = run("estimator")["ZeroCrossings"]().estimate(measured_campaign("rotary-pendulum"))  # type: ignore[operator]
     assert all(run.omega_n.value > 5.0 * run.omega_n.std > 0.0 for run in found.runs)
+
+
+def test_the_estimator_passes_the_check() -> None:
+    check_estimator(run("estimator")["ZeroCrossings"])  # type: ignore[arg-type]
 
 
 def test_the_reader_reads() -> None:

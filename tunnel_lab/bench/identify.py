@@ -13,7 +13,7 @@ import tomli_w
 from nicegui import background_tasks, ui
 
 from identification.estimate import UNITS
-from identification.estimators import ALL_ESTIMATORS, SUMMARIES
+from identification.estimators import free_decay_estimators, summary_of
 from identification.printing import SYMBOLS, TextTable, repeatability_lines, status_lines, unit, with_std
 from identification.status import Remark
 from tunnel_lab.bench import work
@@ -45,13 +45,13 @@ class IdentifyPage:
 
     def __init__(self, session: Session, frame: Frame) -> None:
         self._session, self._frame = session, frame
+        self._names = free_decay_estimators()
         self._shown: object = None
         with ui.element("fieldset"):
             with ui.element("legend"):
                 ui.html("Estimators", sanitize=False, tag="span")
             self._chosen = {
-                name: ui.checkbox(f"{name}: {SUMMARIES[name]}", value=name in _FIRST)
-                for name in ALL_ESTIMATORS
+                name: ui.checkbox(f"{name}: {summary_of(name)}", value=name in _FIRST) for name in self._names
             }
         self._fault = Fault()
         build_choice(session, self._show_command)
@@ -114,7 +114,7 @@ class IdentifyPage:
         background_tasks.create(run_commands(self._session, orders), name="identify")
 
     def _look(self) -> None:
-        session, names = self._session, (*ALL_ESTIMATORS, _BUDGET)
+        session, names = self._session, (*self._names, _BUDGET)
         works = {name: work.work_of(session.log(name)) for name in names}
         estimates = [session.estimate(name) for name in names]
         state = (works, [path.stat().st_mtime_ns for path in estimates if path.is_file()])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import known_estimator, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import chosen_estimators, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -39,6 +39,15 @@ def sweep(
             "--scheduler",
             metavar="ADDRESS",
             help="Use the Dask cluster of this scheduler (tcp://host:8786), or start one here: local.",
+        ),
+    ] = None,
+    estimators: Annotated[
+        list[str] | None,
+        Option(
+            "--estimator",
+            "-e",
+            metavar="NAME",
+            help="Estimate with this one too: a name, or module:Class of your own.",
         ),
     ] = None,
     summary: Annotated[
@@ -77,6 +86,7 @@ def sweep(
 
     [bold]Examples[/bold]
       tunnel sweep sweep.toml --out results
+      tunnel sweep sweep.toml --out results -e my_module:MyMethod
       tunnel sweep sweep.toml --out results --scheduler tcp://host:8786
       tunnel sweep --summary results
 
@@ -103,7 +113,7 @@ def sweep(
     from tunnel_lab.experiments.sweep import run_sweep
     from tunnel_lab.experiments.sweep_cases import read_sweep
 
-    plan = read_sweep(file)
+    plan = read_sweep(file, chosen_estimators(estimators))
     count = min(workers or available_processors(), plan.shards)
 
     def say_line(line: str) -> None:
@@ -118,7 +128,8 @@ def sweep(
     say(f"Written: {out} ({plan.size} cases, {plan.runs} runs, {estimates} estimates)")
     if outcome.crashes:
         crashes = f"{outcome.crashes} estimates raised an exception"
-        say(f"{crashes}: see status 'raised' in the results", stderr=True)
+        say(f"{crashes}: see status 'raised' in the results. The first:", stderr=True)
+        say(outcome.first_crash, stderr=True)
         raise typer.Exit(1)
 
 
@@ -158,7 +169,13 @@ def score(
         Argument(help="Grid of conditions, TOML. Default: the packaged one, or the baseline's own."),
     ] = None,
     estimators: Annotated[
-        list[str] | None, Option("--estimator", "-e", metavar="NAME", help="Score only these. Default: all.")
+        list[str] | None,
+        Option(
+            "--estimator",
+            "-e",
+            metavar="NAME",
+            help="Score only these: names, or module:Class of your own. Default: all packaged ones.",
+        ),
     ] = None,
     out: Annotated[
         Path | None,
@@ -213,13 +230,14 @@ def score(
     [bold]Examples[/bold]
       tunnel score
       tunnel score grid.toml --out scores --trials 200
+      tunnel score -e my_module:MyMethod -e output_error
       tunnel score --estimator output_error --write-baseline base.parquet
       tunnel score --check base.parquet
       tunnel score --check packaged --estimator conventional
       tunnel score --breakdown --out map
 
     [bold]Exit status[/bold]
-      0 scored, 1 an estimator got worse, 2 bad input,
+      0 scored, 1 with --check: an estimator got worse or raised an exception, 2 bad input,
       130 interrupted (finished work is kept in --out).
     """
     from identification.estimators import ALL_ESTIMATORS
@@ -228,10 +246,7 @@ def score(
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
 
-    names = tuple(dict.fromkeys(part.strip() for word in estimators or () for part in word.split(",")))
-    for name in names:
-        known_estimator(name)
-    names = names or ALL_ESTIMATORS
+    names = chosen_estimators(estimators) or ALL_ESTIMATORS
     if breakdown:  # it has its own conditions
         for name, value in {"GRID": grid, "--check": check, "--write-baseline": write_baseline}.items():
             if value is not None:
@@ -269,16 +284,17 @@ def score(
     if cells:
         show_tables(*score_view.cell_tables(results))
     say(score_view.ABOUT)
-    for name, kinds in results.raised().items():
-        say(f"Note: {name} raised {', '.join(kinds)}; counted as failures")
     say_written(*written)
+    raised = score_trials.raised_lines(rows)
+    for line in raised:
+        say(line, stderr=True)
     if baseline is not None:
         verdict = score_view.check(baseline, results)
         say("")
         show_tables(score_view.worse_table(verdict))
         for line in score_view.verdict_lines(verdict):
             say(line)
-        if not verdict.passed:
+        if raised or not verdict.passed:
             raise typer.Exit(1)
 
 
@@ -312,7 +328,7 @@ def _refuse_occupied(out: Path | None, overwrite: bool) -> None:
 
 def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, trials: int | None) -> None:
     from tunnel_lab.experiments import breakdown
-    from tunnel_lab.experiments.score_trials import parquet
+    from tunnel_lab.experiments.score_trials import parquet, raised_lines
     from tunnel_lab.plotting.style import save_both
     from tunnel_sim.files.writing import write_whole
 
@@ -333,6 +349,8 @@ def _breakdown(names: tuple[str, ...], out: Path | None, jobs: int, seed: int, t
         show_tables(*breakdown.breakdown_tables(biases, quantity))
     say(breakdown.ABOUT)
     say_written(*written)
+    for line in raised_lines(rows):
+        say(line, stderr=True)
 
 
 def train(

@@ -18,8 +18,10 @@ from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
     LeaveOutOption,
+    chosen_estimator,
+    chosen_estimators,
     given_campaign,
-    known_estimator,
+    own_code,
     refuse_unwritable_files,
     split_names,
 )
@@ -52,7 +54,13 @@ def run(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
     leave_out: LeaveOutOption = None,
     estimator: Annotated[
-        str, Option("--estimator", "-e", metavar="NAME", help="One of the estimators listed above.")
+        str,
+        Option(
+            "--estimator",
+            "-e",
+            metavar="NAME",
+            help="One of the estimators listed above or of an installed package, or module:Class of your own.",
+        ),
     ] = "output_error",
     json: Annotated[
         Path | None,
@@ -121,8 +129,7 @@ def run(
     from tunnel_sim.files.writing import json_text, write_json
     from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
-    for name in (estimator, *(models or ())):
-        known_estimator(name)
+    estimator, models = chosen_estimator(estimator), list(chosen_estimators(models))
     if models and not budget and uncertainties is None:
         raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
     to_stdout = json is not None and str(json) == "-"
@@ -141,7 +148,7 @@ def run(
             remedy = f"add --estimator {' or '.join(WITH_WEIGHTS)}, or leave it out"
             raise TunnelError(f"{estimator} has no weights", where="--weights", remedy=remedy)
         chosen = cast("Estimator", replace(cast("Any", make_estimator(estimator)), weights=weights))
-    with bar("identifying runs", len(data.runs)) as progress:
+    with own_code([estimator]), bar("identifying runs", len(data.runs)) as progress:
         estimate = identify(whole, chosen, leave_out=left_out, throw=False, progress=progress)
     found = None
     if (budget or uncertainties is not None) and not estimate.status.failed:
@@ -150,7 +157,7 @@ def run(
         inputs = budgets.InputUncertainties()  # exact
         if uncertainties is not None:
             inputs = budgets.load_uncertainties(uncertainties)
-        with console(stderr=True).status("uncertainty budget") as status:
+        with own_code([estimator, *models]), console(stderr=True).status("uncertainty budget") as status:
             found = budgets.make_budget(
                 data,
                 estimate,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from identification.campaign.belief import information_gain
 from identification.estimate import PARAMETERS
 from identification.printing import SYMBOLS
-from tunnel_lab.envs.menu import PRESETS, Costs, Preset, make_menu, preset_sensor, refusal
+from tunnel_lab.envs.menu import PRESETS, WHERE, Costs, Preset, make_menu, preset_sensor, refusal
 from tunnel_lab.envs.session import (
     LARGE,
     CampaignSession,
@@ -28,6 +28,7 @@ from tunnel_lab.envs.session import (
     probabilities,
 )
 from tunnel_sim.effects import effect_class
+from tunnel_sim.envs import arguments_of, refuse_unknown
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.campaign import Campaign
@@ -58,9 +59,10 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         seconds_per_nat: rig time that a nat is worth, s.
         rig: path of a rig description; None takes the packaged rig.
         scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: none.
+        **unknown: refused.
 
     Raises:
-        TunnelError: when an argument is out of range or a name is unknown.
+        EnvError: when an argument is out of range or a name is unknown.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 1}  # noqa: RUF012
@@ -86,7 +88,9 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         scatter: Scatter | Mapping[str, float] | None = None,
         expose_truth: bool = False,
         render_mode: str | None = None,
+        **unknown: object,
     ) -> None:
+        refuse_unknown(unknown, arguments_of(CampaignEnv), WHERE)
         if preset not in PRESETS:
             raise refusal(f"unknown preset {preset!r}", did_you_mean(preset, PRESETS))
         base = PRESETS[preset]

@@ -15,10 +15,13 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import Condition, SensorModel
 from tunnel_sim.vocabulary.rig import Rig
 
+WHERE = "Campaign-v0"
+"""How errors name the environment."""
+
 
 def refusal(what: str, remedy: str) -> TunnelError:
     """The error of an argument or an action of the environment."""
-    return TunnelError(what, where="Campaign-v0", remedy=remedy)
+    return TunnelError(what, where=WHERE, remedy=remedy)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from rich.text import Text
 
 from identification.printing import significant
 from identification.scoring import Score, collect, score
-from tunnel_lab.experiments.runner import Progress
+from tunnel_lab.experiments.runner import Progress, knowing
 from tunnel_lab.experiments.score_trials import Row, estimate_rows, fingerprint, outcome, rows_of
 from tunnel_lab.experiments.score_view import NAMES
 from tunnel_lab.plotting.style import figure, styled
@@ -212,7 +212,7 @@ def break_down(
         parts: folder for finished work, so that an interrupted score can be continued; None for none.
     """
     mark = fingerprint({"breakdown": sorted(case.name for case in cases), "seed": seed}, estimators)
-    work = partial(_estimate_case, tuple(estimators))
+    work = knowing(partial(_estimate_case, tuple(estimators)), estimators)
     rows = rows_of(work, cases, mark, jobs=jobs, parts=parts, progress=progress)
     return [row for case in cases for row in rows[case.name]]
 

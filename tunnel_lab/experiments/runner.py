@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from functools import partial
@@ -20,6 +20,8 @@ from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
 
 if TYPE_CHECKING:
     from distributed import Client
+
+    from identification.estimators import Own
 
 
 TaskT = TypeVar("TaskT")
@@ -86,6 +88,24 @@ def run_tasks(
             done += size(task)
             show(done, total)
     return len(tasks) - len(waiting)
+
+
+def knowing(work: Callable[[TaskT], ResultT], estimators: Iterable[str]) -> Callable[[TaskT], ResultT]:
+    """The same work, which finds estimators of one's own in any process.
+
+    Args:
+        estimators: names of all that the work uses.
+    """
+    from identification.estimators import own_estimators  # only here: worker processes start with this module
+
+    own = own_estimators(estimators)
+    return partial(_with_own, own, work) if own else work
+
+
+def _with_own(own: Sequence[Own], work: Callable[[TaskT], ResultT], task: TaskT) -> ResultT:
+    for one in own:
+        one.register()
+    return work(task)
 
 
 def processes(jobs: int) -> Workers:

@@ -18,7 +18,8 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field, TypeAdapter
 
-from identification.estimators import ALL_ESTIMATORS
+from identification.estimators import free_decay_estimators
+from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound
 from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
 from tunnel_sim.effects.base import read_motion
@@ -237,8 +238,8 @@ def load_grid(path: Path) -> Grid:
     if twice is not None:
         raise TunnelError(f"the cell {twice.label!r} occurs twice", where=where, remedy="remove one")
     for name in document.trials_of:
-        if name not in ALL_ESTIMATORS:
-            remedy = did_you_mean(name, ALL_ESTIMATORS)
+        if name not in free_decay_estimators():
+            remedy = did_you_mean(name, free_decay_estimators())
             raise TunnelError(f"no estimator {name!r}", where=f"{where}, [trials_of]", remedy=remedy)
     trials_of = tuple(document.trials_of.items())
     return Grid(document.name, document.seed, document.trials, trials_of, tuple(cells))
@@ -282,8 +283,6 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
     Raises:
         TunnelError: when a run leaves the finite range.
     """
-    from identification.uncertainty.cramer_rao import campaign_bound, damped_sinusoid_bound
-
     rng = np.random.default_rng([seed, crc32(cell.label.encode()), number])
     rig = load_rig()
     noise = float(np.hypot(cell.noise * cell.amplitude, cell.resolution / np.sqrt(12.0)))
@@ -300,31 +299,18 @@ def draw_trial(cell: Cell, seed: int, number: int) -> Trial:
             for speed in (0.0, cell.wind_speed)
         ]
         campaign = _campaign(cell, truth, runs, rig, rng)
-        states = [(release, 0.0) for _, _, release in runs]
         scatter = Repeatability(
             **{one.scatters: one.severity for one in effects_of(cell.effect) if one.scatters}
         )
-        bounds = campaign_bound(
-            campaign, **vars(truth), noise_std=noise, initial_states=states, repeatability=scatter
-        )
-        return Trial(campaign, dict(vars(truth)), {name: bounds.std(name) for name in bounds.parameters})
+        bound = coefficients_bound(campaign, truth, [release for *_, release in runs], noise, scatter)
+        return Trial(campaign, dict(vars(truth)), bound)
     zeta = cell.zeta * (1.0 + _ZETA_SPREAD * rng.uniform(-1.0, 1.0))
     omega = 2.0 * np.pi * cell.frequency * (1.0 + _FREQUENCY_SPREAD * rng.uniform(-1.0, 1.0))
     inertia = rig.dynamics.yaw_inertia
     truth = Truth(0.0, 0.0, inertia, 2.0 * zeta * omega * inertia)
     campaign = _campaign(cell, truth, [(inertia * omega**2, 0.0, cell.amplitude)], rig, rng)
-    # Released at rest: A cos φ is the angle and A sin φ = −(decay rate)·angle/ωd.
-    damped = omega * np.sqrt(1.0 - zeta**2)
-    lag = -zeta * omega / damped
-    bound = damped_sinusoid_bound(
-        campaign.runs[0].record.time_s,
-        amplitude=cell.amplitude * float(np.hypot(1.0, lag)),
-        phase=float(np.arctan2(lag, 1.0)),
-        frequency=float(damped) / (2.0 * np.pi),
-        zeta=zeta,
-        noise_std=noise,
-    )
-    return Trial(campaign, {"zeta": zeta, "omega_n": omega}, {"zeta": bound.zeta, "omega_n": bound.omega_n})
+    bound = decay_bound(campaign.runs[0].record.time_s, cell.amplitude, float(omega), float(zeta), noise)
+    return Trial(campaign, {"zeta": zeta, "omega_n": omega}, bound)
 
 
 def effects_of(text: str) -> tuple[Effect, ...]:

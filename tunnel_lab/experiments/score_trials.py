@@ -21,7 +21,7 @@ import polars as pl
 
 from identification.estimate import UNITS, Quantity
 from identification.scoring import ScoredEstimate, Trials, collect
-from tunnel_lab.experiments.runner import Progress, processes, run_tasks
+from tunnel_lab.experiments.runner import Progress, knowing, processes, run_tasks
 from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.files.reading import (
@@ -35,7 +35,7 @@ from tunnel_sim.files.reading import (
 )
 from tunnel_sim.files.writing import json_line, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.errors import TunnelError, own_traceback, shown
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate
@@ -111,7 +111,7 @@ def estimate_rows(
     """One estimator on one campaign of known truth, a row for each quantity of the truth.
 
     An estimator that raises an exception has failed, and its status names the exception: one bad record must not
-    stop the work. Value and std are then None.
+    stop the work. Value and std are then None, and the first row has the ``traceback``.
 
     Args:
         truth: by quantity, SI; ζ and ωn are those of the first run.
@@ -120,12 +120,13 @@ def estimate_rows(
     """
     from identification import identify
 
-    begun = time.perf_counter()
+    begun, raised = time.perf_counter(), dict[str, str]()
     try:
         estimate: Estimate | None = identify(campaign, estimator, throw=False)
         status = "" if estimate is None else estimate.status.name.lower()
     except Exception as error:  # any exception of an estimator is counted and shown
         estimate, status = None, f"raised {type(error).__name__}"
+        raised = {"traceback": own_traceback(error)}
     milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
     rows = []
     for quantity, value in truth.items():
@@ -147,6 +148,7 @@ def estimate_rows(
                 "milliseconds": milliseconds,
             }
         )
+    rows[0] |= raised
     return rows
 
 
@@ -185,7 +187,7 @@ def score_grid(
         for cell in range(len(grid.cells))
     ]
     rows = rows_of(
-        partial(score_unit, grid, tuple(estimators)),
+        knowing(partial(score_unit, grid, tuple(estimators)), estimators),
         units,
         fingerprint(grid.to_json_dict(), estimators),
         jobs=jobs,
@@ -245,8 +247,11 @@ def rows_of(
 
 
 def fingerprint(document: Mapping[str, Any], estimators: Sequence[str]) -> str:
-    """SHA-256 of all that results depend on: conditions, names of the estimators, code of the packages below."""
-    text = json.dumps([document, list(estimators), _code()], sort_keys=True)
+    """SHA-256 of all that results depend on: conditions, estimators, the code below and one's own."""
+    from identification.estimators import own_estimators
+
+    own = [one.code for one in own_estimators(estimators)]
+    text = json.dumps([document, list(estimators), own, _code()], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -291,13 +296,18 @@ class Results:
             if row["estimator"] == estimator and row["cell"] in wanted
         )
 
-    def raised(self) -> dict[str, list[str]]:
-        """Exceptions by estimator; empty where there were none."""
-        by_estimator: dict[str, set[str]] = {}
-        for row in self.rows:
-            if row["status"].startswith("raised "):
-                by_estimator.setdefault(row["estimator"], set()).add(row["status"].removeprefix("raised "))
-        return {name: sorted(kinds) for name, kinds in by_estimator.items()}
+
+def raised_lines(rows: Sequence[Row]) -> list[str]:
+    """What is said of estimators that raised exceptions: how often, and the first traceback of each."""
+    tracebacks: dict[str, list[str]] = {}
+    for row in rows:
+        if "traceback" in row:
+            tracebacks.setdefault(row["estimator"], []).append(row["traceback"])
+    lines = []
+    for name, found in tracebacks.items():
+        times = "once" if len(found) == 1 else f"{len(found)} times"
+        lines += [f"{name} raised an exception {times}; counted as failures. The first:", found[0]]
+    return lines
 
 
 def groups_of(grid: Grid) -> dict[str, list[int]]:

@@ -218,8 +218,8 @@ def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:
         _figure(overall(scores)),
         significant(max(worst), 3) if worst else "–",
         _figure(bias),
-        _share(covered),
-        _share(failed) if failed.count else "0",
+        share_text(covered),
+        share_text(failed) if failed.count else "0",
     )
 
 
@@ -243,8 +243,8 @@ def cell_figures(judged: Score) -> tuple[str, ...]:
         _figure(judged.rmse_over_bound),
         _figure(judged.relative_bias),
         _figure(judged.bias_in_stds),
-        _share(judged.coverage),
-        _share(judged.failures) if judged.failures.count else "0",
+        share_text(judged.coverage),
+        share_text(judged.failures) if judged.failures.count else "0",
     )
 
 
@@ -252,7 +252,8 @@ def _figure(quantity: Quantity | None) -> str:
     return "–" if quantity is None else concise(quantity.value, quantity.std)
 
 
-def _share(share: Proportion | None) -> str:
+def share_text(share: Proportion | None) -> str:
+    """A share with its 95 % interval, in %."""
     if share is None:
         return "–"
     low, high = share.interval

@@ -15,10 +15,10 @@ import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache, partial
 from importlib.metadata import version
-from math import sqrt
+from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,24 +26,25 @@ import polars as pl
 
 from identification import identify
 from identification.estimate import PARAMETERS, UNITS
-from identification.estimators import make_estimator
-from tunnel_lab.experiments.runner import Progress, Workers, run_tasks
+from identification.estimators import make_estimator, own_estimators
+from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds
+from tunnel_lab.experiments.runner import Progress, Workers, knowing, run_tasks
 from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
 from tunnel_lab.terminal.inputs import NO_EFFECT
-from tunnel_sim.effects import effect_class
+from tunnel_sim.effects import effect_class, effect_from
 from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.between_runs import Scatter
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
-from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.between_runs import SCATTERED, Scatter
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, own_traceback, raised_line, shown
+from tunnel_sim.vocabulary.plan import CampaignPlan
 
 if TYPE_CHECKING:
     from identification.estimate import Estimate, RunEstimate
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 MANIFEST = "sweep.json"
 RESULTS, RECORDS, CHECKSUMS = "results", "records", "checksums"
 _ELSEWHERE = "name another --out"
@@ -72,7 +73,7 @@ RESULT_COLUMNS: Mapping[str, Any] = {
     **dict.fromkeys(("estimator", "run"), pl.String),
     **dict.fromkeys(("spring_stiffness", "wind_speed", "release_angle"), pl.Float64),
     **dict.fromkeys(("quantity", "unit"), pl.String),
-    **dict.fromkeys(("truth", "value", "std"), pl.Float64),
+    **dict.fromkeys(("truth", "value", "std", "bound"), pl.Float64),
     **dict.fromkeys(("status", "message"), pl.String),
 }
 RECORD_COLUMNS: Mapping[str, Any] = {
@@ -85,7 +86,7 @@ RECORD_COLUMNS: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class Finished:
-    """A finished shard, ready to be written: Parquet files, versions, and the number of estimates that raised.
+    """A finished shard, ready to be written: Parquet files, versions, and the estimates that raised.
 
     Results and records (None where they are not stored) do not depend on where or when the shard is done.
     """
@@ -95,20 +96,28 @@ class Finished:
     records: bytes | None
     made_with: Mapping[str, str]
     crashes: int
+    first_crash: str = ""
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a case has no estimate: `NOT_SIMULATED`, `REFUSED` or `RAISED`, and the message."""
+    """Why a case has no estimate: `NOT_SIMULATED`, `REFUSED` or `RAISED`, and the message, with its traceback."""
 
     status: str
     message: str
+    traceback: str = ""
 
 
 @cache
 def made_with() -> dict[str, str]:
     """Versions and processor that the bits of a result depend on."""
     return {**{name: version(name) for name in _PACKAGES}, "machine": platform.machine()}
+
+
+def made_with_all(sweep: Sweep) -> dict[str, str]:
+    """The same with the code of the sweep's estimators of one's own."""
+    own = own_estimators(sweep.document.estimators)
+    return {**made_with(), **{f"estimator {one.name}": one.code for one in own}}
 
 
 _sweep = lru_cache(maxsize=2)(Sweep.from_json)
@@ -143,31 +152,58 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
                 except TunnelError as error:
                     found = Failure(REFUSED, one_line(error))
                 except Exception as error:
-                    found = Failure(RAISED, one_line(f"{type(error).__name__}: {error}"))
+                    found = Failure(RAISED, one_line(raised_line(error)), own_traceback(error))
             answers.append((case, name, found))
     if not plan.document.estimators:
         answers = [
             (case, None, campaign if isinstance(campaign, Failure) else None) for case, campaign in campaigns
         ]
     answers.sort(key=lambda answer: answer[0].index)  # the estimators of one case keep their order
-    results = _parquet([row for answer in answers for row in estimate_rows(*answer)], RESULT_COLUMNS)
+    bounds = bounds_of(cases)
+    rows = [row for answer in answers for row in estimate_rows(*answer, bounds[answer[0].index])]
+    results = _parquet(rows, RESULT_COLUMNS)
     records = None
     if plan.document.records:
-        rows = [
+        kept = [
             (case.index, run.id, run.wind_speed, run.spring_stiffness, case.plan.sensor.sample_rate,
              pl.Series(run.record.yaw_rad))
             for case, campaign in campaigns
             if not isinstance(campaign, Failure)
             for run in campaign.runs
         ]  # fmt: skip
-        records = _parquet(rows, RECORD_COLUMNS)
+        records = _parquet(kept, RECORD_COLUMNS)
+    crashes = [found.traceback for _, _, found in answers if isinstance(found, Failure) and found.traceback]
     return Finished(
         index=index,
         results=results,
         records=records,
-        made_with={**made_with(), "threads": os.environ.get(ONE_THREAD[0], "several")},
-        crashes=sum(isinstance(found, Failure) and found.status == RAISED for _, _, found in answers),
+        made_with={**made_with_all(plan), "threads": os.environ.get(ONE_THREAD[0], "several")},
+        crashes=len(crashes),
+        first_crash=next(iter(crashes), ""),
     )
+
+
+def bounds_of(cases: Sequence[SweepCase]) -> dict[int, PlanBounds]:
+    """The bounds of cases by index; those that differ in seed and effects only are computed once."""
+    known: dict[object, PlanBounds] = {}
+    found = {}
+    for case in cases:
+        widths = _widths(case.plan)
+        key = (case.rig_name, case.plan.conditions, case.plan.truth, case.plan.sensor, *widths.items())
+        if key not in known:
+            known[key] = plan_bounds(case.plan, case.rig, widths)
+        found[case.index] = known[key]
+    return found
+
+
+def _widths(plan: CampaignPlan) -> dict[str, float]:
+    """Relative standard deviations between the runs of a case, of its scatter and of its effects, by name."""
+    widths = {name: getattr(plan.scatter, name) for name in SCATTERED}
+    for setting in plan.effects:
+        effect = effect_from(setting.name, setting.parameters)
+        if effect.scatters:
+            widths[effect.scatters] = hypot(widths[effect.scatters], effect.severity)
+    return widths
 
 
 def _simulate(cases: Sequence[SweepCase], nthread: int) -> Sequence[Campaign | Failure]:
@@ -190,11 +226,12 @@ def _parquet(rows: Sequence[tuple[Any, ...]], columns: Mapping[str, Any]) -> byt
 
 
 def estimate_rows(
-    case: SweepCase, estimator: str | None, outcome: Estimate | Failure | None
+    case: SweepCase, estimator: str | None, outcome: Estimate | Failure | None, bounds: PlanBounds
 ) -> Iterator[tuple[Any, ...]]:
     """The rows of one estimator's answer to one case.
 
     Args:
+        bounds: of the case, see `bounds_of`.
         estimator: its name; None where the case was only simulated.
         outcome: its estimate, or why there is none; None where the case was only simulated.
 
@@ -220,18 +257,12 @@ def estimate_rows(
     status, message = (outcome.status, outcome.message) if isinstance(outcome, Failure) else (SIMULATED, None)
     for place, condition in enumerate(conditions):
         run = answer.runs[place] if answer else None
-        # Of the nominal model at small angles; there is no oscillation where its stiffness is not positive.
-        air = case.rig.body.flow(condition.air_density, condition.wind_speed)
-        stiffness = condition.spring_stiffness - aerodynamic_stiffness(truth.cn_beta, **air)
-        damping = truth.mechanical_damping - aerodynamic_damping(truth.cn_r, **air)
-        truths: dict[str, float | None] = {"omega_n": None, "zeta": None}
-        if stiffness > 0.0:
-            omega_n = sqrt(stiffness / truth.yaw_inertia)
-            truths = {"omega_n": omega_n, "zeta": damping / (2.0 * truth.yaw_inertia * omega_n)}
+        nominal = nominal_oscillation(condition, truth, case.rig) or {}
         given = (condition.id, condition.spring_stiffness, condition.wind_speed, condition.release_angle)
         found = run.status.name.lower() if run else status
         for name, unit in RUN_QUANTITIES.items():
-            yield (*head, *given, name, unit, truths[name], *_figures(run, name), found, message)
+            figures = (nominal.get(name), *_figures(run, name), bounds.runs[place].get(name))
+            yield (*head, *given, name, unit, *figures, found, message)
     # Spring, wind-on speed and release angle of the campaign, each where the campaign has only one.
     kinds = (
         {condition.spring_stiffness for condition in conditions},
@@ -242,7 +273,8 @@ def estimate_rows(
     injected = {**vars(truth), "sensor_zero": sensor.zero}
     found = answer.status.name.lower() if answer else status
     for name, unit in CAMPAIGN_QUANTITIES.items():
-        yield (*head, *common, name, unit, injected[name], *_figures(answer, name), found, message)
+        figures = (injected[name], *_figures(answer, name), bounds.campaign.get(name))
+        yield (*head, *common, name, unit, *figures, found, message)
 
 
 def _figures(owner: Estimate | RunEstimate | None, name: str) -> tuple[float | None, float | None]:
@@ -316,7 +348,7 @@ def begin(sweep: Sweep, folder: Path) -> Store:
     Raises:
         TunnelError: when the folder holds another sweep or something else, or cannot be written.
     """
-    where, versions = shown(folder), made_with()
+    where, versions = shown(folder), made_with_all(sweep)
     if (folder / MANIFEST).is_file():
         store = open_store(folder)
         old, new = (json.loads(each.to_json()) for each in (store.sweep, sweep))
@@ -382,11 +414,16 @@ def open_store(folder: Path) -> Store:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a sweep: shards found finished, and estimates that raised an exception in those done now."""
+    """The outcome of a sweep: shards found finished, and estimates that raised an exception in those done now.
+
+    Args:
+        first_crash: traceback of the first of them; empty without any.
+    """
 
     store: Store
     found: int
     crashes: int
+    first_crash: str = ""
 
 
 def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress | None = None) -> Outcome:
@@ -399,14 +436,14 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
         TunnelError: when the folder belongs to another sweep, or the work cannot be done.
     """
     store = begin(sweep, folder)
-    crashes = []
+    crashes: list[Finished] = []
 
     def keep(_: int, shard: Finished) -> None:
         store.keep(shard)
-        crashes.append(shard.crashes)
+        crashes.extend([replace(shard, results=b"", records=None)] if shard.crashes else [])
 
     found = run_tasks(
-        partial(run_shard, sweep.to_json()),
+        knowing(partial(run_shard, sweep.to_json()), sweep.document.estimators),
         range(sweep.shards),
         workers,
         finished=set(store.finished()).__contains__,
@@ -416,4 +453,5 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
     )
     for name in (RESULTS, RECORDS, CHECKSUMS):  # partial files that a killed run left
         clear_leftovers(store.folder / name)
-    return Outcome(store, found, sum(crashes))
+    first = min(crashes, key=lambda shard: shard.index).first_crash if crashes else ""
+    return Outcome(store, found, sum(shard.crashes for shard in crashes), first)

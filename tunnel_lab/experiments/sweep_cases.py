@@ -20,7 +20,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from identification.estimators import ALL_ESTIMATORS
+from identification.estimators import free_decay_estimators
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.plan_file import (
@@ -362,11 +362,12 @@ def _samples(table: ConditionsTable, rate: float) -> float:
     return run_count(table) * max(table.duration) * rate
 
 
-def read_sweep(path: Path) -> Sweep:
+def read_sweep(path: Path, estimators: Sequence[str] = ()) -> Sweep:
     """Read and check a sweep file.
 
     Args:
         path: a TOML file; paths of rig files are relative to its folder.
+        estimators: names of further ones to estimate with.
     """
     content = load_toml(path, missing="name a sweep file, see docs/how-to/sweep.md")
     where = shown(path)
@@ -376,7 +377,8 @@ def read_sweep(path: Path) -> Sweep:
         table.model_copy(update={"name": table.name or (f"conditions-{place}" if many else "conditions")})
         for place, table in enumerate(document.conditions, 1)
     ]
-    document = document.model_copy(update={"conditions": conditions})
+    every = [*document.estimators, *(name for name in estimators if name not in document.estimators)]
+    document = document.model_copy(update={"conditions": conditions, "estimators": every})
     _check_names(document, where)
     for table in conditions:
         check_conditions(table, f"{where}, conditions '{table.name}'")
@@ -399,10 +401,10 @@ def read_sweep(path: Path) -> Sweep:
 
 def _check_names(document: SweepDocument, where: str) -> None:
     for name in document.estimators:
-        if name not in ALL_ESTIMATORS:
-            raise TunnelError(
-                f"unknown estimator '{name}'", where=where, remedy=did_you_mean(name, ALL_ESTIMATORS)
-            )
+        known = free_decay_estimators()
+        if name not in known:
+            remedy = did_you_mean(name, known)
+            raise TunnelError(f"unknown estimator '{name}'", where=where, remedy=remedy)
     if not document.estimators and not document.records:
         what = "neither estimators nor records: there would be no result"
         raise TunnelError(what, where=where, remedy="name an estimator, or set records = true")

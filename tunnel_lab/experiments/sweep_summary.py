@@ -16,6 +16,7 @@ import numpy as np
 from identification.printing import SYMBOLS, concise, significant, unit
 from identification.scoring import Score, Trials, score
 from identification.statistics import Proportion
+from tunnel_lab.experiments.score_view import share_text
 from tunnel_lab.experiments.sweep import SCATTER_COLUMNS, Store
 from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
@@ -63,7 +64,10 @@ NOT_ASKED = (
 DRAWN: Mapping[str, str] = {"omega_n": "ωn", "zeta": "ζ", "cn_beta": "Cnβ", "cn_r": "Cnr"}
 """Quantities that have a panel; Izz, Cr and the sensor's zero are in the first table and the CSV."""
 NAMES: Mapping[str, str] = {**DRAWN, **SYMBOLS, "sensor_zero": "zero"}
-BRACKETS = "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %."
+BRACKETS = (
+    "In brackets: the standard error in the last digits, from the number of trials; of shares 95 %. Bound: "
+    "Cramér–Rao's, of the nominal model, with the scatter where runs scatter."
+)
 _TICKS = 5  # intervals between labels of six digits, such as 0.00075, that do not touch
 _ASIDE = 0.012  # of the axis, between two estimators
 _LOGARITHMIC = ("noise_std", "spring_stiffness")
@@ -94,6 +98,7 @@ class Line:
     def to_row(self) -> dict[str, Any]:
         """The line as plain values: every figure with its standard error or 95 % interval."""
         bias, rmse, coverage = self.score.bias, self.score.rmse, self.score.coverage
+        over = self.score.rmse_over_bound
         return {
             "axis": self.axis, "effect": self.effect, "at": self.at, "at_unit": self.at_unit,
             "estimator": self.estimator, "quantity": self.quantity,
@@ -101,6 +106,7 @@ class Line:
             **_share("failures", self.score.failures),
             "bias": bias and bias.value, "bias_std": bias and bias.std,
             "rmse": rmse and rmse.value, "rmse_std": rmse and rmse.std,
+            "rmse_over_bound": over and over.value, "rmse_over_bound_std": over and over.std,
             **_share("coverage", coverage),
         }  # fmt: skip
 
@@ -127,7 +133,7 @@ def summarise(store: Store) -> list[Line]:
             "the sweep has no estimators", where=str(store.folder), remedy="there is no estimate to summarise"
         )
     pairs = frame.select("estimator", "quantity").unique(maintain_order=True).collect()
-    columns = ("effect", "severity", *AXES, "truth", "value", "std", "status", "unit")
+    columns = ("effect", "severity", *AXES, "truth", "value", "std", "bound", "status", "unit")
     lines: list[Line] = []
     for estimator, quantity in pairs.iter_rows():
         mine = (pl.col("estimator") == estimator) & (pl.col("quantity") == quantity)
@@ -180,13 +186,14 @@ def _score(data: pl.DataFrame) -> Score:
     relative = bool(np.all(truth != 0.0))
     kept = data["value"].is_not_null().to_numpy()
     given = data.filter(data["value"].is_not_null())
+    bounded = len(given) > 0 and not given["bound"].null_count()
     scale = 100.0 / np.abs(truth[kept]) if relative else np.ones(int(kept.sum()))
     return score(
         Trials(
             error=read_only((given["value"].to_numpy() - truth[kept]) * scale),
             std=read_only(given["std"].to_numpy() * scale),
             truth=read_only(truth[kept] * scale),
-            bound=None,
+            bound=read_only(given["bound"].to_numpy() * scale) if bounded else None,
             failures=int((~kept).sum()),
             unit="%" if relative else data["unit"][0],
         )
@@ -270,8 +277,8 @@ def overall_table(lines: Iterable[Line]) -> Table:
     kept = [line for line in lines if line.axis == OVERALL]
     pooled = "without effects" if all(line.effect == "none" for line in kept) else "effects pooled"
     result = table(
-        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "in 95 % interval", "failed",
-        right=("trials",),
+        f"All cases, {pooled}", "estimator", "quantity", "trials", "bias", "RMSE", "RMSE/\nbound",
+        "95 % covers\n[%]", "failed\n[%]", right=("trials",),
     )  # fmt: skip
     last = ""
     for line in kept:
@@ -281,7 +288,7 @@ def overall_table(lines: Iterable[Line]) -> Table:
         score = line.score
         result.add_row(
             line.estimator, NAMES[line.quantity], str(score.count), _figure(score.bias), _figure(score.rmse),
-            _percent(score.coverage), _percent(score.failures),
+            _figure(score.rmse_over_bound), share_text(score.coverage), share_text(score.failures),
         )  # fmt: skip
     return result
 
@@ -303,11 +310,6 @@ def axis_table(lines: Sequence[Line]) -> Table:
 
 
 def _figure(quantity: Quantity | None) -> str:
-    return "–" if quantity is None else f"{concise(quantity.value, quantity.std)} {quantity.unit}"
-
-
-def _percent(share: Proportion | None) -> str:
-    if share is None:
+    if quantity is None:
         return "–"
-    low, high = share.interval
-    return f"{100.0 * share.value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
+    return f"{concise(quantity.value, quantity.std)} {'' if quantity.unit == '1' else quantity.unit}".rstrip()

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from enum import StrEnum
 from functools import wraps
@@ -15,7 +17,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer import Option
 
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.errors import (
+    TunnelError,
+    did_you_mean,
+    one_line,
+    own_traceback,
+    raised_line,
+    shown,
+)
 
 if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
@@ -145,15 +154,50 @@ def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
 
 
-def known_estimator(name: str) -> None:
-    """Refuse an unknown estimator with a `TunnelError` that suggests the closest name."""
-    from identification.estimators import known_estimators
+def chosen_estimator(word: str) -> str:
+    """The name of an estimator from what ``--estimator`` was given: its name, or ``module:Class`` of one's own.
 
+    A module is looked for in the current folder too, and its class is registered.
+
+    Raises:
+        TunnelError: for an unknown name, suggesting the closest one, and for a class that cannot be used.
+    """
+    from identification.estimators import known_estimators, register_from
+
+    if ":" in word:
+        if not {"", str(Path.cwd())} & set(sys.path):
+            sys.path.insert(0, str(Path.cwd()))  # worker processes take it over
+        return register_from(word)
     known = known_estimators()
-    if name not in known:
-        raise TunnelError(
-            f"there is no estimator {name!r}", where="--estimator", remedy=did_you_mean(name, known)
-        )
+    if word not in known:
+        remedy = f"{did_you_mean(word, known).removesuffix('?')}, or give module:Class of your own"
+        raise TunnelError(f"there is no estimator {word!r}", where="--estimator", remedy=remedy)
+    return word
+
+
+def chosen_estimators(words: Sequence[str] | None) -> tuple[str, ...]:
+    """The same of repeated options, each perhaps a list with commas."""
+    return tuple(dict.fromkeys(map(chosen_estimator, split_names(words))))
+
+
+@contextmanager
+def own_code(estimators: Sequence[str]) -> Iterator[None]:
+    """End the command with the traceback and status 1 where an estimator of one's own raises within the block."""
+    try:
+        yield
+    except TunnelError:
+        raise
+    except Exception as error:
+        from identification.estimators import SUMMARIES
+        from tunnel_lab.terminal.outputs import say
+
+        own = [name for name in estimators if name not in SUMMARIES]
+        if not own:
+            raise
+        say(own_traceback(error), stderr=True)
+        remedy = "identification.check_estimator checks a class"
+        say(f"tunnel: {', '.join(own)} raised an exception: {raised_line(error)}; {remedy}", stderr=True)
+        raise typer.Exit(1) from None
 
 
 def refuse_unwritable_files(*paths: Path | None) -> None:

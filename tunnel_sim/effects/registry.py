@@ -120,7 +120,7 @@ _OF_SPECTRUM = 2  # parameters of a random moment
 def _load_entry_points() -> None:
     """Register the effects of installed packages, once."""
     for name, point in added_to(ENTRY_POINTS).items():
-        with loading(ENTRY_POINTS, name):
+        with loading(f"entry point {ENTRY_POINTS}: {name}"):
             register_effect(point.load())
 
 

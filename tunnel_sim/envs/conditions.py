@@ -12,7 +12,7 @@ import numpy as np
 
 from tunnel_sim.effects import ALL_EFFECTS, Effect
 from tunnel_sim.engine.virtual_campaign import plan_effects, run_settings
-from tunnel_sim.envs import EnvError, as_env_error
+from tunnel_sim.envs import EnvError, as_env_error, refuse_unknown
 from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
@@ -121,13 +121,15 @@ def angle_limit(rig: Rig) -> float:
     return radians(rig.potentiometer.half_range_deg)
 
 
-def free_decay_config(arguments: Mapping[str, Any]) -> FreeDecayConfig:
-    """The configuration of an environment from its keyword arguments."""
+def free_decay_config(arguments: Mapping[str, Any], beside: Iterable[str] = ()) -> FreeDecayConfig:
+    """The configuration of an environment from its keyword arguments.
+
+    Args:
+        arguments: by name, in the units of `FreeDecayConfig`.
+        beside: names that the environment takes beside them, for the remedy.
+    """
     known = [item.name for item in fields(FreeDecayConfig)]
-    for name in arguments:
-        if name not in known:
-            remedy = did_you_mean(name, known)
-            raise EnvError(f"unknown argument {name!r}", where="FreeDecay-v0", remedy=remedy)
+    refuse_unknown(arguments, (*known, *beside), "FreeDecay-v0")
     return FreeDecayConfig(**arguments)
 
 

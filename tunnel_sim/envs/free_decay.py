@@ -11,7 +11,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from tunnel_sim.envs import EnvError
+from tunnel_sim.envs import EnvError, arguments_of
 from tunnel_sim.envs.conditions import free_decay_config
 from tunnel_sim.envs.engines import ManyRuns, Models, OneRun, action_space, operator_action
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
@@ -39,7 +39,7 @@ class FreeDecayEnv(gymnasium.Env[Any, Any]):
         camera: str = "overview",
         **arguments: Any,
     ) -> None:
-        self.config = free_decay_config(arguments)
+        self.config = free_decay_config(arguments, arguments_of(FreeDecayEnv))
         self.rig = self.config.rig()
         fps = render_fps(self.config.control_period)
         self.metadata = {**self.metadata, "render_modes": render_modes(), "render_fps": fps}  # type: ignore[misc]
@@ -150,7 +150,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
     ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise EnvError(f"unknown mode {render_mode!r}", where="render_mode", remedy="use 'rgb_array'")
-        self.config = free_decay_config(arguments)
+        self.config = free_decay_config(arguments, arguments_of(FreeDecayVectorEnv))
         self.rig = self.config.rig()
         self.metadata = {**self.metadata, "render_fps": render_fps(self.config.control_period)}  # type: ignore[misc]
         self.num_envs, self.render_mode = num_envs, render_mode

@@ -105,7 +105,7 @@ def load_reader(ending: str) -> Reader | None:
     if ending in READERS:
         built_in: Reader = pkgutil.resolve_name(place)
         return built_in
-    with loading(ENTRY_POINTS, ending[1:]):
+    with loading(f"entry point {ENTRY_POINTS}: {ending[1:]}"):
         added = pkgutil.resolve_name(place)
         if not isinstance(added, Reader):
             raise TunnelError("is not a Reader", remedy="see tunnel_sim.files.readers")

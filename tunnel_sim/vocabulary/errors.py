@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import os
+import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -88,12 +90,42 @@ def added_to(group: str) -> dict[str, EntryPoint]:
 
 
 @contextmanager
-def loading(group: str, name: str) -> Iterator[None]:
-    """Say in one line whatever a foreign package does wrong while its entry point is loaded within the block."""
+def loading(where: str, remedy: str = "correct or uninstall its package") -> Iterator[None]:
+    """Say in one line whatever foreign code does wrong while it is loaded within the block."""
     try:
         yield
     except Exception as error:
-        said = str(error) if isinstance(error, TunnelError) else f"{type(error).__name__}: {error}"
-        what = f"cannot be loaded ({one_line(said)})"
-        remedy = "correct or uninstall its package"
-        raise TunnelError(what, where=f"entry point {group}: {name}", remedy=remedy) from error
+        said = str(error) if isinstance(error, TunnelError) else raised_line(error)
+        raise TunnelError(f"cannot be loaded ({one_line(said)})", where=where, remedy=remedy) from error
+
+
+def raised_line(error: BaseException) -> str:
+    """An exception in one line: its type, its message, and the line of the user's own code that led to it."""
+    frames = _own_frames(error)
+    place = f", {Path(frames[-1].filename).name} line {frames[-1].lineno}" if frames else ""
+    return one_line(f"{type(error).__name__}: {error}{place}", _LONGEST)
+
+
+def own_traceback(error: BaseException) -> str:
+    """The traceback of an exception from the user's own code on, as Python prints it."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = _own_frames(error)
+    shown_from = frames.index(own[0]) if own else 0
+    lines = (*traceback.format_list(frames[shown_from:]), *traceback.format_exception_only(error))
+    return "Traceback (most recent call last):\n" + "".join(lines).rstrip()
+
+
+def _own_frames(error: BaseException) -> list[traceback.FrameSummary]:
+    """The frames of a traceback in the user's own files; without any, those outside this program."""
+    home = Path(__file__).parents[2]
+    ours = [home / name for name in ("tunnel_sim", "identification", "diagnosis", "tunnel_lab")]
+    python = Path(os.__file__).parent
+    outside = [
+        one
+        for one in traceback.extract_tb(error.__traceback__)
+        if not any(Path(one.filename).is_relative_to(folder) for folder in ours)
+        and not one.filename.startswith("<")
+    ]
+    own = [one for one in outside if not Path(one.filename).is_relative_to(python)]
+    libraries = {"site-packages", "dist-packages"}
+    return [one for one in own if not libraries & set(Path(one.filename).parts)] or own

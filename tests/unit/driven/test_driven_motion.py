@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification._identify import DRIVEN_ESTIMATORS
-from identification.estimators import ALL_ESTIMATORS
+from identification.estimators import ALL_ESTIMATORS, estimators_of_driven_runs
 from identification.signal.driven import driven_rows, driven_start
 from tests.reference.free_decays import damped_cosine
 from tunnel_sim.files.rig_file import load_rig
@@ -212,7 +211,7 @@ def test_a_run_without_a_spring_stated_gives_frequency_and_damping() -> None:
     assert abs(found.omega_n.value - np.sqrt(K)) < 4.5 * found.omega_n.std
 
 
-@pytest.mark.parametrize("name", [name for name in ALL_ESTIMATORS if name not in DRIVEN_ESTIMATORS])
+@pytest.mark.parametrize("name", [name for name in ALL_ESTIMATORS if name not in estimators_of_driven_runs()])
 def test_other_estimators_refuse_driven_runs_in_one_line(name: str) -> None:
     with pytest.raises(
         TunnelError, match=f"run 'r0': the run is driven, and {name} takes free decays only"

@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification._identify import DRIVEN_ESTIMATORS
-from identification.estimators import ALL_ESTIMATORS, DRIVEN_ONLY, Estimator
+from identification.estimators import (
+    ALL_ESTIMATORS,
+    DRIVEN_ONLY,
+    Estimator,
+    estimators_of_driven_runs,
+)
 from identification.estimators.bayesian import Bayesian, Forced
 from identification.estimators.frequency_response import FrequencyResponse
 from identification.signal.driven import driven_rows
@@ -76,7 +80,9 @@ def test_coefficients_of_a_linear_rig_are_found(kind: str, held: bool) -> None:
         assert getattr(found, name).value == pytest.approx(true, rel=1e-4), name
 
 
-@pytest.mark.parametrize("estimator", [slow(e) if e == "output_error" else e for e in DRIVEN_ESTIMATORS])
+@pytest.mark.parametrize(
+    "estimator", [slow(e) if e == "output_error" else e for e in estimators_of_driven_runs()]
+)
 @pytest.mark.parametrize(("column", "gain"), [("drive", 2.5), slow("base_rad", 1.0)])
 def test_an_unknown_gain_and_a_moving_root_are_taken(column: str, gain: float, estimator: str) -> None:
     given = driven("multisine", column, gain=gain)

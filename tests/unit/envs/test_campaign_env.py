@@ -409,3 +409,18 @@ def test_a_drift_is_complete_at_the_last_run():
 def test_a_bad_scatter_is_refused(scatter, said):
     with pytest.raises(TunnelError, match=said):
         make(scatter=scatter)
+
+
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [
+        ("durration", "did you mean 'durations'?"),
+        ("max_rnus", "did you mean 'max_runs'?"),
+        ("qq", "use one of costs, "),
+    ],
+)
+def test_an_unknown_argument_is_one_line(argument, said):
+    with pytest.raises(ValueError, match="Campaign-v0: unknown argument") as refusal:
+        gym.make("tunnel_sim/Campaign-v0", **{argument: 1.0})
+    assert isinstance(refusal.value, TunnelError)
+    assert f"unknown argument '{argument}'; {said}" in str(refusal.value)

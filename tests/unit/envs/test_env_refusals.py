@@ -18,6 +18,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
     ("arguments", "parts"),
     [
         ({"durration": 5.0}, ["durration", "did you mean 'duration'"]),
+        ({"widht": 320}, ["FreeDecay-v0: unknown argument 'widht'", "did you mean 'width'"]),
         ({"preset": "operater"}, ["did you mean 'operator'"]),
         ({"duration": -1.0}, ["duration = -1.0", "above 0"]),
         ({"duration": float("nan")}, ["duration = nan"]),

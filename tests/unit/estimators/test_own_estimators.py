@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Callable
 from importlib.metadata import EntryPoint, EntryPoints
 from typing import ClassVar
 
@@ -11,7 +12,7 @@ import pytest
 from identification import Estimate, RunEstimate, identify
 from identification.datasets import measured_campaign
 from identification.estimators import ENTRY_POINTS, SUMMARIES, known_estimators, make_estimator
-from tunnel_lab.terminal.inputs import known_estimator
+from tunnel_lab.terminal.inputs import chosen_estimator
 from tunnel_sim import Campaign, TunnelError
 
 
@@ -36,7 +37,7 @@ def _plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("_plugged_in")
 def test_it_is_known_and_used_by_name() -> None:
     assert known_estimators() == (*SUMMARIES, "idle", "gone", "misnamed")
-    known_estimator("idle")
+    assert chosen_estimator("idle") == "idle"
     found = identify(measured_campaign("rotary-pendulum"), "idle")
     assert (found.estimator, found.cn_beta) == ("idle", None)
 
@@ -56,3 +57,21 @@ def test_what_is_not_an_estimator_is_one_line(name: str, why: str) -> None:
 def test_an_unknown_name_suggests_it() -> None:
     with pytest.raises(TunnelError, match="did you mean 'idle'"):
         make_estimator("idel")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda _: {"cn_beta": 0.5}, "estimator idle: returned dict and not an Estimate"),
+        (
+            lambda campaign: Estimate(campaign.name, "idle", ()),
+            r"returned runs \(none\), not swing-1, swing-2",
+        ),
+    ],
+)
+def test_an_answer_of_another_kind_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, answer: Callable[[Campaign], object], said: str
+) -> None:
+    monkeypatch.setattr(Idle, "estimate", lambda _, campaign: answer(campaign))
+    with pytest.raises(TunnelError, match=f"{said}.*check_estimator"):
+        identify(measured_campaign("rotary-pendulum"), Idle())

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -135,7 +136,10 @@ def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch)
 
     monkeypatch.setattr(Conventional, "estimate", fall)
     results = Results(small, NAMES, tuple(score_trials.score_grid(small, NAMES, jobs=0)))
-    assert results.raised() == {"conventional": ["LinAlgError"]}
+    said, traceback = score_trials.raised_lines(results.rows)
+    assert said.startswith("conventional raised an exception ")
+    assert traceback.endswith("numpy.linalg.LinAlgError: singular")
+    assert f"{Path(__file__).name}" in traceback
     assert {trials.failures for trials in results.trials().values()} == {4}
     assert scores_frame(results)["failure_share"].to_list() == [1.0] * 12
 

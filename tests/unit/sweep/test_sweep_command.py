@@ -152,6 +152,7 @@ def hand_made(values: list[float | None], status: str = "ok") -> pl.DataFrame:
             "truth": [2.0] * len(values),
             "value": values,
             "std": [None if value is None else 0.05 for value in values],
+            "bound": [0.04] * len(values),
             "status": [status if value is None else "ok" for value in values],
             "unit": ["1"] * len(values),
         }
@@ -183,6 +184,7 @@ def test_a_row_of_the_csv_is_its_line_with_intervals() -> None:
     assert (row["axis"], row["at"], row["unit"], row["count"]) == ("all", None, "%", 6)
     assert (row["bias"], row["rmse"]) == (pytest.approx(6.0), pytest.approx((302.0 / 5.0) ** 0.5))
     assert (row["failures"], row["coverage"]) == (pytest.approx(1.0 / 6.0), pytest.approx(0.4))
+    assert row["rmse_over_bound"] == pytest.approx(((2 * 0.5**2 + 3 * 5.0**2) / 5.0) ** 0.5)
     for name in ("failures", "coverage"):
         assert 0.0 < row[f"{name}_low"] < row[name] < row[f"{name}_high"] < 1.0
     none, *_ = lines_of(hand_made([None, None], "raised"), "e", "zeta")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -216,7 +217,10 @@ def test_an_estimator_that_crashes_is_a_status(
     assert outcome.crashes == 12
     rows = outcome.store.scan().collect()
     assert set(rows["status"]) == {"raised"}
-    assert set(rows["message"]) == {"ZeroDivisionError: planted"}
+    (message,) = set(rows["message"])
+    assert re.fullmatch(r"ZeroDivisionError: planted, test_sweep_engine\.py line \d+", message)
+    assert outcome.first_crash.startswith("Traceback (most recent call last):")
+    assert outcome.first_crash.endswith("ZeroDivisionError: planted")
 
 
 def damages(first: Path, second: Path) -> Iterator[None]:
@@ -267,7 +271,9 @@ def test_a_sweep_json_that_is_incomplete_is_one_line(
         del document[key]
     else:
         document[key] = value
-    if (key, value) == ("schema_version", 1) or (key == "made_with" and isinstance(value, dict)):
+    if (key, value) == ("schema_version", engine.SCHEMA_VERSION) or (
+        key == "made_with" and isinstance(value, dict)
+    ):
         return  # still what a folder may hold
     path.write_text(json.dumps(document), encoding="utf-8")
     for read in (open_store, lambda folder: begin(sweep, folder)):

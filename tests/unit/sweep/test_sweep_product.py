@@ -164,3 +164,56 @@ def test_a_number_that_scatters_twice_is_refused(tmp_path: Path) -> None:
              'name = "wind_speed_scatter"\nparameters = { spread = 0.01 }')  # fmt: skip
     with pytest.raises(TunnelError, match="wind_speed scatters twice"):
         variant(tmp_path, ('[[effects]]\nname = "none"', SCATTER), twice)
+
+
+LONG = """
+name = "long"
+seed = 3
+replicates = 1
+estimators = ["matrix_pencil"]
+cases_per_shard = 20
+[conditions]
+springs = [8]
+wind_speeds = [0.0, 15.0]
+release_angles_deg = [20.0]
+duration = 90.0
+[truth]
+cn_beta = 0.495
+cn_r = -0.114
+[sensor]
+sample_rate = 50.0
+noise_std = [0.0, 0.001, 0.002]
+resolution = 0.0
+[scatter]
+wind_speed = [0.0, 0.01]
+[[effects]]
+name = "none"
+[[effects]]
+name = "coulomb_friction"
+parameters.friction_moment = 0.002
+"""
+
+
+def test_the_bound_is_that_of_a_long_lightly_damped_decay(tmp_path: Path) -> None:
+    """Against std(ζ)/ζ = 4 (S/A) √(σ/fs) and std(f)/f = ζ std(ζ)/ζ, for light damping (Kay 1993)."""
+    (tmp_path / "long.toml").write_text(LONG, encoding="utf-8")
+    rows = pl.read_parquet(run_shard(read_sweep(tmp_path / "long.toml").to_json(), 0).results)
+    still = rows.filter((pl.col("wind_speed") == 0.0) & pl.col("run").is_not_null())
+    assert set(rows.filter(pl.col("noise_std") == 0.0)["bound"]) == {None}
+    for noise in (0.001, 0.002):
+        part = still.filter(pl.col("noise_std") == noise)
+        truths, bounds = (dict(part.select("quantity", name).iter_rows()) for name in ("truth", "bound"))
+        rate = truths["zeta"] * truths["omega_n"]
+        relative = 4.0 * noise / np.radians(20.0) * np.sqrt(rate / 50.0)
+        assert bounds["zeta"] / truths["zeta"] == pytest.approx(relative, rel=0.05)
+        assert bounds["omega_n"] / truths["omega_n"] == pytest.approx(truths["zeta"] * relative, rel=0.05)
+    # the same whatever effect acts; that of the coefficients grows with the noise and with the scatter
+    by_effect = rows.group_by("noise_std", "scatter_wind_speed", "run", "quantity").agg(
+        pl.col("bound").n_unique()
+    )
+    assert set(by_effect["bound"]) == {1}
+    known = rows.filter((pl.col("quantity") == "cn_beta") & (pl.col("effect") == "none"))
+    bounds = {(n, s): b for n, s, b in known.select("noise_std", "scatter_wind_speed", "bound").iter_rows()}
+    assert bounds[0.002, 0.0] == pytest.approx(2.0 * bounds[0.001, 0.0], rel=1e-9)
+    # an error of the speed of 1 % is one of 2 % in the only wind-on run
+    assert bounds[0.001, 0.01] == pytest.approx(np.hypot(0.02 * 0.495, bounds[0.001, 0.0]), rel=0.01)

@@ -1,0 +1,342 @@
+"""How much training the environments need: ``python -m docs.studies.learning_curves docs`` measures it.
+
+Agents are trained with Stable-Baselines3 on one thread; during the training the agent as it is then plays episodes
+that no training has seen, each time the same ones, and takes its most probable action. The score of an episode is
+its return, in nats. Data, figure and table of docs/how-to/train-an-agent.md are written. Training needs the extra
+``train`` and some fifteen minutes of one core; ``--draw`` draws the stored data.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium.wrappers.vector import NormalizeObservation
+
+import tunnel_sim.envs  # noqa: F401  registers the environments
+from docs.studies.campaign_agent import CAMPAIGNS, TRAINING, make, model_of
+from docs.studies.campaign_policies import replaced
+from tunnel_lab.envs.excitation import Resonant
+from tunnel_lab.envs.policies import greedy, scripted, trained
+from tunnel_lab.plotting.style import COLOURS, INTERVAL, MARKERS, WIDTH, figure, grid, save, styled
+from tunnel_sim.files.writing import write_whole
+from tunnel_sim.vocabulary.record import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FREE_DECAY: dict[str, Any] = {
+    "duration": 10.0,
+    "control_period": 0.05,
+    "sample_rate": 100.0,
+    "noise_std": 0.005,
+    "prior": {"cn_beta": 0.03, "cn_r": 0.03},
+}
+"""A run of 200 control periods, some seven in a cycle; by default it has 1000. The derivatives are known to 0.03
+from an earlier campaign. With the default prior, which knows next to nothing, the first half second gives most of
+the reward whatever the agent does, and hides what its actions add."""
+SETTINGS: dict[str, Any] = {
+    "n_steps": 200,  # a run
+    "batch_size": 400,
+    "gamma": 0.98,  # 50 control periods, 2.5 s: the wind follows its set-point in 2 s
+    "ent_coef": 0.0,
+    "learning_rate": 1e-3,
+    "policy_kwargs": {"net_arch": [64, 64], "log_std_init": -0.5},
+}
+"""Of PPO for ``FreeDecay-v0``, where they differ from those of the packaged agent."""
+RUNS = 16  # in parallel
+SEEDS = (0, 1)
+SWING = radians(20.0)  # rad, that the policy written by hand keeps
+SPEED = 25.0  # m/s, at which it does so
+CURVES = ("FreeDecay-v0", "Campaign-v0")
+LENGTHS = {"FreeDecay-v0": 150_000, "Campaign-v0": 32_000}
+"""Steps of each training: control periods, and runs."""
+STEP = {"FreeDecay-v0": "control periods", "Campaign-v0": "runs"}
+EPISODES = {"FreeDecay-v0": 48, "Campaign-v0": 50}
+TRAINED = "trained"
+PACKAGED = "packaged agent"
+NAME = "train-an-agent-curves"
+
+
+@dataclass(frozen=True)
+class Point:
+    """The score of a policy, or of an agent at one point of its training.
+
+    Args:
+        policy: ``trained``, or a policy that is not trained here.
+        seed: of the training; 0 for another policy.
+        steps: of the training so far; 0 for another policy.
+        nats: mean return of the episodes, nats.
+        std_error: of the mean, from the scatter between the episodes, nats.
+        episodes: number of them.
+    """
+
+    environment: str
+    policy: str
+    seed: int
+    steps: int
+    nats: float
+    std_error: float
+    episodes: int
+
+
+def point(environment: str, policy: str, seed: int, steps: int, returns: Array) -> Point:
+    """The mean of returns, shape (n,), nats."""
+    error = float(returns.std(ddof=1) / np.sqrt(returns.size))
+    return Point(
+        environment, policy, seed, steps, round(float(returns.mean()), 4), round(error, 4), returns.size
+    )
+
+
+def play_runs(act: Callable[[Array], Array], begin: Callable[[dict[str, Any]], None] | None = None) -> Array:
+    """The returns of runs of ``FreeDecay-v0``, nats, shape (n,).
+
+    Args:
+        act: actions, shape (n, 2), from observations, shape (n, p).
+        begin: called with the stated conditions, each shape (n,).
+    """
+    count = EPISODES["FreeDecay-v0"]
+    envs = gymnasium.make_vec("tunnel_sim/FreeDecay-v0", num_envs=count, nthread=1, **FREE_DECAY)
+    observations, info = envs.reset(seed=0)
+    if begin is not None:
+        begin(info)
+    returns, over = np.zeros(count), np.zeros(count, dtype=bool)
+    while not over.all():
+        observations, rewards, terminated, truncated, _ = envs.step(act(observations))
+        returns += np.where(over, 0.0, rewards)  # a run that has ended is restarted by itself
+        over |= terminated | truncated
+    envs.close()
+    return returns
+
+
+def play_campaigns(act: Callable[[Any], Any]) -> Array:
+    """The returns of campaigns of ``Campaign-v0``, nats less rig time, shape (n,).
+
+    Args:
+        act: the action in an environment in which an episode is under way.
+    """
+    env = gymnasium.make("tunnel_sim/Campaign-v0")
+    returns = np.zeros(EPISODES["Campaign-v0"])
+    for seed in range(returns.size):
+        env.reset(seed=seed)
+        over = False
+        while not over:
+            _, reward, terminated, truncated, _ = env.step(np.array(act(env.unwrapped)))
+            returns[seed] += float(reward)
+            over = terminated or truncated
+    return returns
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """One action throughout."""
+
+    action: Array
+
+    def __call__(self, _: Array) -> Array:
+        return self.action
+
+
+def untrained() -> list[Point]:
+    """The policies that the agents are compared with."""
+    from tunnel_sim.envs.conditions import FreeDecayConfig
+    from tunnel_sim.envs.engines import operator_action
+
+    config, found = FreeDecayConfig(**FREE_DECAY), []
+    policies: list[Callable[[Array], Array]] = []
+
+    def alone(info: dict[str, Any]) -> None:
+        policies[:] = [
+            _Held(operator_action(config, wind_speed=float(speed))) for speed in info["wind_speed"]
+        ]
+
+    def resonant(info: dict[str, Any]) -> None:
+        policies[:] = [
+            Resonant(config, stiffness=float(spring), inertia=0.1014, wind_speed=SPEED, amplitude=SWING)
+            for spring in info["spring_stiffness"]
+        ]
+
+    def each(observations: Array) -> Array:
+        return np.array([policy(own) for policy, own in zip(policies, observations, strict=True)])
+
+    for name, begin in (("free decay", alone), ("resonant", resonant)):
+        found.append(point("FreeDecay-v0", name, 0, 0, play_runs(each, begin)))
+    for name, rule in (("scripted", scripted), ("greedy", greedy), (PACKAGED, trained)):
+        returns = play_campaigns(lambda env: rule(env.known))  # noqa: B023  called within the loop
+        found.append(point("Campaign-v0", name, 0, 0, returns))
+    return found
+
+
+def train(environment: str, seed: int, steps: int) -> list[Point]:
+    """The learning curve of one agent, from before its training to its end."""
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    torch.set_num_threads(1)  # the network is so small that a second thread only costs time
+    if environment == "FreeDecay-v0":
+        native = gymnasium.make_vec("tunnel_sim/FreeDecay-v0", num_envs=RUNS, nthread=1, **FREE_DECAY)
+        envs = NormalizeObservation(native)
+        model = model_of(envs, seed, **SETTINGS)
+    else:
+        envs = make(CAMPAIGNS, **TRAINING)
+        model = model_of(envs, seed)
+
+    def returns() -> Array:
+        statistics: Any = envs.obs_rms
+        mean, spread = statistics.mean.copy(), np.sqrt(statistics.var + envs.epsilon)
+
+        def act(observation: Array) -> Array:
+            found: Array = model.predict((observation - mean) / spread, deterministic=True)[0]
+            return found
+
+        if environment == "FreeDecay-v0":
+            return play_runs(act)
+        return play_campaigns(lambda env: act(features_of(env)))
+
+    found: list[Point] = []
+
+    class Score(BaseCallback):
+        """Scores the agent before a rollout, each time that the steps have doubled."""
+
+        next_steps = 0
+
+        def _on_rollout_start(self) -> None:
+            if self.num_timesteps >= self.next_steps:
+                found.append(point(environment, TRAINED, seed, self.num_timesteps, returns()))
+                print(found[-1], flush=True)
+                self.next_steps = max(2 * self.num_timesteps, 1)
+
+        def _on_step(self) -> bool:
+            return True
+
+    model.learn(steps, callback=Score())
+    if found[-1].steps < model.num_timesteps:
+        found.append(point(environment, TRAINED, seed, model.num_timesteps, returns()))
+    return found
+
+
+def features_of(env: Any) -> Array:
+    """What the agent of a campaign sees."""
+    from tunnel_lab.envs.policies import features
+
+    return features(env.known.observation())
+
+
+def to_csv(points: Sequence[Point]) -> str:
+    """The points as CSV, a row for each."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [item.name for item in fields(Point)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(one) for one in points)
+    return text.getvalue()
+
+
+def from_csv(text: str) -> list[Point]:
+    """The inverse of `to_csv`."""
+    return [
+        Point(
+            row["environment"],
+            row["policy"],
+            int(row["seed"]),
+            int(row["steps"]),
+            float(row["nats"]),
+            float(row["std_error"]),
+            int(row["episodes"]),
+        )
+        for row in csv.DictReader(io.StringIO(text))
+    ]
+
+
+@styled
+def curves(points: Sequence[Point]) -> Figure:
+    """The scores over the steps of the training with 95 % intervals, a panel for each environment."""
+    drawn = figure(WIDTH, 3.6)
+    for axes, environment in zip(drawn.subplots(1, len(CURVES)), CURVES, strict=True):
+        _panel(axes, [one for one in points if one.environment == environment])
+        axes.set_title(environment)
+        axes.set_xlabel(f"steps of the training: {STEP[environment]}")
+    drawn.axes[0].set_ylabel("information in a run [nats]")
+    drawn.axes[1].set_ylabel("information less rig time [nats]")
+    return drawn
+
+
+def _panel(axes: Axes, points: Sequence[Point]) -> None:
+    mine = [one for one in points if one.policy == TRAINED]
+    first = min(one.steps for one in mine if one.steps)
+    start = first / 2.0  # where an axis of logarithms has its zero
+    for place, seed in enumerate(sorted({one.seed for one in mine})):
+        line = [one for one in mine if one.seed == seed]
+        axes.errorbar(
+            [max(one.steps, start) for one in line], [one.nats for one in line],
+            yerr=[INTERVAL * one.std_error for one in line],
+            color=COLOURS[place], marker=MARKERS[place], markersize=4.0, linewidth=1.0,
+            label=f"agent, seed {seed}",
+        )  # fmt: skip
+    for place, rule in enumerate(one for one in points if one.policy != TRAINED):
+        style = ("--", ":", "-.")[place]
+        axes.axhline(rule.nats, color="0.4", linewidth=1.0, linestyle=style, label=rule.policy)
+    last = max(one.steps for one in mine)
+    marks = [mark for mark in (3e3, 1e4, 3e4, 1e5) if first <= mark <= last]
+    axes.set_xscale("log")
+    axes.set_xlim(0.8 * start, 1.2 * last)
+    axes.set_xticks([start, *marks], ["0", *(f"{mark:,.0f}" for mark in marks)])
+    axes.minorticks_off()
+    grid(axes)
+    axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+
+
+def fill(page: str, points: Sequence[Point]) -> str:
+    """The page with the table of the scores over the steps, for each environment."""
+    for environment in CURVES:
+        mine = [one for one in points if one.environment == environment]
+        seeds = sorted({one.seed for one in mine if one.policy == TRAINED})
+        lines = [
+            f"| {STEP[environment]} | {' | '.join(f'agent, seed {seed} [nats]' for seed in seeds)} |",
+            "|---" * (1 + len(seeds)) + "|",
+        ]
+        for steps in sorted({one.steps for one in mine if one.policy == TRAINED}):
+            scores = {one.seed: one for one in mine if (one.policy, one.steps) == (TRAINED, steps)}
+            lines.append(f"| {steps:,} | {' | '.join(_cell(scores[seed]) for seed in seeds)} |")
+        for one in mine:
+            if one.policy != TRAINED:
+                lines.append(f"| *{one.policy}* | {' | '.join([_cell(one)] + [''] * (len(seeds) - 1))} |")
+        page = replaced(page, environment, "\n".join(lines))
+    return page
+
+
+def _cell(one: Point) -> str:
+    return f"{one.nats:.2f} ± {INTERVAL * one.std_error:.2f}".replace("-", "−")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train, and write the data and the figure; or draw the stored data."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("docs", type=Path, help="the folder docs of the source tree")
+    parser.add_argument("--draw", action="store_true", help="draw the stored data; train nothing")
+    given = parser.parse_args(arguments)
+    stored = given.docs / "how-to" / f"{NAME}.csv"
+    if not given.draw:
+        points = untrained()
+        for environment in CURVES:
+            for seed in SEEDS:
+                points += train(environment, seed, LENGTHS[environment])
+        write_whole(stored, to_csv(points).encode())
+    points = from_csv(stored.read_text(encoding="utf-8"))
+    save(curves(points), given.docs / "images" / f"{NAME}.png")
+    page = given.docs / "how-to" / "train-an-agent.md"
+    write_whole(page, fill(page.read_text(encoding="utf-8"), points).encode())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,135 @@
+"""The Cramér–Rao bounds that errors are compared with: of the nominal model, and the scatter where runs scatter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.engine.virtual_campaign import stated_run
+from tunnel_sim.vocabulary.between_runs import Repeatability
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
+from tunnel_sim.vocabulary.plan import (
+    CampaignPlan,
+    Condition,
+    SensorModel,
+    Truth,
+    aerodynamic_damping,
+    aerodynamic_stiffness,
+)
+from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.rig import Rig
+
+
+def reading_deviation(sensor: SensorModel) -> float:
+    """Standard deviation of a reading with its quantisation, rad."""
+    return float(np.hypot(sensor.noise_std, sensor.resolution / np.sqrt(12.0)))
+
+
+def decay_bound(time: Array, release: float, omega_n: float, zeta: float, noise: float) -> dict[str, float]:
+    """The bound of ``zeta`` (1) and ``omega_n`` (rad/s) of one run that is released at rest, its zero unknown.
+
+    Args:
+        time: sample times from the release, shape (n,), s.
+        release: angle, rad.
+        omega_n: true natural frequency, rad/s.
+        zeta: true damping ratio.
+        noise: standard deviation of a reading, rad.
+
+    Returns:
+        By quantity; empty without an oscillation, or without noise, where the bound is zero.
+    """
+    from identification.uncertainty.cramer_rao import damped_sinusoid_bound
+
+    if not (noise > 0.0 and omega_n > 0.0 and abs(zeta) < 1.0 and release):
+        return {}
+    # Released at rest: A cos φ is the angle and A sin φ = −(decay rate)·angle/ωd.
+    damped = omega_n * np.sqrt(1.0 - zeta**2)
+    lag = -zeta * omega_n / damped
+    bound = damped_sinusoid_bound(
+        time,
+        amplitude=abs(release) * float(np.hypot(1.0, lag)),
+        phase=float(np.arctan2(lag, 1.0)),
+        frequency=float(damped) / (2.0 * np.pi),
+        zeta=zeta,
+        noise_std=noise,
+    )
+    return {"zeta": bound.zeta, "omega_n": bound.omega_n}
+
+
+def coefficients_bound(
+    campaign: Campaign,
+    truth: Truth,
+    releases: Sequence[float],
+    noise: float,
+    scatter: Repeatability | None = None,
+) -> Mapping[str, float]:
+    """The bound of Cnβ, Cnr, Izz and Cr by name, SI; those that the campaign does not determine are left out.
+
+    Args:
+        releases: the angle from which each run is released at rest, rad.
+        noise: standard deviation of a reading, rad.
+        scatter: of the runs; None: they repeat exactly.
+
+    Returns:
+        By quantity; empty without noise, where the bound is zero.
+    """
+    from identification.uncertainty.cramer_rao import campaign_bound
+
+    if noise <= 0.0:
+        return {}
+    states = [(release, 0.0) for release in releases]
+    bound = campaign_bound(
+        campaign, **vars(truth), noise_std=noise, initial_states=states, repeatability=scatter
+    )
+    return {name: bound.std(name) for name in bound.parameters}
+
+
+@dataclass(frozen=True)
+class PlanBounds:
+    """The bounds of a planned campaign.
+
+    Args:
+        runs: of ``omega_n`` and ``zeta`` of each run, as of `decay_bound`.
+        campaign: of the coefficients, as of `coefficients_bound`.
+    """
+
+    runs: tuple[Mapping[str, float], ...]
+    campaign: Mapping[str, float]
+
+
+def nominal_oscillation(condition: Condition, truth: Truth, rig: Rig) -> dict[str, float] | None:
+    """ωn [rad/s] and ζ of a run in the nominal model at small angles; None where its stiffness is not positive."""
+    air = rig.body.flow(condition.air_density, condition.wind_speed)
+    stiffness = condition.spring_stiffness - aerodynamic_stiffness(truth.cn_beta, **air)
+    damping = truth.mechanical_damping - aerodynamic_damping(truth.cn_r, **air)
+    if stiffness <= 0.0:
+        return None
+    omega_n = float(np.sqrt(stiffness / truth.yaw_inertia))
+    return {"omega_n": omega_n, "zeta": damping / (2.0 * truth.yaw_inertia * omega_n)}
+
+
+def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> PlanBounds:
+    """The bounds of a campaign of free decays as its plan states it, whatever effects act.
+
+    Args:
+        widths: relative standard deviations between runs by name, as `Repeatability` has them; zero: none.
+    """
+    noise, rate = reading_deviation(plan.sensor), plan.sensor.sample_rate
+    nominal = [nominal_oscillation(one, plan.truth, rig) for one in plan.conditions]
+    times = [np.arange(max(2, round(one.duration * rate))) / rate for one in plan.conditions]
+    runs = tuple(
+        {} if found is None else decay_bound(time, one.release_angle, **found, noise=noise)
+        for one, found, time in zip(plan.conditions, nominal, times, strict=True)
+    )
+    if not all(runs):  # one that does not oscillate, or a sensor without noise
+        return PlanBounds(runs, {})
+    bare = tuple(
+        stated_run(one, Record(time, np.zeros(time.size)))
+        for one, time in zip(plan.conditions, times, strict=True)
+    )
+    campaign = Campaign(plan.name, RigProperties.of(rig), SensorProperties.of(plan.sensor), bare)
+    scatter = Repeatability(**{name: width for name, width in widths.items() if width})
+    releases = [one.release_angle for one in plan.conditions]
+    return PlanBounds(runs, coefficients_bound(campaign, plan.truth, releases, noise, scatter))
