@@ -26,7 +26,7 @@ from identification.status import Outcome, Remark
 from tunnel_sim.effects import Effect
 from tunnel_sim.vocabulary.campaign import Campaign, Run
 from tunnel_sim.vocabulary.drive import refuse_untreated
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 _LEFT_OUT = "left out of the diagnosis, which compares free decays"
 
@@ -208,9 +208,9 @@ def refuse_undiagnosable(campaign: Campaign, given: NominalModel | None = None) 
             what = "the run is driven and has no spring, and the wind blows, which is not diagnosed yet"
             raise TunnelError(what, where=where, remedy="leave the run out")
         if run.record.yaw_rad.size < LEAST_SAMPLES:
+            size = counted(run.record.yaw_rad.size, "sample")
             raise TunnelError(
-                f"the run is driven and has {run.record.yaw_rad.size} samples: too few to tell its noise from its "
-                "response",
+                f"the run is driven and has {size}: too few to tell its noise from its response",
                 where=where,
                 remedy=f"record {LEAST_SAMPLES} samples or more, or leave the run out",
             )

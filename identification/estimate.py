@@ -21,7 +21,7 @@ from identification.status import Status as Status
 from identification.status import by_severity as by_severity
 from tunnel_sim.files.reading import as_described, check_shape
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, installing
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -328,8 +328,7 @@ class Estimate:
         try:
             from arviz import from_dict  # only here: an extra
         except ModuleNotFoundError as error:
-            remedy = "pip install 'virtual-wind-tunnel[arviz]'"
-            raise TunnelError("arviz is not installed", remedy=remedy) from error
+            raise TunnelError("arviz is not installed", remedy=f"run {installing('arviz')}") from error
         std = np.sqrt(np.diag(self.covariance_matrix))
         powers, axes = np.linalg.eigh(self.covariance_matrix / np.outer(std, std))
         own = rng.standard_normal((draws, std.size)) * np.sqrt(np.maximum(powers, 0.0))
@@ -408,8 +407,7 @@ def as_pandas(frame: pl.DataFrame) -> DataFrame:
     try:
         from pandas import DataFrame  # only here: an extra
     except ModuleNotFoundError as error:
-        remedy = "pip install 'virtual-wind-tunnel[frames]'"
-        raise TunnelError("pandas is not installed", remedy=remedy) from error
+        raise TunnelError("pandas is not installed", remedy=f"run {installing('frames')}") from error
     return DataFrame(frame.to_dict(as_series=False))
 
 

@@ -15,6 +15,7 @@ from itertools import zip_longest
 from typing import Any
 
 from identification.status import Remark, Status
+from tunnel_sim.vocabulary.errors import counted
 
 SYMBOLS: Mapping[str, str] = {
     "cn_beta": "Cnβ",
@@ -279,7 +280,7 @@ def estimate_parts(document: Document) -> list[str | TextTable]:
     notes = [str(Remark.from_json_dict(remark)) for remark in document["remarks"]]
     notes += status_lines(document)
     left = len(document["runs"]) - SHOWN_RUNS
-    more = f"and {left} more runs, which runs_frame() lists" if left > 0 else ""
+    more = f"and {counted(left, 'more run')}, which runs_frame() lists" if left > 0 else ""
     tables: list[str | TextTable] = [coefficients_table(document), runs_table(document), more]
     return [*tables, *repeatability_lines(document), *(f"Note: {note}" for note in notes)]
 

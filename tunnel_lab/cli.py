@@ -7,17 +7,19 @@ Exit status: 0 success; 1 a check or an estimate failed; 2 bad input, with one l
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cache, partial
-from typing import Annotated, cast
+from functools import cache
+from typing import Annotated, Any, cast
 
 import typer
 
 from tunnel_lab.commands import (
     about,
     blind,
+    demo,
     diagnose,
     effects,
     experiments,
@@ -69,29 +71,7 @@ def tunnel(
     yaw-moment derivatives Cnβ and Cnr (1/rad), the inertia Izz (kg m²) and the
     rig's damping Cr (N m s/rad), each with a standard deviation.
 
-    [bold]Start here[/bold]
-      tunnel demo                        the whole chain, with figures
-      tunnel springs                     inertia from the paper's spring table
-      tunnel plan p.toml --drive         the drive that tells most, in a plan's rig time
-      tunnel simulate plan.toml --out c  simulate a campaign into folder c
-      tunnel import log.csv --out c      make a campaign from a logger's files
-      tunnel identify c --json est.json  its coefficients, simulated or measured
-      tunnel diagnose c                  why the model does not fit it
-      tunnel compare a.json b.json       diagnoses side by side
-      tunnel plot c                      draw its figures
-      tunnel export c --format mat       write it as MAT, CSV, Excel or HDF5
-      tunnel effects                     effects that a plan can add
-      tunnel blind                       blind tests of the diagnosis
-      tunnel score                       errors of each estimator
-      tunnel sweep sweep.toml --out s    many campaigns, resumable
-      tunnel view                        the rig in real time, in a window or browser
-      tunnel render                      a film of a run, and a picture
-      tunnel train w.safetensors         train the paper's networks from a seed
-      tunnel paper                       the paper's tables and figures
-      tunnel docs                        the documentation, in a browser
-      tunnel doctor                      what is installed, and a self-check
-      tunnel schema campaign             JSON schemas, for editors
-      tunnel bench                       from a logger's files to a report, in a browser
+    tunnel COMMAND --help explains a command, with examples.
 
     [bold]Units[/bold]
       SI and radians throughout.
@@ -105,39 +85,73 @@ def tunnel(
         typer.echo(context.get_help())
 
 
-COMMANDS: dict[str, Callable[..., None]] = {
-    "demo": paper.demo,
-    "plan": simulate.plan_drive,
-    "simulate": simulate.simulate,
-    "import": files.import_files,
-    "identify": identify.run,
-    "diagnose": diagnose.diagnose,
-    "compare": diagnose.compare,
-    "plot": show.plot,
-    "export": files.export,
-    "springs": paper.springs,
-    "effects": effects.run,
-    "score": experiments.score,
-    "sweep": experiments.sweep,
-    "view": show.view,
-    "render": show.render,
-    "train": experiments.train,
-    "paper": paper.paper,
-    "docs": about.docs,
-    "doctor": about.doctor,
-    "schema": about.schema,
-    "bench": show.bench,
+GROUPS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
+    "Start here": {
+        "demo": demo.demo,
+        "bench": show.bench,
+        "import": files.import_files,
+        "diagnose": diagnose.diagnose,
+        "simulate": simulate.simulate,
+    },
+    "Records": {"export": files.export, "plot": show.plot, "springs": paper.springs},
+    "Simulation": {
+        "effects": effects.run,
+        "plan": simulate.plan_drive,
+        "view": show.view,
+        "render": show.render,
+    },
+    "Estimators": {
+        "identify": identify.run,
+        "score": experiments.score,
+        "sweep": experiments.sweep,
+        "train": experiments.train,
+    },
+    "Results": {"compare": diagnose.compare, "paper": paper.paper},
+    "Developers": {
+        "doctor": about.doctor,
+        "docs": about.docs,
+        "schema": about.schema,
+        "blind": blind.app,
+    },
 }
-"""Every command that is one function by its name, in the order of the help."""
+"""Every command by its name, in groups as the help shows them; one that has commands of its own comes last."""
+COMMANDS = {
+    name: command
+    for group in GROUPS.values()
+    for name, command in group.items()
+    if not isinstance(command, typer.Typer)
+}
+"""Every command that is one function by its name."""
 _WITHOUT_TABLES = {"simulate", "plot", "export", "view", "render", "docs", "schema", "bench"}
 
-for _name, _command in COMMANDS.items():
-    _wider = with_quiet if _name in _WITHOUT_TABLES else with_format
-    app.command(_name)(_wider(_command))
-app.add_typer(blind.app, name="blind")
+for _group, _members in GROUPS.items():
+    for _name, _command in _members.items():
+        if isinstance(_command, typer.Typer):
+            app.add_typer(_command, name=_name, rich_help_panel=_group)
+        else:
+            _wider = with_quiet if _name in _WITHOUT_TABLES else with_format
+            app.command(_name, rich_help_panel=_group)(_wider(_command))
 
 
-_whole = cache(partial(typer.main.get_command, app))  # built once however often a process calls `main`
+_MARKUP = re.compile(r"\[(?=[a-z#/@])(?!/?bold\])")
+"""A bracket that Rich would take for markup; of markup the help has headings only."""
+
+
+def _with_plain_brackets(command: Any) -> None:
+    """Show brackets in the help of a command, its options and its own commands as they are, such as ``[drive]``."""
+    for text in (command, *command.params):
+        for name in ("help", "short_help"):
+            if said := getattr(text, name, None):
+                setattr(text, name, _MARKUP.sub(r"\\[", said))
+    for own in getattr(command, "commands", {}).values():
+        _with_plain_brackets(own)
+
+
+@cache  # built once however often a process calls `main`
+def _whole() -> Any:
+    command = typer.main.get_command(app)
+    _with_plain_brackets(command)
+    return command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

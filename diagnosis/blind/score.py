@@ -24,7 +24,7 @@ from diagnosis.search.weigh import UNKNOWN
 from identification.statistics import Proportion
 from tunnel_sim.files.reading import as_described, read_json
 from tunnel_sim.files.writing import as_json
-from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 from tunnel_sim.vocabulary.record import Array
 
 BINS = 10
@@ -452,7 +452,9 @@ def _checked_answers(
     left = [path.name for path in campaigns if path.name not in hashes]
     if left:
         raise TunnelError(
-            f"{len(left)} of {len(campaigns)} campaigns have no answer", where=str(target), remedy=again
+            f"{len(left)} of {counted(len(campaigns), 'campaign')} without an answer",
+            where=str(target),
+            remedy=again,
         )
     answers = {}
     for path in campaigns:

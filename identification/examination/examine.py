@@ -19,6 +19,7 @@ from identification.examination.slips.base import Seen
 from identification.examination.slips.table import found_in, mended
 from identification.status import Examined, Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign, SensorProperties
+from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import CLOCK_TOLERANCE, Array, Record
 
 _FINEST = 9  # decimals: no logger rounds to less than a nanosecond
@@ -197,7 +198,8 @@ def with_clocks(campaign: Campaign) -> tuple[Campaign, tuple[Remark, ...]]:
     if gappy:
         count = sum(clock.missing for _, clock in gappy)
         longest = max(float(clock.interval * (np.diff(clock.place).max() - 1)) for _, clock in gappy)
-        what = f"{count} samples are missing, up to {longest:.4g} s at a time; the others are used at their times"
+        lost = f"{counted(count, 'sample')} missing, up to {longest:.4g} s at a time"
+        what = f"{lost}; the others are used at their times"
         remarks.append(Remark(Outcome.NOTED, tuple(run.id for run, _ in gappy), what, "check the logger"))
     if not rounded:
         return campaign, tuple(remarks)

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from identification import ALL_ESTIMATORS
-from tunnel_sim.effects import ALL_EFFECTS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -58,7 +57,6 @@ def test_the_figures_of_the_benchmark_are_those_of_its_page() -> None:
 
 
 def test_the_counts_are_those_of_the_code() -> None:
-    assert f"{len(ALL_EFFECTS)} effects" in TEXT
     assert len(ALL_ESTIMATORS) == 9
     assert "nine estimators" in TEXT
 

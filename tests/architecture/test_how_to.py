@@ -24,7 +24,7 @@ INDEX = ROOT / "docs" / "README.md"
 @pytest.mark.parametrize(
     ("page", "typed"),
     [
-        pytest.param("run-the-demo", ["demo"], marks=pytest.mark.slow),
+        pytest.param("run-the-demo", ["demo", "demo"], marks=pytest.mark.slow),
         ("identify-a-record", ["springs"]),
         pytest.param("diagnose-a-campaign", ["simulate", "diagnose"], marks=pytest.mark.slow),
         pytest.param("state-uncertainties", ["simulate", "identify"], marks=pytest.mark.slow),

@@ -35,7 +35,7 @@ def unknown(typed: str) -> list[str]:
         if name not in command.commands:
             return [name]
         command = command.commands[name]
-    known = {name for parameter in command.params for name in parameter.opts}
+    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
     return [word for word in words if word.startswith("-") and word not in known]
 
 

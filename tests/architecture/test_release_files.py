@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+import shlex
 import tomllib
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 import pytest
+from test_landing import unknown
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+CITATION = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 CONDA = {"torch": "pytorch", "matplotlib": "matplotlib-base", "mujoco": "mujoco-python"}
 """Packages that conda-forge calls otherwise."""
 
@@ -34,7 +38,12 @@ def test_the_recipe_has_the_dependencies_and_the_version_of_the_project():
 
 
 def test_the_citation_has_the_version_of_the_project():
-    assert f"version: {PROJECT['project']['version']}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"version: {PROJECT['project']['version']}\n" in CITATION
+
+
+def test_the_citation_has_a_date_that_has_been() -> None:
+    (day,) = re.findall(r"^date-released: (\d{4}-\d{2}-\d{2})$", CITATION, re.MULTILINE)
+    assert date(2025, 1, 1) < date.fromisoformat(day) <= datetime.now(UTC).date()
 
 
 def test_the_image_runs_without_root_and_installs_extras_that_exist():
@@ -47,6 +56,33 @@ def test_the_image_runs_without_root_and_installs_extras_that_exist():
     extras = re.search(r"/source\[([a-z,]+)\]", "\n".join(lines))
     assert extras is not None
     assert set(extras[1].split(",")) <= set(PROJECT["project"]["optional-dependencies"])
+
+
+def docker_lines(text: str) -> list[list[str]]:
+    """The words of every line of a text that runs docker; a comment of the Dockerfile may be one."""
+    return [
+        shlex.split(line.lstrip("# "))
+        for line in text.splitlines()
+        if line.lstrip("# ").startswith("docker ")
+    ]
+
+
+def test_the_page_of_the_image_shows_commands_that_exist():
+    """Docker itself is not run: its lines are compared with the Dockerfile, the rest with the command line."""
+    page = docker_lines((ROOT / "docs" / "how-to" / "docker.md").read_text(encoding="utf-8"))
+    dockerfile = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    (build,) = [words for words in page if words[1] == "build"]
+    runs = [words for words in page if words[1] == "run" and len(words) > 3]
+    image = build[build.index("-t") + 1]
+    assert 'ENTRYPOINT ["/opt/tunnel/bin/tunnel"]' in dockerfile
+    assert len(runs) >= 4
+    for words in runs:
+        assert "$PWD:/data" in words
+        assert unknown(shlex.join(["tunnel", *words[words.index(image) + 1 :]])) == []
+    # The head of the Dockerfile shows some of the page's.
+    shown = docker_lines(dockerfile)
+    assert build in shown
+    assert any(words in runs for words in shown if "bench" in words)
 
 
 @pytest.mark.parametrize("package", PROJECT["tool"]["scikit-build"]["wheel"]["packages"])

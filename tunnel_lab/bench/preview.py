@@ -17,7 +17,7 @@ from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.importing.conditions import ImportChoices, read_recipe
 from tunnel_sim.files.toml_input import validate
 from tunnel_sim.files.writing import write_whole
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.columns import ColumnPair
@@ -391,7 +391,7 @@ def show_columns(columns: list[Column], state: Callable[[dict[str, Any]], Awaita
             if not column.units:
                 field.props("disable")
     if len(columns) > MOST_COLUMNS:
-        ui.label(f"{len(columns) - MOST_COLUMNS} more columns are not shown.").classes("soft")
+        ui.label(f"{counted(len(columns) - MOST_COLUMNS, 'more column')} not shown.").classes("soft")
 
 
 def show_choices(

@@ -21,7 +21,7 @@ from tunnel_lab.bench.parts import (
 )
 from tunnel_lab.bench.uploads import drop_zone, more
 from tunnel_lab.bench.workspace import Session, rename
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.records import Imported
@@ -233,7 +233,7 @@ class RecordsPage:
                 self._charts = [self._chart(record) for record in records]
             hidden = len({id(part.raw) for part in imported.parts}) - len(records)
             if hidden > 0:
-                ui.label(f"{hidden} more records are not drawn.").classes("soft")
+                ui.label(f"{counted(hidden, 'more record')} not drawn.").classes("soft")
             with ui.expansion("Resting angles as numbers"), ui.element("div").classes("fields"):
                 self._rests = []
                 for mark in marks:

@@ -18,8 +18,9 @@ import typer
 from typer import Argument, Option
 
 from tunnel_lab.terminal.encoding import printable_json
+from tunnel_lab.terminal.inputs import ending
 from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
-from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, library, shown
+from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, did_you_mean, installing, library, shown
 
 PACKAGES = ("mujoco", "numpy", "scipy", "torch", "gymnasium", "polars", "matplotlib")
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -144,8 +145,8 @@ def extras() -> Iterator[tuple[str, str]]:
 
     for extra, modules in EXTRAS.items():
         missing = [name for name in modules if find_spec(name) is None]
-        remedy = f"pip install 'virtual-wind-tunnel[{extra}]'"
-        yield f"extra {extra}", f"lacks {', '.join(missing)}: {remedy}" if missing else "installed"
+        lacks = f"lacks {', '.join(missing)}: run {installing(extra)}"
+        yield f"extra {extra}", lacks if missing else "installed"
 
 
 def self_check() -> Iterator[tuple[str, str, bool]]:
@@ -196,7 +197,13 @@ SCHEMAS = {
 def schema(
     document: Annotated[str, Argument(help="campaign, plan, estimate or diagnosis.")],
     out: Annotated[
-        Path | None, Option("--out", metavar="FILE", help="Write to a file instead of standard output.")
+        Path | None,
+        Option(
+            "--out",
+            callback=ending(".json"),
+            metavar="FILE.json",
+            help="Write to a file instead of standard output.",
+        ),
     ] = None,
 ) -> None:
     """Print the JSON schema of a document.

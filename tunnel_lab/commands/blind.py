@@ -12,13 +12,14 @@ from typer import Argument, Option
 
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
+    ending,
     refuse_unwritable_files,
     split_names,
     with_format,
     with_quiet,
 )
 from tunnel_lab.terminal.outputs import bar, console, rich_table, say, say_written, show_tables
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import counted
 
 HELP = """Blind tests of the diagnosis: make campaigns, diagnose them, score the answers.
 
@@ -156,7 +157,7 @@ def make(
             progress=progress,
             show_steps=console(stderr=True).is_terminal,
         )  # fmt: skip
-    say(f"Written: {out} ({count} campaigns), key {where}")
+    say(f"Written: {out} ({counted(count, 'campaign')}), key {where}")
     say(f"Key sha256 {read_json(out / SEAL, remedy='')['key_sha256']}, in {out / SEAL}")
 
 
@@ -193,15 +194,23 @@ def score(
     exclude: Excluded = None,
     key: KeyFile = None,
     markdown: Annotated[
-        Path | None, Option("--markdown", metavar="FILE", help="Also write the score as a page.")
+        Path | None,
+        Option("--markdown", callback=ending(".md"), metavar="FILE", help="Also write the score as a page."),
     ] = None,
     json: Annotated[
-        Path | None, Option("--json", metavar="FILE", help="Also write all figures and cases as JSON.")
+        Path | None,
+        Option(
+            "--json",
+            callback=ending(".json"),
+            metavar="FILE",
+            help="Also write all figures and cases as JSON.",
+        ),
     ] = None,
     figure: Annotated[
         Path | None,
         Option(
             "--figure",
+            callback=ending(".png"),
             metavar="FILE.png",
             help="Also draw the calibration, and the confusion beside it; PDF too.",
         ),
@@ -230,8 +239,6 @@ def score(
     names = split_names(exclude)
     vocabulary(exclude=names)
     refuse_unwritable_files(markdown, json, figure)
-    if figure is not None and figure.suffix != ".png":
-        raise TunnelError("is not a .png", where=f"--figure {figure}", remedy="name a file that ends in .png")
     result = score_set(folder, excluded=names, key=key, effects_file=effects_file)
     drawn: tuple[Path, ...] = ()
     if figure is not None:

@@ -18,6 +18,7 @@ from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import (
     EffectsFileOption,
     LeaveOutOption,
+    ending,
     file_hashes,
     given_campaign,
     refuse_unwritable_files,
@@ -44,15 +45,27 @@ def diagnose(
     leave_out: LeaveOutOption = None,
     json: Annotated[
         Path | None,
-        _output("--json", metavar="FILE", help="Write the answer as JSON; - for standard output."),
+        _output(
+            "--json",
+            callback=ending(".json"),
+            metavar="FILE",
+            help="Write the answer as JSON; - for standard output.",
+        ),
     ] = None,
     report: Annotated[
-        Path | None, _output("--report", metavar="FILE.html", help="Write a report, one HTML page.")
+        Path | None,
+        _output(
+            "--report",
+            callback=ending(".html", ".htm"),
+            metavar="FILE.html",
+            help="Write a report, one HTML page.",
+        ),
     ] = None,
     summary: Annotated[
         Path | None,
         _output(
             "--summary",
+            callback=ending(".pdf"),
             metavar="FILE.pdf",
             help="Write the report's summary, one printed page; needs Chromium.",
         ),
@@ -106,12 +119,20 @@ def diagnose(
     ] = None,
     patch: Annotated[
         Path | None,
-        _model("--patch", metavar="OUT.xml", help="Write the model with the causes in it; for --model."),
+        _model(
+            "--patch",
+            callback=ending(".xml"),
+            metavar="OUT.xml",
+            help="Write the model with the causes in it; for --model.",
+        ),
     ] = None,
     propose: Annotated[
         Path | None,
         _output(
-            "--propose", metavar="LAW.toml", help="Write the formula proposed for what no effect explains."
+            "--propose",
+            callback=ending(".toml"),
+            metavar="LAW.toml",
+            help="Write the formula proposed for what no effect explains.",
         ),
     ] = None,
 ) -> None:

@@ -14,7 +14,7 @@ from rich.text import Text
 from typer import Argument, Option
 
 from identification.printing import unit_mark
-from tunnel_lab.terminal.inputs import EffectsFileOption, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import EffectsFileOption, ending, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import say, say_written, show_tables, table
 from tunnel_sim.vocabulary.errors import TunnelError
 
@@ -70,9 +70,18 @@ def run(
         ),
     ] = None,
     checked: Annotated[str | None, Argument(hidden=True)] = None,
-    json: Annotated[Path | None, Option("--json", metavar="FILE", help="Write the effects as JSON.")] = None,
+    json: Annotated[
+        Path | None,
+        Option("--json", callback=ending(".json"), metavar="FILE", help="Write the effects as JSON."),
+    ] = None,
     markdown: Annotated[
-        Path | None, Option("--markdown", metavar="FILE", help="Write the effects as a reference page.")
+        Path | None,
+        Option(
+            "--markdown",
+            callback=ending(".md"),
+            metavar="FILE",
+            help="Write the effects as a reference page.",
+        ),
     ] = None,
     effects_file: EffectsFileOption = None,
 ) -> None:

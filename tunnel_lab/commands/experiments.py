@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import chosen_estimators, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import chosen_estimators, ending, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, console, say, say_written, show_tables, table
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     from tunnel_lab.experiments.score_trials import Results
@@ -29,9 +29,9 @@ def sweep(
     out: Annotated[
         Path | None, Option("--out", "-o", metavar="FOLDER", help="Folder of the results.")
     ] = None,
-    workers: Annotated[
+    jobs: Annotated[
         int | None,
-        Option("--workers", min=1, help="Processes on this machine. Default: one for each processor."),
+        Option("--jobs", min=1, help="Processes on this machine. Default: one for each processor."),
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -106,15 +106,15 @@ def sweep(
         raise TunnelError(
             f"{missing} is missing", where="sweep", remedy="give FILE --out FOLDER, or --summary FOLDER"
         )
-    if workers is not None and scheduler not in (None, "local"):
+    if jobs is not None and scheduler not in (None, "local"):
         what = "its workers are started on their own machines"
-        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --workers")
+        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --jobs")
     from tunnel_lab.experiments.runner import available_processors, lasting_processes, on_cluster
     from tunnel_lab.experiments.sweep import run_sweep
     from tunnel_lab.experiments.sweep_cases import read_sweep
 
     plan = read_sweep(file, chosen_estimators(estimators))
-    count = min(workers or available_processors(), plan.shards)
+    count = min(jobs or available_processors(), plan.shards)
 
     def say_line(line: str) -> None:
         say(f"tunnel: {line}", stderr=True)
@@ -123,11 +123,12 @@ def sweep(
     with bar("cases", plan.size) as progress:
         outcome = run_sweep(plan, out, crew, progress)
     if outcome.found:
-        say(f"{outcome.found} of {plan.shards} shards were finished before")
+        say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
     estimates = plan.size * len(plan.document.estimators)
-    say(f"Written: {out} ({plan.size} cases, {plan.runs} runs, {estimates} estimates)")
+    sizes = (plan.size, "case"), (plan.runs, "run"), (estimates, "estimate")
+    say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")
     if outcome.crashes:
-        crashes = f"{outcome.crashes} estimates raised an exception"
+        crashes = f"{counted(outcome.crashes, 'estimate')} raised an exception"
         say(f"{crashes}: see status 'raised' in the results. The first:", stderr=True)
         say(outcome.first_crash, stderr=True)
         raise typer.Exit(1)
@@ -156,7 +157,7 @@ def _summarise(folder: Path) -> None:
             written += save_both(drawn, target / f"{name}.png")
     done, shards = len(store.finished()), store.sweep.shards
     if done < shards:
-        say(f"Finished: {done} of {shards} shards; run the same command again for the rest\n")
+        say(f"Finished: {done} of {counted(shards, 'shard')}; run the same command again for the rest\n")
     along = map(sweep_summary.axis_table, grouped.values())
     show_tables(sweep_summary.overall_table(lines), *along)
     say(sweep_summary.BRACKETS)
@@ -202,7 +203,13 @@ def score(
         ),
     ] = None,
     write_baseline: Annotated[
-        Path | None, Option("--write-baseline", metavar="FILE", help="Write the trials as a baseline.")
+        Path | None,
+        Option(
+            "--write-baseline",
+            callback=ending(".parquet"),
+            metavar="FILE",
+            help="Write the trials as a baseline.",
+        ),
     ] = None,
     breakdown: Annotated[
         bool, Option("--breakdown", help="Show the bias caused by each unmodelled effect instead.")

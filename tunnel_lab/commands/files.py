@@ -11,9 +11,9 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import LeaveOutOption, split_names
+from tunnel_lab.terminal.inputs import LeaveOutOption, ending, split_names
 from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 _column = partial(Option, rich_help_panel="Columns")
 _unit = partial(Option, rich_help_panel="Units")
@@ -92,16 +92,22 @@ def import_files(
     ] = None,
     delimiter: Annotated[
         str | None,
-        Option("--delimiter", hidden=True, help="Delimiter of a text file: tab, blank, ';', ',' or '|'."),
+        _column("--delimiter", metavar="SIGN", help="Delimiter of a text file: tab, blank, ';', ',' or '|'."),
     ] = None,
     decimal: Annotated[
-        str | None, Option("--decimal", hidden=True, help="Decimal sign of a text file.")
+        str | None, _column("--decimal", metavar="SIGN", help="Decimal sign of a text file: ',' or '.'.")
     ] = None,
     recipe: Annotated[
         Path | None, _column("--recipe", metavar="import.toml", help="Choices of an earlier import.")
     ] = None,
     preview: Annotated[
-        Path | None, _output("--preview", metavar="FILE.png", help="Draw what was read; write no campaign.")
+        Path | None,
+        _output(
+            "--preview",
+            callback=ending(".png"),
+            metavar="FILE.png",
+            help="Draw what was read; write no campaign.",
+        ),
     ] = None,
     yes: Annotated[bool, _output("--yes", "-y", help="Write without asking.")] = False,
     overwrite: Annotated[
@@ -112,10 +118,9 @@ def import_files(
 
     Text of any dialect, Excel, MAT, TDMS, HDF5, Parquet and JSON are read. Columns, units,
     sample rate, runs and releases are found; what was found, and why, is printed
-    before anything is written. Options correct what was found wrongly; a recipe also
-    states delimiter and decimal sign of a text file. The campaign gets a picture
-    (import.png), the choices made (import.toml, for --recipe), and comments in
-    campaign.toml on what the files do not state, such as the stiffness.
+    before anything is written. Options correct what was found wrongly. The campaign
+    gets a picture (import.png), the choices made (import.toml, for --recipe), and
+    comments in campaign.toml on what the files do not state, such as the stiffness.
 
     [bold]Examples[/bold]
       tunnel import log.csv --out my-rig
@@ -184,7 +189,7 @@ def import_files(
         raise typer.Exit(1)
     write_imported(imported, out, overwrite=overwrite, picture=import_picture)
     count = len(imported.campaign.runs)
-    say(f"Written: {out} ({count} run{'s' if count > 1 else ''}, {out / 'import.png'} shows them)")
+    say(f"Written: {out} ({counted(count, 'run')}, {out / 'import.png'} shows them)")
 
 
 class ExportFormat(StrEnum):
@@ -198,7 +203,7 @@ class ExportFormat(StrEnum):
 
 def export(
     campaign: Annotated[Path, Argument(help="Folder of the campaign: campaign.toml and its runs.")],
-    format: Annotated[ExportFormat, Option("--format", help="Format of the file.")],
+    format: Annotated[ExportFormat, Option("--file-format", help="Format of the file.")],
     out: Annotated[
         Path | None,
         Option(
@@ -214,8 +219,8 @@ def export(
     with the run's id and conditions. tunnel import reads the same runs again.
 
     [bold]Examples[/bold]
-      tunnel export my-campaign --format mat
-      tunnel export my-campaign --format csv --out all-runs.csv
+      tunnel export my-campaign --file-format mat
+      tunnel export my-campaign --file-format csv --out all-runs.csv
 
     [bold]Exit status[/bold]
       0 written, 2 bad input; the file is written completely or not at all.
@@ -224,9 +229,10 @@ def export(
     from tunnel_sim.files.exporting import export_campaign
     from tunnel_sim.files.writing import refuse_unwritable
 
-    path = out or Path(f"{campaign.resolve().name}.{'h5' if format is ExportFormat.HDF5 else format.value}")
+    endings = (".h5", ".hdf5") if format is ExportFormat.HDF5 else (f".{format.value}",)
+    path = ending(*endings)(out) or Path(f"{campaign.resolve().name}{endings[0]}")
     refuse_unwritable(path)
     data = read_campaign(campaign)
     export_campaign(data, path, format.value)
     count = len(data.runs)
-    say(f"Written: {path} ({count} run{'s' if count > 1 else ''})")
+    say(f"Written: {path} ({counted(count, 'run')})")

@@ -20,6 +20,7 @@ from tunnel_lab.terminal.inputs import (
     LeaveOutOption,
     chosen_estimator,
     chosen_estimators,
+    ending,
     given_campaign,
     own_code,
     refuse_unwritable_files,
@@ -64,7 +65,12 @@ def run(
     ] = "output_error",
     json: Annotated[
         Path | None,
-        Option("--json", metavar="FILE", help="Write the estimate as JSON; - for standard output."),
+        Option(
+            "--json",
+            callback=ending(".json"),
+            metavar="FILE",
+            help="Write the estimate as JSON; - for standard output.",
+        ),
     ] = None,
     weights: Annotated[
         Path | None,

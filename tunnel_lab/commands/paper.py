@@ -1,155 +1,22 @@
-"""``tunnel demo``, ``springs`` and ``paper``: its campaign, its table of springs, its tables and figures."""
+"""``tunnel springs`` and ``paper``: the paper's table of springs, its tables and figures."""
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.outputs import (
-    bar,
-    console,
-    say,
-    say_written,
-    show_estimate,
-    show_tables,
-    table,
-    truth_table,
-)
+from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line, shown
 
-if TYPE_CHECKING:
-    from identification.estimate import Estimate
-    from tunnel_sim.vocabulary.campaign import Campaign
-    from tunnel_sim.vocabulary.plan import CampaignPlan
-
-SHOWN = ("output_error", "conventional", "neural_network")
-"""Estimators of the comparison: the default and the two of the paper. `tunnel score` compares them all."""
-MEASURED = "rotary-pendulum"
-CHECKED_ESTIMATOR = "output_error"
-CHECK_STDS = 4.0
-"""The check fails beyond this many standard deviations; its false-alarm rate is one in four thousand."""
 STIFFNESS, FREQUENCY, SPRING = "stiffness_N_m_per_rad", "frequency_Hz", "spring"
 REMEDY = f"give a CSV file with the columns {STIFFNESS} and {FREQUENCY}, and optionally {SPRING}"
-
-
-def demo(
-    out: Annotated[
-        Path, Option("--out", "-o", metavar="FOLDER", help="Where campaign, estimates and figures go.")
-    ] = Path("tunnel-output"),
-    seed: Annotated[
-        int | None, Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
-    ] = None,
-) -> None:
-    """Simulate the paper's campaign, identify it, compare it with the truth.
-
-    The paper's rig is simulated with the wind off and on. Three estimators give
-    Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad), shown beside the injected
-    values. Measured swings of a pendulum follow, by windows of a few cycles.
-    Campaign, estimates (JSON) and figures (PNG, PDF) are kept in FOLDER.
-
-    [bold]Examples[/bold]
-      tunnel demo
-      tunnel demo --out here --seed 7
-
-    [bold]Exit status[/bold]
-      0 success, 1 an estimate failed or output_error missed the truth by more
-      than four standard deviations, 2 bad input.
-    """
-    from identification import identify
-    from identification.datasets import measured_campaign
-    from tunnel_lab.plotting import runs
-    from tunnel_lab.plotting.style import save_both
-    from tunnel_lab.show.film import Look, Request, write_film
-    from tunnel_sim.files.plan_file import paper_plan
-    from tunnel_sim.files.writing import output_folder, write_json
-
-    folder = output_folder(out)
-    plan = paper_plan()
-    if seed is not None:
-        plan = replace(plan, seed=seed)
-    # Everything is written before anything is printed: the reader of a pipe may close it early.
-    campaign, estimates = simulated_part(plan, folder)
-    measured = measured_campaign(MEASURED)
-    estimate = identify(measured, CHECKED_ESTIMATOR, throw=False)
-    write_json(folder / f"estimate-{MEASURED}.json", estimate.to_json_dict())
-    off = next(run for run in campaign.runs if not run.wind_on)
-    pairs = [run for run in campaign.runs if run.wind_on and run.spring_stiffness == off.spring_stiffness]
-    on = max(pairs, key=lambda run: run.wind_speed)
-    save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
-    save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")
-    save_both(runs.windows_figure(estimate), folder / "windows.png")
-    save_both(runs.truth_figure(estimates, vars(plan.truth)), folder / "estimates.png")
-    problem = ""  # why there is no picture of the rig
-    with console(stderr=True).status("rendering the rig"):
-        try:
-            write_film(Request(), Look(height=800, trace=False), folder / "rig.png", at=0.0)
-        except TunnelError as error:
-            problem = str(error)
-    show_simulated(campaign, estimates, plan)
-    say(f"Measured: {measured.name}, {len(measured.runs)} runs. {measured.description}\n")
-    show_estimate(measured, estimate, windows=True)
-    say("\nFigures (.png and .pdf): traces, spectrum, windows, estimates")
-    say(f"No picture of the rig: {problem}" if problem else "Picture of the rig: rig.png")
-    say(f"Campaign, estimates (JSON) and figures are in {folder}")
-    if missed := misses(estimates, plan):
-        say(f"Check failed: {'; '.join(missed)}", stderr=True)
-        raise typer.Exit(1)
-
-
-def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
-    """Clauses on the checks that fail: estimates that are missing, or too far from the truth for their std.
-
-    The distance is checked for the maximum-likelihood estimator only, whose standard deviations should be exact.
-    """
-    lines = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
-    for estimate in estimates:
-        if estimate.estimator != CHECKED_ESTIMATOR or estimate.status.failed:
-            continue
-        for name, value in vars(plan.truth).items():
-            quantity = getattr(estimate, name)
-            if quantity is None:
-                lines.append(f"{estimate.estimator}: no {name}")
-            elif abs(quantity.value - value) > CHECK_STDS * quantity.std:
-                lines.append(f"{estimate.estimator}: {name} misses the truth by more than {CHECK_STDS:g} std")
-    return lines
-
-
-def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
-    """Simulate, identify by the paper's two methods and the default one, and write all of it into the folder."""
-    from identification import identify
-    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
-    from tunnel_sim.files.campaign_folder import write_campaign
-    from tunnel_sim.files.writing import write_json
-
-    with bar("simulating runs", len(plan.conditions)) as progress:
-        campaign = simulate_campaign(plan, progress=progress)
-    write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
-    estimates = []
-    for name in SHOWN:
-        with console(stderr=True).status(f"identifying by {name}"):
-            estimate = identify(campaign, name, throw=False)
-        write_json(folder / f"estimate-{name}.json", estimate.to_json_dict())
-        estimates.append(estimate)
-    return campaign, tuple(estimates)
-
-
-def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan) -> None:
-    """Print the comparison with the truth."""
-    from identification.printing import status_lines
-
-    say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
-    show_tables(truth_table(estimates, vars(plan.truth)))
-    for estimate in estimates:
-        for line in status_lines(estimate.to_json_dict()):
-            say(f"Note, {estimate.estimator}: {line}")
 
 
 def springs(
@@ -269,7 +136,9 @@ def read_spring_table(path: Path) -> SpringTable:
     names, stiffness, frequency = [], [], []
     for number, (where, row) in enumerate(rows[1:], 1):
         if len(row) <= max(columns.values()):
-            raise TunnelError(f"has {len(row)} values", where=where, remedy="give one for each column")
+            raise TunnelError(
+                f"has {counted(len(row), 'value')}", where=where, remedy="give one for each column"
+            )
         name = row[columns[SPRING]].strip() if SPRING in columns else ""
         if len(name) > limits.NAME_CHARACTERS:
             what = f"the spring's name has {len(name)} characters"
@@ -278,7 +147,9 @@ def read_spring_table(path: Path) -> SpringTable:
         stiffness.append(_positive(row[columns[STIFFNESS]], where))
         frequency.append(_positive(row[columns[FREQUENCY]], where))
     if len(names) < 3:
-        raise TunnelError(f"has {len(names)} springs", where=str(path), remedy="give three or more")
+        raise TunnelError(
+            f"has {counted(len(names), 'spring')}", where=str(path), remedy="give three or more"
+        )
     return SpringTable(tuple(names), tuple(stiffness), tuple(frequency))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,7 @@ from typer import Argument, Option
 from tunnel_lab.terminal.inputs import HELP as CAMPAIGN_HELP
 from tunnel_lab.terminal.inputs import given_campaign, split_names
 from tunnel_lab.terminal.outputs import bar, say, say_written
-from tunnel_sim.vocabulary.errors import TunnelError, library, shown
+from tunnel_sim.vocabulary.errors import TunnelError, installing, library, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -289,7 +290,8 @@ def bench(
     (import), state the conditions, identify, diagnose, find the run that would
     distinguish the answers, and write the report. You can go on in a terminal at
     any point. Only this machine's user can open the page: its address has a secret
-    in it. It needs pip install 'virtual-wind-tunnel\[bench]', and no network.
+    in it. It needs the extra bench (.venv/bin/pip install '.[bench]' in the clone
+    of the project), and no network.
 
     [bold]Examples[/bold]
       tunnel bench
@@ -306,12 +308,16 @@ def bench(
     from tunnel_sim.files.writing import output_folder
 
     if find_spec("nicegui") is None:
-        remedy = "pip install 'virtual-wind-tunnel[bench]'"
+        remedy = f"run {installing('bench')}"
         raise TunnelError("NiceGUI is not installed", where="tunnel bench", remedy=remedy)
     if find_spec("fcntl") is None:  # the bench follows its processes by locks
         raise TunnelError("needs Linux or macOS", where="tunnel bench", remedy="use the commands")
     from tunnel_lab.bench.server import serve
 
+    if not folder.is_dir():
+        quoted = shlex.quote(str(folder))
+        remedy = f"make it with: mkdir -p {quoted}, or leave FOLDER out for the current folder"
+        raise TunnelError("there is no such folder", where=shown(folder), remedy=remedy)
     opened = (folder / CAMPAIGN_FILE).is_file()
     campaign = folder.resolve()
     serve(

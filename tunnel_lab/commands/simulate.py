@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import EffectsFileOption, parse_effect, refuse_unwritable_files
+from tunnel_lab.terminal.inputs import EffectsFileOption, ending, parse_effect, refuse_unwritable_files
 from tunnel_lab.terminal.outputs import bar, say, say_written, show_tables, table
-from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -40,7 +40,9 @@ class Goal(StrEnum):
 def simulate(
     plan: Annotated[Path, Argument(help="Plan of the campaign, a TOML file.")],
     out: Annotated[Path, Option("--out", "-o", metavar="FOLDER", help="Where the campaign goes.")],
-    format: Annotated[RunFormat, Option("--format", help="Format of the run files.")] = RunFormat.PARQUET,
+    format: Annotated[
+        RunFormat, Option("--file-format", help="Format of the run files.")
+    ] = RunFormat.PARQUET,
     seed: Annotated[
         int | None, Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
     ] = None,
@@ -60,6 +62,7 @@ def simulate(
         Path | None,
         Option(
             "--picture",
+            callback=ending(".png"),
             metavar="FILE.png",
             help="Draw the runs, input and response; more than twelve go on further pages, FILE-2.png and so on.",
         ),
@@ -104,7 +107,7 @@ def simulate(
 
     [bold]Examples[/bold]
       tunnel simulate plan.toml --out my-campaign
-      tunnel simulate plan.toml --out again --format csv --seed 7
+      tunnel simulate plan.toml --out again --file-format csv --seed 7
       tunnel simulate plan.toml --out dry \
         --effect coulomb_friction:friction_moment=0.004
 
@@ -126,15 +129,13 @@ def simulate(
     plan_effects(loaded)  # refuses what cannot be injected before anything is simulated
     refuse_occupied(out, overwrite=overwrite)
     if picture is not None:
-        if picture.suffix.lower() != ".png":
-            raise TunnelError("is not a .png", where=str(picture), remedy="name a file such as runs.png")
         refuse_unwritable_files(picture)
     with bar("simulating runs", len(loaded.conditions)) as progress:
         campaign = simulate_campaign(loaded, progress=progress)
     folder = write_campaign(
         campaign, out, run_format=format.value, truth=truth_document(loaded), overwrite=overwrite
     )
-    say(f"Written: {folder} ({len(campaign.runs)} runs)")
+    say(f"Written: {folder} ({counted(len(campaign.runs), 'run')})")
     if picture is not None:
         written = []
         for i, page in enumerate(trace_pages(campaign), 1):
@@ -162,7 +163,12 @@ def plan_drive(
     amplitude: Annotated[
         float, Option("--amplitude", metavar="RAD", help="Largest angle of the response, rad, peak.")
     ],
-    out: Annotated[Path, Option("--out", "-o", metavar="FILE.toml", help="Where the driven plan goes.")],
+    out: Annotated[
+        Path,
+        Option(
+            "--out", "-o", callback=ending(".toml"), metavar="FILE.toml", help="Where the driven plan goes."
+        ),
+    ],
     drive: Annotated[bool, Option("--drive", help="Plan driven runs; the only kind so far.")] = False,
     goal: Annotated[
         Goal, Option("--goal", help="d: both coefficients, by the determinant; cn_r: Cnr alone.")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tunnel_sim.engine.virtual_campaign import stated_run
 from tunnel_sim.vocabulary.between_runs import Repeatability
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, SensorProperties
 from tunnel_sim.vocabulary.plan import (
@@ -116,6 +115,8 @@ def plan_bounds(plan: CampaignPlan, rig: Rig, widths: Mapping[str, float]) -> Pl
     Args:
         widths: relative standard deviations between runs by name, as `Repeatability` has them; zero: none.
     """
+    from tunnel_sim.engine.virtual_campaign import stated_run  # only here: loads MuJoCo
+
     noise, rate = reading_deviation(plan.sensor), plan.sensor.sample_rate
     nominal = [nominal_oscillation(one, plan.truth, rig) for one in plan.conditions]
     times = [np.arange(max(2, round(one.duration * rate))) / rate for one in plan.conditions]

@@ -129,7 +129,7 @@ def lasting_processes(jobs: int, say: Say) -> Workers:
                 broken += 1
                 if broken >= PATIENCE:
                     what = f"worker processes died {PATIENCE} times without finishing a shard"
-                    remedy = "check the memory and give fewer --workers; finished shards are kept"
+                    remedy = "check the memory and give fewer --jobs; finished shards are kept"
                     raise TunnelError(what, remedy=remedy) from None
                 say("a worker process was lost; its shards are repeated")
 

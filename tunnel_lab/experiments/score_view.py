@@ -30,7 +30,7 @@ from tunnel_lab.experiments.score_trials import Key, Results, groups_of
 from tunnel_lab.plotting.style import COLOURS, MARKERS, figure, grid, log_axis, styled
 from tunnel_lab.terminal.inputs import NO_EFFECT
 from tunnel_lab.terminal.outputs import table
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -180,7 +180,7 @@ def summary_tables(results: Results) -> list[Table]:
     tables = []
     trials = results.trials()
     for group, cells in groups_of(results.grid).items():
-        many = f"{len(cells)} cells" if len(cells) > 1 else "1 cell"
+        many = counted(len(cells), "cell")
         result = table(
             f"{group[0].upper()}{group[1:]} ({many})",
             *("", "RMSE/\nbound", "worst", "bias/\nbound", "95 % covers\n[%]", "failed\n[%]"),
@@ -282,7 +282,8 @@ def worse_table(verdict: Verdict) -> Table:
 
 def verdict_lines(verdict: Verdict) -> list[str]:
     """The result of a check in words."""
-    tests = f"{len(verdict.findings)} tests, false-alarm rate {100 * verdict.false_alarm_rate:g} % of all together"
+    rate = f"{100 * verdict.false_alarm_rate:g} %"
+    tests = f"{counted(len(verdict.findings), 'test')}, false-alarm rate {rate} of all together"
     worse = verdict.worse
     if worse:
         names = ", ".join(sorted({finding.estimator for finding in worse}))

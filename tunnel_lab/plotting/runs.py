@@ -30,6 +30,7 @@ from tunnel_lab.plotting.style import (
     with_breaks,
 )
 from tunnel_sim.vocabulary.campaign import Campaign, Run
+from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -291,7 +292,9 @@ def import_picture(imported: Imported) -> bytes:
             beside.plot(*thinned(time, values), color=VERMILION, linewidth=0.4, alpha=0.6)
             beside.set_ylabel(f"input {name}", fontsize=8, color=VERMILION)
             beside.tick_params(labelsize=7)
-        axes.set_title(figure_text(raw.id if kept == 1 else f"{raw.id}: {kept} runs"), fontsize=9, loc="left")
+        axes.set_title(
+            figure_text(raw.id if kept == 1 else f"{raw.id}: {counted(kept, 'run')}"), fontsize=9, loc="left"
+        )
         axes.set_xlabel("time [s]", fontsize=8)
         axes.set_ylabel(f"reading [{imported.campaign.sensor.unit}]", fontsize=8)
         axes.tick_params(labelsize=7)

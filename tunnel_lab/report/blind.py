@@ -12,6 +12,7 @@ from diagnosis.words.numbers import plain
 from identification.printing import TextTable
 from tunnel_lab.plotting.style import WIDTH, figure, grid, styled
 from tunnel_lab.report.drawing import AFTER, BEFORE, INK, PAPER, QUIET
+from tunnel_sim.vocabulary.errors import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -227,7 +228,7 @@ def _other_sections(score: Score) -> list[ScoreSection]:
 
 def origin_lines(score: Score) -> list[str]:
     """The scored set, and the hashes that seal it."""
-    lines = [f"{len(score.cases)} campaigns"]
+    lines = [counted(len(score.cases), "campaign")]
     if score.excluded:
         lines.append(f"Withheld from the vocabulary: {', '.join(score.excluded)}")
     if score.sealed:

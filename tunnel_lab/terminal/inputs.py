@@ -208,6 +208,25 @@ def refuse_unwritable_files(*paths: Path | None) -> None:
         refuse_unwritable(path)
 
 
+def ending(*known: str) -> Callable[[Path | None], Path | None]:
+    """A callback of an option that takes a file: one with another ending than these is refused, such as ``.html``.
+
+    What is written has one format, so that another ending would name it wrongly. ``-`` and devices pass.
+    """
+
+    def checked(path: Path | None) -> Path | None:
+        if (
+            path is None or str(path) == "-" or path.resolve().suffix.lower() in known
+        ):  # of a link: its target's
+            return path
+        if path.exists() and not path.is_file():  # a folder is refused where it is written to
+            return path
+        remedy = f"name a file that ends in {' or '.join(known)}, the format that is written"
+        raise TunnelError(f"does not end in {' or '.join(known)}", where=shown(path), remedy=remedy)
+
+    return checked
+
+
 class TableFormat(StrEnum):
     """How tables are printed."""
 

@@ -26,6 +26,7 @@ from identification.printing import SYMBOLS, TextTable, concise, in_stds, signif
 from tunnel_lab.terminal.encoding import printable_json
 from tunnel_lab.terminal.inputs import TableFormat, chosen, quiet
 from tunnel_lab.terminal.time_left import Reached
+from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.text_cells import as_text_cell
 
 if TYPE_CHECKING:
@@ -203,7 +204,7 @@ def windows_table(run: RunEstimate) -> Table:
     """Estimates of consecutive windows of a run, the largest amplitude first, as in the paper's Table III."""
     cycles = run.windows[0].cycles if run.windows else 0
     result = table(
-        f"{run.id}: windows of {cycles} cycle{'s' if cycles > 1 else ''}",
+        f"{run.id}: windows of {counted(cycles, 'cycle')}",
         *("from [s]", "to [s]", "amplitude [rad]", "ζ [1]", "ωn [rad/s]"),
         right=("from [s]", "to [s]"),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib import import_module
@@ -39,10 +39,29 @@ _defined = {
     if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
 }
 
+
+def in_order(kinds: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
+    """Effects by their place in the vocabulary; classes without a name are bases of others and left out.
+
+    Raises:
+        TypeError: when an effect has no place, or that of another.
+    """
+    named = sorted((kind for kind in kinds if hasattr(kind, "name")), key=lambda kind: kind.name)
+    places: dict[int, type[Effect]] = {}
+    following = 1 + max((kind.place for kind in named if hasattr(kind, "place")), default=0)
+    for kind in named:
+        place = getattr(kind, "place", None)
+        if place is None or place in places:
+            other = "no place" if place is None else f"the place of {places[place].name}"
+            raise TypeError(
+                f"{kind.__module__}.{kind.__name__} has {other} in the vocabulary: write place = {following}"
+            )
+        places[place] = kind
+    return tuple(places[place] for place in sorted(places))
+
+
 #: Every built-in effect, in the order of the vocabulary: a module of this package that defines one is enough.
-ALL_EFFECTS: tuple[type[Effect], ...] = tuple(
-    sorted((kind for kind in _defined if hasattr(kind, "place")), key=lambda kind: kind.place)
-)
+ALL_EFFECTS: tuple[type[Effect], ...] = in_order(_defined)
 
 
 def known_effects() -> tuple[type[Effect], ...]:

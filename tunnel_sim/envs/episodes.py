@@ -25,7 +25,7 @@ from tunnel_sim.envs.engines import ManyRuns, OneRun, Operation, OperatorLog, Wi
 from tunnel_sim.envs.information import Information, Prior
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
@@ -116,7 +116,10 @@ class Episodes:
         else:
             set_point, moment = decode(self._config, actions)
             if len(moment) != self._count:
-                raise EnvError(f"{len(moment)} actions for {self._count} runs", remedy="give one per run")
+                raise EnvError(
+                    f"{counted(len(moment), 'action')} for {counted(self._count, 'run')}",
+                    remedy="give one per run",
+                )
             speeds, self._speed = self._wind.speeds(self._speed, set_point)
             at = np.minimum(self.step_count, self._config.steps - 1)
             self._log[np.arange(self._count), :, at] = np.stack((set_point, self._speed, moment), axis=1)

@@ -16,6 +16,7 @@ from tunnel_sim.envs.conditions import free_decay_config
 from tunnel_sim.envs.engines import ManyRuns, Models, OneRun, action_space, operator_action
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView, render_modes
+from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import Array, Record
 
 
@@ -190,7 +191,7 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         else:
             seeds = list(seed)
         if len(seeds) != self.num_envs:
-            what = f"{len(seeds)} seeds for {self.num_envs} runs"
+            what = f"{counted(len(seeds), 'seed')} for {counted(self.num_envs, 'run')}"
             raise EnvError(what, where="seed", remedy="give one per run")
         observations = np.zeros(self.observation_space.shape or ())
         infos: dict[str, Any] = {}

@@ -14,13 +14,13 @@ from gymnasium.vector import VectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation
 
 from tunnel_sim.envs import EnvError
+from tunnel_sim.vocabulary.errors import installing
 from tunnel_sim.vocabulary.record import Array
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    remedy = "install it with pip install 'virtual-wind-tunnel[train]'"
-    raise EnvError("stable-baselines3 is missing", remedy=remedy) from error
+    raise EnvError("stable-baselines3 is missing", remedy=f"run {installing('train')}") from error
 
 
 class BaselinesVecEnv(VecEnv):

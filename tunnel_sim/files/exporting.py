@@ -133,7 +133,7 @@ def _as_xlsx(campaign: Campaign, stream: BinaryIO, where: str) -> None:
             raise TunnelError(
                 f"run '{run.id}' has {run.record.time_s.size:,} samples, more than a sheet's {_SHEET_ROWS - 1:,}",
                 where=where,
-                remedy="choose --format hdf5 or mat",
+                remedy="choose --file-format hdf5 or mat",
             )
     # Texts that look like formulas or links stay texts.
     options = {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}

@@ -22,7 +22,9 @@ def native_library(stem: str) -> Path:
     try:
         distribution = importlib.metadata.distribution("virtual-wind-tunnel")
     except importlib.metadata.PackageNotFoundError as error:
-        raise TunnelError("the package is not installed", remedy="install it with 'pip install .'") from error
+        raise TunnelError(
+            "the package is not installed", remedy="run .venv/bin/pip install . in its clone"
+        ) from error
     folder = Path(str(distribution.locate_file("tunnel_sim/native")))
     for ending in (".so", ".dylib", ".dll"):
         path = folder / f"lib{stem}{ending}"

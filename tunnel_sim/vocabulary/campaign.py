@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tunnel_sim.vocabulary.between_runs import Repeatability as Repeatability
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, installing
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
 from tunnel_sim.vocabulary.rig import JointLaw, Rig
@@ -131,8 +131,7 @@ class Run:
         try:
             from xarray import Dataset  # only here: an extra
         except ModuleNotFoundError as error:
-            remedy = "pip install 'virtual-wind-tunnel[frames]'"
-            raise TunnelError("xarray is not installed", remedy=remedy) from error
+            raise TunnelError("xarray is not installed", remedy=f"run {installing('frames')}") from error
         names = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
         stated = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         columns = {"yaw_rad": ("time_s", self.record.yaw_rad, {"long_name": "reading of the yaw angle"})}

@@ -59,6 +59,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else f"use one of {', '.join(names)}"
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things in words: "1 gap", "2 gaps"; the plural of the noun ends in s."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 EXTRAS = {
     "import": ("fastexcel", "xlsxwriter", "h5py", "nptdms"),
     "frames": ("pandas", "xarray"),
@@ -72,14 +77,18 @@ EXTRAS = {
 """The modules of each extra of ``pyproject.toml`` that a command needs."""
 
 
+def installing(extra: str) -> str:
+    """The command that installs an extra, one of `EXTRAS`, in a clone of the project: it is on no package index."""
+    return f".venv/bin/pip install '.[{extra}]' in the clone of the project"
+
+
 def library(name: str, use: str, extra: str, where: str = "") -> Any:
     """A library of an extra, by the name of its module and what needs it; one of `EXTRAS`."""
     try:
         return import_module(name)
     except ImportError:
         what = f"{use} needs the package {name.partition('.')[0]}"
-        remedy = f"run: pip install 'virtual-wind-tunnel[{extra}]'"
-        raise TunnelError(what, where=where, remedy=remedy) from None
+        raise TunnelError(what, where=where, remedy=f"run {installing(extra)}") from None
 
 
 def added_to(group: str) -> dict[str, EntryPoint]:

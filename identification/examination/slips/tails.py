@@ -12,6 +12,7 @@ from identification.policy import LEAST_SAMPLES
 from identification.signal.frequency import starting_frequency
 from identification.status import Outcome, Remark
 from tunnel_sim.vocabulary.campaign import Campaign
+from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import Record
 
 _STUCK = 0.6  # of a cycle
@@ -45,7 +46,7 @@ class StuckReading(RecordSlip):
                 where = np.flatnonzero(stuck)
                 what = (
                     f"between {time[where[0]]:.3f} and {time[where[-1]]:.3f} s the reading keeps one value while "
-                    f"the body moves ({where.size} samples); they are left out"
+                    f"the body moves ({counted(where.size, 'sample')}); they are left out"
                 )
                 remarks.append(
                     Remark(Outcome.CUT, (run.id,), what, "check the logger and the sensor's cable")

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -36,8 +37,23 @@ def assert_refused(outcome: Outcome, *parts: str) -> None:
 def test_no_command_shows_the_help(tunnel: Tunnel) -> None:
     status, out, err = tunnel()
     assert (status, err) == (0, "")
-    for command in COMMANDS:
-        assert f"tunnel {command}" in out
+    assert "tunnel COMMAND --help" in out
+
+
+def test_the_help_shows_every_command_once_below_its_group(tunnel: Tunnel) -> None:
+    _, out, _ = tunnel("--help")
+    shown: dict[str, list[str]] = {}
+    for line in out.splitlines():
+        if heading := re.match(r"╭─ (.+?) ─", line):
+            group = shown.setdefault(heading[1], [])
+        elif row := re.match(r"│ ([a-z]+) +\S", line):
+            group.append(row[1])
+    assert shown.pop("Options") == []
+    assert shown == {group: list(members) for group, members in cli.GROUPS.items()}
+    assert next(iter(shown.items())) == ("Start here", ["demo", "bench", "import", "diagnose", "simulate"])
+    names = [name for members in shown.values() for name in members]
+    assert sorted(names) == sorted(set(names)) == sorted([*COMMANDS, "blind"])
+    assert not any(re.search(rf"\btunnel {name}\b", out) for name in names)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -49,9 +65,14 @@ def test_every_command_explains_itself(tunnel: Tunnel, command: str) -> None:
 
 
 def test_the_version_is_the_distributions(tunnel: Tunnel) -> None:
-    from importlib.metadata import version
-
     assert tunnel("--version") == (0, f"tunnel {version('virtual-wind-tunnel')}\n", "")
+
+
+def test_the_package_runs_as_a_module_from_the_tree() -> None:
+    tree = Path(cli.__file__).parents[1]
+    words = [sys.executable, "-m", "tunnel_lab", "--version"]
+    done = subprocess.run(words, cwd=tree, capture_output=True, text=True, check=True)
+    assert done.stdout == f"tunnel {version('virtual-wind-tunnel')}\n"
 
 
 @pytest.mark.parametrize(
@@ -61,7 +82,7 @@ def test_the_version_is_the_distributions(tunnel: Tunnel) -> None:
         (["identify"], ["Missing argument"]),
         (["springs", "--colour"], ["No such option", "--colour"]),
         (["simulate", "plan.toml"], ["Missing option", "--out"]),
-        (["simulate", "plan.toml", "--out", "x", "--format", "xls"], ["xls", "parquet", "csv"]),
+        (["simulate", "plan.toml", "--out", "x", "--file-format", "xls"], ["xls", "parquet", "csv"]),
         (["simulate", "plan.toml", "--out", "x", "--seed", "-1"], ["--seed"]),
         (["simulate", "plan.toml", "--out", "x", "--seed", "one"], ["--seed"]),
         (["springs", "one.csv", "two.csv"], ["two.csv"]),
@@ -165,7 +186,7 @@ def test_help_imports_nothing_heavy_and_takes_hardly_longer_than_any_help() -> N
     )
     seconds, done = processor_time(script)
     assert done.stderr == "[]\n"
-    assert "tunnel demo" in done.stdout
+    assert "Start here" in done.stdout
     assert seconds < 2.5 * processor_time(bare)[0]
 
 
@@ -196,4 +217,3 @@ def test_options_stand_in_groups_with_room_for_their_descriptions(
             assert begins is not None, panel
             assert len(panel[0]) - begins.start() - 2 > 30, panel
             panel = []
-    assert "--delimiter" not in out

@@ -49,4 +49,4 @@ def test_without_pages_or_sphinx_a_remedy_is_given(
     monkeypatch.setitem(sys.modules, "sphinx.cmd.build", None)
     status, out, err = tunnel("docs", "--source", pages, "--out", pages.parent / "site")
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "pip install 'virtual-wind-tunnel[docs]'" in err
+    assert "pip install '.[docs]'" in err

@@ -18,7 +18,7 @@ from tunnel_lab.commands import about
 from tunnel_lab.commands.about import SCHEMAS, schema_of
 from tunnel_sim.effects import effect_class
 from tunnel_sim.files.campaign_folder import read_campaign
-from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, library
+from tunnel_sim.vocabulary.errors import EXTRAS, TunnelError, installing, library
 
 Tunnel = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[3]
@@ -57,9 +57,9 @@ def test_an_estimate_far_from_the_truth_fails(monkeypatch: pytest.MonkeyPatch) -
 def test_a_missing_extra_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(EXTRAS, "film", ("imageio", "no_such_module"))
     found = dict(about.extras())
-    assert found["extra film"] == "lacks no_such_module: pip install 'virtual-wind-tunnel[film]'"
+    assert found["extra film"] == f"lacks no_such_module: run {installing('film')}"
     with pytest.raises(
-        TunnelError, match=r"a film needs the package no_such_module; run: pip install .*\[film\]"
+        TunnelError, match=r"a film needs the package no_such_module; run .venv/bin/pip install '\.\[film\]'"
     ):
         library("no_such_module", "a film", "film")
 
@@ -84,7 +84,7 @@ def test_a_command_that_lacks_its_extra_says_which(
     monkeypatch.setitem(sys.modules, module, None)
     status, out, err = tunnel(*arguments)
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert f"pip install 'virtual-wind-tunnel[{extra}]'" in err
+    assert installing(extra) in err
 
 
 def test_the_extras_are_those_of_the_installation() -> None:

@@ -55,4 +55,4 @@ def test_a_bad_drive_is_one_line_and_writes_nothing(tunnel: Tunnel, tmp_path: Pa
         "simulate", tmp_path / "plan.toml", "--out", tmp_path / "c", "--picture", "runs.pdf"
     )
     assert (status, (tmp_path / "c").exists()) == (2, False)
-    assert "is not a .png" in err
+    assert "does not end in .png" in err

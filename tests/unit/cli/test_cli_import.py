@@ -104,9 +104,9 @@ def test_tables_as_csv_markdown_and_json(tunnel: Tunnel) -> None:
 
 
 def test_an_export_is_written(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Path) -> None:
-    status, out, _ = tunnel("export", tiny_campaign, "--format", "csv", "--out", tmp_path / "all.csv")
+    status, out, _ = tunnel("export", tiny_campaign, "--file-format", "csv", "--out", tmp_path / "all.csv")
     assert status == 0
     assert "2 runs" in out
     assert (tmp_path / "all.csv").read_text().startswith("run,wind_speed,spring_stiffness,")
-    status, _, err = tunnel("export", tiny_campaign, "--format", "doc")
+    status, _, err = tunnel("export", tiny_campaign, "--file-format", "doc")
     assert (status, err.count("\n")) == (2, 1)

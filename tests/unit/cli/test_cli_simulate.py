@@ -1,17 +1,13 @@
-"""``tunnel simulate`` and ``tunnel demo``: what they write, and that a failed check is seen."""
+"""``tunnel simulate``: what it writes and refuses."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from identification.estimate import Estimate, Quantity, Status
-from tunnel_lab.commands.paper import misses
 from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
@@ -40,7 +36,9 @@ def test_a_plan_becomes_a_campaign_that_can_be_identified(tunnel: Tunnel, tmp_pa
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(tunnel: Tunnel, tmp_path: Path) -> None:
     for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
-        assert tunnel("simulate", PLAN, "--out", tmp_path / name, "--seed", seed, "--format", "csv")[0] == 0
+        assert (
+            tunnel("simulate", PLAN, "--out", tmp_path / name, "--seed", seed, "--file-format", "csv")[0] == 0
+        )
     a, b, c = (contents(tmp_path / name) for name in "abc")
     assert a == b
     assert a.keys() == c.keys()
@@ -87,42 +85,3 @@ def test_a_folder_below_a_file_is_refused(tunnel: Tunnel, tmp_path: Path) -> Non
     assert (status, out) == (2, "")
     assert err.startswith("tunnel: ")
     assert err.count("\n") == 1
-
-
-def exact(plan: CampaignPlan, name: str = "output_error") -> Estimate:
-    values: dict[str, Any] = {
-        key: Quantity(value, 0.01 * abs(value), "") for key, value in vars(plan.truth).items()
-    }
-    return Estimate("tiny", name, (), **values)
-
-
-def test_the_demo_misses_nothing_that_is_near(plan: CampaignPlan) -> None:
-    assert misses([exact(plan), exact(plan, "conventional")], plan) == []
-
-
-def test_the_demo_sees_an_estimate_far_from_the_truth(plan: CampaignPlan) -> None:
-    far = replace(exact(plan), cn_r=Quantity(plan.truth.cn_r * 1.05, 0.01 * abs(plan.truth.cn_r), "1/rad"))
-    assert misses([far], plan) == ["output_error: cn_r misses the truth by more than 4 std"]
-
-
-def test_the_demo_sees_an_estimate_that_is_missing_or_failed(plan: CampaignPlan) -> None:
-    failed = Estimate("tiny", "conventional", (), (Status.NO_RUN_IDENTIFIED,))
-    (missing, reason) = misses([replace(exact(plan), yaw_inertia=None), failed], plan)[::-1]
-    assert missing == "output_error: no yaw_inertia"
-    assert reason.startswith("conventional: no run could be identified")
-
-
-@pytest.mark.slow
-def test_a_failed_check_ends_the_demo_with_status_one(
-    tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: CampaignPlan
-) -> None:
-    monkeypatch.setattr("tunnel_sim.files.plan_file.paper_plan", lambda: plan)
-    monkeypatch.setattr("tunnel_lab.commands.paper.misses", lambda *_: ["planted"])
-    monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    status, out, err = tunnel("demo", "--out", tmp_path / "out")
-    assert status == 1
-    assert "Check failed: planted" in err
-    assert "No picture of the rig: off-screen rendering does not work here" in out
-    written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"campaign", "traces.png", "spectrum.png", "windows.png", "estimates.png"} <= written
-    assert "rig.png" not in written

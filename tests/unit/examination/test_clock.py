@@ -99,7 +99,7 @@ def test_missing_samples_are_counted_and_said():
     data = campaign([at(one, one.record.time_s, keep)])
     kept, (remark,) = with_clocks(data)
     assert kept is data
-    assert "26 samples are missing, up to 0.05 s" in remark.what
+    assert "26 samples missing, up to 0.05 s" in remark.what
 
 
 def test_even_records_pass_untouched():

@@ -141,7 +141,7 @@ def test_conditions_from_a_table(tmp_path: Path) -> None:
         ("file,wind_speed\na.csv,fast\n", "wind_speed = 'fast' is not a number"),
         ("file,wind_speed\na.csv,1\na.csv,2\n", "'a.csv' occurs twice"),
         ("file,wind_speed\na.csv,-1\n", "greater than or equal to 0"),
-        ("file,wind_speed\na.csv\n", "1 cells in line 2, but 2 names"),
+        ("file,wind_speed\na.csv\n", "1 cell in line 2, but 2 names"),
     ],
 )
 def test_a_bad_table_of_conditions(tmp_path: Path, text: str, what: str) -> None:

@@ -148,11 +148,11 @@ def test_missing_rows_disorder_and_repeats_are_said() -> None:
     np.testing.assert_array_equal(found.reading, np.delete(angle, 700))
     said = "; ".join(found.said)
     for part in (
-        "1 samples without a number",
+        "1 sample without a number",
         "sorted by time",
         "10 repeated samples",
         "at 5 s",
-        "1 samples are missing",
+        "1 sample missing in 1 gap, ",
     ):
         assert part in said
 

@@ -125,9 +125,7 @@ def test_a_missing_library_is_said(
 ) -> None:
     FILES[name](tmp_path / name)
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(
-        TunnelError, match=rf"needs the package {module}.*pip install 'virtual-wind-tunnel\[import\]'"
-    ):
+    with pytest.raises(TunnelError, match=rf"needs the package {module}.*pip install '\.\[import\]'"):
         read_tables((tmp_path / name).read_bytes(), name)
 
 

@@ -163,8 +163,8 @@ def test_texts_among_the_numbers_are_said(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.record.yaw_rad, np.delete(angle, 500), atol=1e-8)
     said = "\n".join(imported.remarks())
     assert "the column 'state' holds text and is left out" in said
-    assert "1 texts in the column 'yaw' are taken as missing" in said
-    assert "samples without a number left out" in said
+    assert "1 text in the column 'yaw' taken as missing" in said
+    assert "sample without a number left out" in said
 
 
 @pytest.mark.parametrize(

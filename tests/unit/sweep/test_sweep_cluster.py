@@ -111,7 +111,7 @@ def test_a_local_cluster_gives_the_same(small: Path, sweep: Sweep, here, tmp_pat
         str(small),
         "--scheduler",
         "local",
-        "--workers",
+        "--jobs",
         "3",
     ]
     done = subprocess.run(

@@ -80,9 +80,9 @@ def test_a_broken_file_is_one_line_and_leaves_nothing(
         (["--summary", "OUT"], "sweep.json: no such file; name the folder of a sweep"),
         (["FILE", "--out", "TAKEN"], "the folder holds something else"),
         (["FILE", "--out", "FILE"], "cannot be written"),
-        (["FILE", "--out", "OUT", "--workers", "0"], "--workers"),
+        (["FILE", "--out", "OUT", "--jobs", "0"], "--jobs"),
         (["FILE", "--out", "OUT", "--scheduler", "tcp://127.0.0.1:1"], "no scheduler answers"),
-        (["FILE", "--out", "OUT", "--scheduler", "tcp://h:1", "--workers", "2"], "leave out --workers"),
+        (["FILE", "--out", "OUT", "--scheduler", "tcp://h:1", "--jobs", "2"], "leave out --jobs"),
         (["FILE", "--out", "OUT", "--scheduler", "nonsense://h"], "no scheduler answers"),
     ],
 )

@@ -30,7 +30,7 @@ PATIENCE_S = 120.0
 
 def started(file: Path, out: Path) -> subprocess.Popen[str]:
     """``tunnel sweep`` on two processes, once its first shard is finished."""
-    words = [sys.executable, "-m", "tunnel_lab.cli", "sweep", str(file), "--out", str(out), "--workers", "2"]
+    words = [sys.executable, "-m", "tunnel_lab.cli", "sweep", str(file), "--out", str(out), "--jobs", "2"]
     process = subprocess.Popen(
         words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
     )

@@ -13,6 +13,7 @@ from tunnel_sim.files.importing.tables import LEAST_ROWS, Channel, Table
 from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.errors import counted
 
 RUN_IDS = ("id", "run", "run_id")
 """Members and attributes whose text is the name of the run that a group holds."""
@@ -67,7 +68,7 @@ def tables_of_arrays(
         for above in sorted(facts, key=len):  # the nearest group counts
             if above == "" or group == above or group.startswith(above + "/"):
                 stated |= facts[above]
-        said = f"{kind}: {len(channels)} channel{'s' if len(channels) > 1 else ''} of {length} samples"
+        said = f"{kind}: {counted(len(channels), 'channel')} of {counted(length, 'sample')}"
         tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group))))
     return tables
 

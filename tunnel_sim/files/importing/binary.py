@@ -18,7 +18,7 @@ from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import USED_COLUMNS, FileTable, Reader, faults
 from tunnel_sim.files.reading import check_count, frame_schema, read_frame
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, library, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, counted, library, one_line
 
 _REMEDY = "write the file again, as Parquet or as text"
 
@@ -53,7 +53,7 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
             column = column - column.min()
         values = column.cast(pl.Float64).fill_null(float("nan")).to_numpy()
         channels.append(Channel(name, values, unit))
-    said = f"Parquet file: {len(channels)} columns of {frame.height} samples"
+    said = f"Parquet file: {counted(len(channels), 'column')} of {counted(frame.height, 'sample')}"
     table = Table(tuple(channels), said=(said,))
     return [table] if runs is None else by_texts(table, runs, frame.get_column(runs))
 
@@ -200,7 +200,8 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
                         values = channel[:].astype(np.float64)
                         columns.append(Channel(name, values, known_unit(stated) or unit))
                 part = group.name if len(groups) > 1 else ""
-                said = (f"TDMS file: group '{group.name}', {len(columns)} channels of {length} samples",)
+                size = f"{counted(len(columns), 'channel')} of {counted(length, 'sample')}"
+                said = (f"TDMS file: group '{group.name}', {size}",)
                 tables.append(Table(tuple(columns), part, facts, said))
     return tables
 

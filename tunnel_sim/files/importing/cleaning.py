@@ -9,7 +9,7 @@ from math import floor, log10, pi
 
 import numpy as np
 
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.errors import TunnelError, counted
 from tunnel_sim.vocabulary.record import Array
 
 _COUNTERS = (2.0**8, 2.0**10, 2.0**12, 2.0**14, 2.0**16, 2.0**24, 2.0**32)
@@ -61,7 +61,7 @@ def without_overflow(values: Array, said: list[str]) -> Array:
         others = float(np.abs(steps[~jumps]).max())
         if others > _SMALL * full or (full - np.abs(steps[jumps]) > _NEAR_END * others).any():
             continue
-        said.append(f"{int(jumps.sum())} jumps by {full:.6g} taken out (overflow of the counter)")
+        said.append(f"{counted(int(jumps.sum()), 'jump')} by {full:.6g} taken out (overflow of the counter)")
         turns = np.concatenate([[0.0], np.cumsum(np.where(jumps, -np.sign(steps), 0.0))])
         result = values.copy()
         result[known] = numbers + full * turns
@@ -95,7 +95,7 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         known = np.flatnonzero(good)
         inside = int(known[-1] - known[0] + 1 - known.size) if known.size else 0
         if inside:
-            said.append(f"{inside} samples without a number left out")
+            said.append(f"{counted(inside, 'sample')} without a number left out")
         time, reading = time[good], reading[good]
     if (np.diff(time) < 0.0).any():
         order = np.argsort(time, kind="stable")
@@ -112,8 +112,12 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         time = np.linspace(time[0], time[-1], time.size)
     elif same.any():
         keep = np.concatenate([[True], ~same])
-        further = f", and {differing} further readings at the time of the one before" if differing else ""
-        said.append(f"{np.count_nonzero(repeated)} repeated samples left out{further}")
+        further = (
+            f", and {counted(int(differing), 'further reading')} at the time of the one before"
+            if differing
+            else ""
+        )
+        said.append(f"{counted(int(repeated.sum()), 'repeated sample')} left out{further}")
         time, reading = time[keep], reading[keep]
     if time.size and time[0] != 0.0:
         said.append(f"times count from the first sample, which the file has at {time[0]:.6g} s")
@@ -124,8 +128,8 @@ def cleaned(time: Array, reading: Array) -> Cleaned:
         gaps = steps > 1.75 * usual
         if gaps.any():
             missing = int(np.round(steps[gaps] / usual - 1.0).sum())
-            where = f"in {int(gaps.sum())} gaps, up to {steps.max():.4g} s long"
-            said.append(f"about {missing} samples are missing {where}")
+            where = f"in {counted(int(gaps.sum()), 'gap')}, up to {steps.max():.4g} s long"
+            said.append(f"about {counted(missing, 'sample')} missing {where}")
         spread = float(np.abs(steps[~gaps] - usual).max())
         if spread > _UNEVEN * usual:
             share = f"{100.0 * spread / usual:.0f} % of a step"

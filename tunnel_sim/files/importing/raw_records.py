@@ -27,7 +27,7 @@ from tunnel_sim.files.importing.tables import INPUT_FACTS, LEAST_ROWS, Table
 from tunnel_sim.files.importing.units import UNITS, kind_of, names_a_time
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.drive import InputColumn
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints, TurningPoints, are_turning_points
 
@@ -102,7 +102,7 @@ def raw_records(
                 # Stamps are decimals: a start at one of them includes it.
                 slack = 1e-9 * max(abs(end) for end in (choices.start, choices.end) if end is not None)
                 kept = (time >= first - slack) & (time <= last + slack)
-                said.append(f"{int(kept.sum())} of {time.size} samples lie from --start to --end")
+                said.append(f"{int(kept.sum())} of {counted(time.size, 'sample')} from --start to --end")
             driven = find_input(table.channels, (pair.time, pair.reading), readings, choices, said, where)
             time, readings = time[kept], readings[kept]
             beside = (pair.time, pair.reading, None if driven is None else driven.channel)
@@ -113,7 +113,7 @@ def raw_records(
             said += [f"{key} = {value:g} from the file's name" for key, value in named.items()]
             starts = [0, *restarts(time), time.size]
             if len(starts) > 2:
-                said.append(f"the clock starts anew {len(starts) - 2} times: another run each")
+                said.append(f"the clock starts anew {counted(len(starts) - 2, 'time')}: another run each")
             for place, (a, b) in enumerate(itertools.pairwise(starts), 1):
                 clean = cleaned(time[a:b], readings[a:b])
                 if quantity == "angle" and driven is None and are_turning_points(clean.time_s, clean.reading):

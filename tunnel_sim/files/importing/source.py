@@ -31,7 +31,7 @@ from tunnel_sim.files.importing.text import TEXT, read_text_tables
 from tunnel_sim.files.readers import load_reader, reader_place
 from tunnel_sim.files.reading import check_count, is_blank, read_regular
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, shown
 
 _SERVE = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
@@ -243,7 +243,7 @@ def read_source(path: Path, choices: ImportChoices) -> Source:
             wild = np.abs(channel.values) > limits.LARGEST_NUMBER  # its powers would overflow
             if wild.any():
                 said.append(
-                    f"{int(wild.sum())} numbers beyond {limits.LARGEST_NUMBER:g} are taken as missing"
+                    f"{counted(int(wild.sum()), 'number')} beyond {limits.LARGEST_NUMBER:g} taken as missing"
                 )
                 channel = replace(channel, values=np.where(wild, np.nan, channel.values))
             channels.append(channel)

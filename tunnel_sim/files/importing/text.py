@@ -17,7 +17,7 @@ from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, split_u
 from tunnel_sim.files.readers import Reader
 from tunnel_sim.files.reading import check_count, check_lines, check_utf8, read_regular
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, counted, one_line, shown
 
 if TYPE_CHECKING:
     from tunnel_sim.files.importing.conditions import ImportChoices
@@ -202,11 +202,11 @@ def read_text_tables(
     layout = find_layout([_cells(line, dialect) for line in head], head, dialect.decimal, dialect.width)
     sample = [dialect.split(line) for line in body if line.strip()]
     if layout is None:
-        what = f"no numbers in the first {len(head)} lines"
+        what = f"no numbers in the first {counted(len(head), 'line')}"
         raise TunnelError(what, where=where, remedy="remove the lines above the table")
     heading = "names in the line above the numbers" if layout.headed else "no names of columns"
     said = (
-        f"text ({encoding}), {dialect.width} columns separated by {_SAID[dialect.delimiter]}, decimal "
+        f"text ({encoding}), {counted(dialect.width, 'column')} separated by {_SAID[dialect.delimiter]}, decimal "
         f"{'comma' if dialect.decimal == ',' else 'point'}, numbers from line {layout.first + 1}, {heading}"
     )
     known = {
@@ -326,7 +326,7 @@ def tables_of(
                 number, unit = seconds + _DAY * midnights, "s"
                 notes[i] = f"the column '{name}' holds times of day, taken as seconds"
         elif lost:
-            notes[i] = f"{lost} texts in the column '{name}' are taken as missing"
+            notes[i] = f"{counted(lost, 'text')} in the column '{name}' taken as missing"
         if number.null_count() < number.len():
             channels.append(Channel(name, number.fill_null(float("nan")).to_numpy(), unit))
     table = replace(table, channels=tuple(channels), headed=layout.headed)
@@ -371,7 +371,8 @@ def read_cells(path: Path) -> tuple[list[str], list[list[str]]]:
     rows = [Dialect(delimiter, ".", 0).split(line) for line in lines]
     wrong = next((i for i, row in enumerate(rows) if len(row) != len(rows[0])), None)
     if wrong is not None:
-        what = f"{len(rows[wrong])} cells in line {wrong + 1}, but {len(rows[0])} names of columns"
+        cells = counted(len(rows[wrong]), "cell")
+        what = f"{cells} in line {wrong + 1}, but {counted(len(rows[0]), 'name')} of columns"
         remedy = f"give every line one cell for each column, with {_SAID[delimiter]} between"
         raise TunnelError(what, where=where, remedy=remedy)
     return rows[0], rows[1:]

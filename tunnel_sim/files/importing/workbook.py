@@ -13,7 +13,7 @@ from tunnel_sim.files.importing.text import Layout, facts_in, find_layout, is_nu
 from tunnel_sim.files.readers import Reader, faults
 from tunnel_sim.files.reading import check_count
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, library
+from tunnel_sim.vocabulary.errors import TunnelError, counted, library
 
 _HEAD = 400  # rows of a sheet that are looked at
 _TEXTS = (
@@ -98,7 +98,8 @@ def _tables(book: Any, sheet: _Sheet) -> list[Table]:
     kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
     body = book.load_sheet(sheet.name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
     headed = "names in the row above the numbers" if layout.headed else "no names of columns"
-    said = f"workbook: sheet '{sheet.name}', {sheet.width} columns, numbers from row {layout.first + 1}, {headed}"
+    columns = counted(sheet.width, "column")
+    said = f"workbook: sheet '{sheet.name}', {columns}, numbers from row {layout.first + 1}, {headed}"
     labels = None if layout.runs is None else body.to_series(layout.runs)
     tables = tables_of(body, layout, ".", labels, Table((), facts=layout.facts, said=(said,)))
     return [part for table in tables if table.channels for part in by_run(table)]

@@ -1,0 +1,310 @@
+"""``tunnel demo``: two faults planted in the virtual rig, and found again; or the estimators beside the truth."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from importlib import resources
+from math import isclose
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.text import Text
+from typer import Option
+
+from tunnel_lab.terminal.outputs import (
+    bar,
+    console,
+    rich_table,
+    say,
+    say_written,
+    show_tables,
+    step_display,
+    table,
+    truth_table,
+)
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from identification.estimate import Estimate
+    from tunnel_sim.vocabulary.campaign import Campaign
+    from tunnel_sim.vocabulary.plan import CampaignPlan
+
+Document = Mapping[str, Any]
+SHOWN = ("output_error", "conventional", "neural_network")
+"""Estimators of the comparison: the default and the two of the paper. `tunnel score` compares them all."""
+CHECKED_ESTIMATOR = "output_error"
+CHECK_STDS = 4.0
+"""The check fails beyond this many standard deviations; its false-alarm rate is one in four thousand."""
+CAMPAIGN, PLAN, REPORT = "demo", "demo-plan.toml", "report.html"
+
+
+def demo(
+    out: Annotated[
+        Path, Option("--out", "-o", metavar="FOLDER", help="Where records, answers and report go.")
+    ] = Path("tunnel-output"),
+    seed: Annotated[
+        int | None, Option("--seed", min=0, help="Seed of the noise; overrides the plan's.")
+    ] = None,
+    estimators: Annotated[
+        bool,
+        Option("--estimators", help="Compare estimators with the truth instead, on the paper's campaign."),
+    ] = False,
+) -> None:
+    """Plant two faults in the virtual rig, and find them from its records.
+
+    The rig is simulated with dry friction and with one spring that is softer than
+    stated. Then the records alone are identified and diagnosed: what is wrong, how
+    large it is, and how far the gap closes on runs held out of the fit. FOLDER
+    gets the report (report.html), the plan, the campaign, and both answers as
+    JSON. It takes a quarter of a minute.
+
+    With --estimators the paper's campaign, without faults, is identified by three
+    estimators instead. Cnβ and Cnr (1/rad), Izz (kg m²) and Cr (N m s/rad) are
+    shown beside the injected values, and FOLDER gets figures (PNG, PDF). tunnel
+    score compares all estimators, with the Cramér–Rao bound.
+
+    [bold]Examples[/bold]
+      tunnel demo
+      tunnel demo --out here --seed 7
+      tunnel demo --estimators
+
+    [bold]Exit status[/bold]
+      0 success, 1 the faults were not found, an estimate failed, or one that is
+      checked missed the truth by more than four standard deviations, 2 bad input.
+    """
+    from tunnel_sim.files.plan_file import load_plan, paper_plan
+    from tunnel_sim.files.writing import output_folder
+
+    folder = output_folder(out)
+    with resources.as_file(resources.files("tunnel_lab") / "data" / PLAN) as path:
+        plan = paper_plan() if estimators else load_plan(path)
+    if seed is not None:
+        plan = replace(plan, seed=seed)
+    missed = compare_estimators(plan, folder) if estimators else find_faults(plan, folder)
+    if missed:
+        say(f"Check failed: {'; '.join(missed)}", stderr=True)
+        raise typer.Exit(1)
+
+
+def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
+    """Simulate a plan with effects, identify and diagnose the records, write all of it and print two screens.
+
+    Returns:
+        Clauses on what the diagnosis missed; empty where it found what was planted.
+    """
+    import diagnosis
+    from identification import identify
+    from tunnel_lab.bench.workspace import Session
+    from tunnel_lab.report import write_report
+    from tunnel_lab.terminal.inputs import file_hashes
+    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
+    from tunnel_sim.files.campaign_folder import write_campaign
+    from tunnel_sim.files.writing import write_json, write_whole
+
+    files = Session(folder, CAMPAIGN)  # named as on the bench, which opens them as they are
+    text = (resources.files("tunnel_lab") / "data" / PLAN).read_bytes()
+    with bar("simulating runs", len(plan.conditions)) as progress:
+        campaign = simulate_campaign(plan, progress=progress)
+    write_campaign(campaign, files.campaign, truth=truth_document(plan), overwrite=True)
+    write_whole(folder / PLAN, text)
+    # Everything is written before anything is printed: the reader of a pipe may close it early.
+    estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
+    write_json(files.estimate(CHECKED_ESTIMATOR), estimate.to_json_dict())
+    with step_display() as show_step:
+        answer = diagnosis.diagnose(campaign, progress=show_step)
+    document = answer.to_json_dict()
+    document["provenance"]["sha256"] = file_hashes(files.campaign)
+    write_json(files.diagnosis, document)
+    write_report(document, campaign, folder / REPORT)
+    show_faults(plan, campaign, estimate, document)
+    say_written(folder / REPORT)
+    say(f"Records, plan and both answers (JSON) are in {folder}")
+    show_next(folder)
+    return missed_faults(plan, document)
+
+
+def show_faults(plan: CampaignPlan, campaign: Campaign, estimate: Estimate, document: Document) -> None:
+    """Print what was planted, what was found, and how far the gap closes."""
+    from diagnosis.words.tables import waterfall_table
+    from tunnel_sim.effects.registry import effect_class
+
+    springs = dict.fromkeys(condition.spring_stiffness for condition in plan.conditions)
+    speeds = dict.fromkeys(condition.wind_speed for condition in plan.conditions)
+    say(
+        f"Simulated: {len(campaign.runs)} runs of the virtual rig, springs of {_listed(springs)} N m/rad, "
+        f"wind of {_listed(speeds)} m/s, seed {plan.seed}"
+    )
+    for effect in plan.effects:
+        sizes = (
+            f"{info.name} {info.symbol} = {effect.parameters[info.name]:g}{_spaced(info.unit)}"
+            for info in effect_class(effect.name).parameters()
+            if info.name in effect.parameters
+        )
+        say(f"Planted: {effect.name}, {', '.join(sizes)}")
+    say(f"\nFound, from the records alone:\n{document['verdict']}\n")
+    show_tables(found_table(plan, estimate, document), rich_table(waterfall_table(document)))
+
+
+def found_table(plan: CampaignPlan, estimate: Estimate, document: Document) -> Table:
+    """What was planted, beside what the nominal model alone and the model with the causes give."""
+    from identification.estimate import UNITS
+    from identification.printing import SYMBOLS, estimated, in_stds, significant, unit, with_std
+    from tunnel_sim.effects.registry import effect_class
+
+    result = table(
+        "Planted and found, ± one standard deviation σ",
+        *("", "planted", "model alone", "with the causes", "error"),
+        right=("planted", "error"),
+    )
+    after = document["coefficients"]["after"]
+    for name in after:
+        truth, alone = getattr(plan.truth, name), getattr(estimate, name)
+        result.add_row(
+            Text(f"{SYMBOLS[name]} {unit(UNITS[name])}"),
+            significant(truth),
+            "–" if alone is None else with_std(alone.value, alone.std),
+            with_std(after[name]["value"], after[name]["std"]),
+            in_stds(after[name]["value"] - truth, after[name]["std"]),
+        )
+    for (effect, name), (truth, found) in planted_and_found(plan, document).items():
+        info = next(info for info in effect_class(effect).parameters() if info.name == name)
+        error = in_stds(found["value"] - truth, found["std"]) if found and found["std"] else ""
+        cell = "not found" if found is None else estimated(found)
+        result.add_row(Text(f"{info.symbol} {unit(info.unit)}"), significant(truth), "", cell, error)
+    return result
+
+
+def planted_and_found(
+    plan: CampaignPlan, document: Document
+) -> dict[tuple[str, str], tuple[float, Document | None]]:
+    """Planted parameters by effect and name, each with that of the answer; None where it is not in the answer."""
+    answer = document["candidates"][0]
+    given = {
+        tuple(name.split(".")) if "." in name else (answer["effect"], name): found
+        for name, found in answer["parameters"].items()
+    }
+    return {
+        (effect.name, name): (value, given.get((effect.name, name)))
+        for effect in plan.effects
+        for name, value in effect.parameters.items()
+    }
+
+
+def missed_faults(plan: CampaignPlan, document: Document) -> list[str]:
+    """Clauses on what a diagnosis missed: other causes, or a size or coefficient too far from the truth.
+
+    What is chosen among stated values, such as the spring, has no standard deviation and must be the planted one.
+    """
+    planted = sorted(effect.name for effect in plan.effects)
+    if sorted(document["causes"]) != planted:
+        found = " and ".join(document["causes"]) or "none"
+        return [f"planted {' and '.join(planted)}, found {found}"]
+    pairs = {f"{effect} {name}": pair for (effect, name), pair in planted_and_found(plan, document).items()}
+    for name, found in document["coefficients"]["after"].items():
+        pairs[name] = getattr(plan.truth, name), found
+    return [
+        f"{name} misses the truth by more than {CHECK_STDS:g} std"
+        for name, (truth, found) in pairs.items()
+        if found is None
+        or not isclose(found["value"], truth, abs_tol=CHECK_STDS * (found["std"] or 0.0), rel_tol=1e-9)
+    ]
+
+
+def _spaced(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
+
+
+def _listed(values: Iterable[float]) -> str:
+    *first, last = (f"{value:g}" for value in values)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def show_next(folder: Path) -> None:
+    """Name the commands to go on with, as they can be typed here."""
+    typed = sys.argv[0] if Path(sys.argv[0]).stem == "tunnel" else ""
+    name = "tunnel" if not typed or shutil.which("tunnel") else shlex.quote(typed)
+    steps = (
+        (f"bench {shlex.quote(str(folder))}", "this campaign and your own files, in the browser"),
+        ("import log.csv --out my-rig", "your own records, from a data logger's files"),
+        ("diagnose my-rig --report my.html", "what is missing in the model of your rig"),
+    )
+    say("\nNext")
+    room = max(len(command) for command, _ in steps)
+    for command, what in steps:
+        say(f"  {name} {command:<{room}}  {what}")
+
+
+def compare_estimators(plan: CampaignPlan, folder: Path) -> list[str]:
+    """Simulate the paper's campaign, compare estimates with the truth, and draw both.
+
+    Returns:
+        Clauses on the checks that fail.
+    """
+    from tunnel_lab.plotting import runs
+    from tunnel_lab.plotting.style import save_both
+
+    campaign, estimates = simulated_part(plan, folder)
+    off = next(run for run in campaign.runs if not run.wind_on)
+    pairs = [run for run in campaign.runs if run.wind_on and run.spring_stiffness == off.spring_stiffness]
+    on = max(pairs, key=lambda run: run.wind_speed)
+    save_both(runs.wind_off_on_figure(off, on), folder / "traces.png")
+    save_both(runs.spectrum_figure((off, on)), folder / "spectrum.png")
+    save_both(runs.truth_figure(estimates, vars(plan.truth)), folder / "estimates.png")
+    show_simulated(campaign, estimates, plan)
+    say("Figures (.png and .pdf): traces, spectrum, estimates")
+    say(f"Campaign, estimates (JSON) and figures are in {folder}")
+    return misses(estimates, plan)
+
+
+def misses(estimates: Sequence[Estimate], plan: CampaignPlan) -> list[str]:
+    """Clauses on the checks that fail: estimates that are missing, or too far from the truth for their std.
+
+    The distance is checked for the maximum-likelihood estimator only, whose standard deviations should be exact.
+    """
+    lines = [f"{e.estimator}: {e.status.value}" for e in estimates if e.status.failed]
+    for estimate in estimates:
+        if estimate.estimator != CHECKED_ESTIMATOR or estimate.status.failed:
+            continue
+        for name, value in vars(plan.truth).items():
+            quantity = getattr(estimate, name)
+            if quantity is None:
+                lines.append(f"{estimate.estimator}: no {name}")
+            elif abs(quantity.value - value) > CHECK_STDS * quantity.std:
+                lines.append(f"{estimate.estimator}: {name} misses the truth by more than {CHECK_STDS:g} std")
+    return lines
+
+
+def simulated_part(plan: CampaignPlan, folder: Path) -> tuple[Campaign, tuple[Estimate, ...]]:
+    """Simulate, identify by the paper's two methods and the default one, and write all of it into the folder."""
+    from identification import identify
+    from tunnel_sim.engine.virtual_campaign import simulate_campaign, truth_document
+    from tunnel_sim.files.campaign_folder import write_campaign
+    from tunnel_sim.files.writing import write_json
+
+    with bar("simulating runs", len(plan.conditions)) as progress:
+        campaign = simulate_campaign(plan, progress=progress)
+    write_campaign(campaign, folder / "campaign", truth=truth_document(plan), overwrite=True)
+    estimates = []
+    for name in SHOWN:
+        with console(stderr=True).status(f"identifying by {name}"):
+            estimate = identify(campaign, name, throw=False)
+        write_json(folder / f"estimate-{name}.json", estimate.to_json_dict())
+        estimates.append(estimate)
+    return campaign, tuple(estimates)
+
+
+def show_simulated(campaign: Campaign, estimates: Sequence[Estimate], plan: CampaignPlan) -> None:
+    """Print the comparison with the truth."""
+    from identification.printing import status_lines
+
+    say(f"Simulated: {campaign.name}, {len(campaign.runs)} runs, seed {plan.seed}\n")
+    show_tables(truth_table(estimates, vars(plan.truth)))
+    for estimate in estimates:
+        for line in status_lines(estimate.to_json_dict()):
+            say(f"Note, {estimate.estimator}: {line}")
