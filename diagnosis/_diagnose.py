@@ -21,6 +21,7 @@ from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import noise_noted
 from diagnosis.noise.mains import hum_noted
+from diagnosis.remainder.driven import closable_driven
 from diagnosis.remainder.explain import closable
 from diagnosis.result import Diagnosis
 from diagnosis.search.clock import Progress
@@ -147,7 +148,9 @@ def _assembled(
 def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progress) -> Diagnosis:
     """The answer with what could be closed of what remains, and what else may explain it."""
     decided, caution = answer.decision.decided, tuple[Fact, ...]()
-    if chosen.campaign.driven:  # the remainder's laws are sought along free decays
+    if (
+        chosen.campaign.driven and not study.model.restored
+    ):  # every small error of a moment adds up in the angle
         caution = (Fact("remainder not sought"),)
     else:
         say("what no effect explains")
@@ -155,7 +158,10 @@ def _with_remainder(answer: Diagnosis, study: Study, chosen: Chosen, say: Progre
         significant = not decided or (answer.rest is not None and answer.rest.significant)
         try:
             with np.errstate(over="raise"):  # a fitted model that runs away
-                left = closable(study, significant=significant, decided=decided)
+                if chosen.campaign.driven:
+                    left = closable_driven(study, significant=significant and decided)
+                else:
+                    left = closable(study, significant=significant, decided=decided)
             answer = replace(answer, closable=left)
         except (np.linalg.LinAlgError, FloatingPointError):  # the answer stands without it
             caution = (Fact("remainder not solved"),)

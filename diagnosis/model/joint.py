@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 _SAME_GAIN = 1e-3  # relative: within it a stated gain, or a limit, is the model's
 _FEW = 5  # blocks whose readings say how fast a run begins
 _OF_SERVO = "The actuator is a servo, from whose command these effects of a spring would act; not tried: {}."
+_OF_GEAR = (
+    "Gravity holds the joint, so that play would be in the gears between motor and link: that takes a model of two "
+    "bodies, and is not tried: {}."
+)
 _SLIDE = "The joint slides: read m for rad, N for N m and kg for kg m2 throughout."
 
 
@@ -88,10 +92,12 @@ class _OfLaw(NominalModel):
         return self.law.lead
 
     def untried(self, campaign: Campaign, kinds: Sequence[type[Effect]]) -> dict[str, list[type[Effect]]]:
-        """Effects of a spring that is the servo of an actuator."""
+        """Effects of a spring that is the servo of an actuator, and play where gravity takes a spring's place."""
         actuator, gone = self.law.actuator, dict[str, list[type[Effect]]]()
         if actuator is not None and actuator.servo[1] != 0.0:
             gone[_OF_SERVO] = [kind for kind in kinds if kind.on_spring]
+        elif self.law.hangs:
+            gone[_OF_GEAR] = [kind for kind in kinds if kind.parts]
         left = [kind for kind in kinds if not any(kind in some for some in gone.values())]
         return gone | super().untried(campaign, left)
 

@@ -11,13 +11,13 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc
 
-from diagnosis.answer.held_out import predict_held_out, predict_stretches, turns_of
 from diagnosis.facts.remainder import Ceiling, Closable, Curve, Law, Line
 from diagnosis.likelihood.ceiling import GAPS, Evidence, Ridge, Unexplained, gaps, normal, ratio
 from diagnosis.likelihood.paths import COMMON, OF_READING, SINGLE, Path, Places, paths
 from diagnosis.likelihood.residuals import block_gain, resonance, smooth_spectra
 from diagnosis.model.similarity import Similarity
 from diagnosis.remainder.formula import choose, propose
+from diagnosis.remainder.laws import held_out_share, stated_law
 from diagnosis.search.scatter import with_scatter
 from diagnosis.search.study import Study
 from diagnosis.settings import RemainderSettings
@@ -118,31 +118,11 @@ def chosen_kind(
 def _law(unexplained: Unexplained, kind: str, drop: float, similarity: Similarity) -> Law | None:
     """The formula of a kind in the measured campaign's units, where one is supported on what is held out."""
     formula = choose(unexplained, kind, drop)
-    proposal = None if formula is None else propose(unexplained, formula, kind)
+    proposal = None if formula is None else propose(unexplained.fit, formula, kind)
     if proposal is None:
         return None
-    base = unexplained.fit
-    before, after = (predict_held_out(one).residuals for one in (base, proposal.fit))
-    if not before:
-        turns = turns_of(base, {run.id for run in base.problem.data.runs})
-        before, after = (predict_stretches(one, turns) for one in (base, proposal.fit))
-    both = [run for run in before if run in after]
-    powers = np.array([[float(r[run] @ r[run]) for run in both] for r in (before, after)])
-    sizes = np.array([before[run].size for run in both], np.float64)
-    closed, std = ratio(np.nan_to_num(powers[0] - powers[1], nan=0.0, neginf=0.0), powers[0] - sizes)
-    if closed < base.settings.remainder.formula_closes:
-        return None
-    own, values = {}, {}
-    for place, (name, given) in enumerate(proposal.table["parameters"].items()):
-        full, unit = f"{proposal.table['name']}.{name}", str(given["unit"])
-        value = similarity.own(proposal.fit.value(full), unit)
-        low, high = sorted(similarity.own(float(given[end]), unit) for end in ("lower", "upper"))
-        own[name] = {
-            "unit": unit, "scale": value or similarity.own(float(given["scale"]), unit), "lower": min(low, value),
-            "upper": max(high, value), "default": value if place else 0.0,
-        }  # fmt: skip
-        values[name] = (value, similarity.own(proposal.fit.std(full), unit))
-    return Law({**proposal.table, "parameters": own}, values, closed, std)
+    closed, std, _ = held_out_share(unexplained.fit, proposal.fit)
+    return stated_law(unexplained.fit, proposal, similarity, closed, std)
 
 
 def _others(

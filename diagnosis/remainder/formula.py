@@ -274,8 +274,8 @@ def _of(whole: Normal, chosen: Sequence[int]) -> Normal:
     return Normal(whole.matrix[np.ix_(keep, keep)], whole.gradient[keep], whole.power, len(keep))
 
 
-def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal | None:
-    """Fit a formula from `choose` like any other effect, named after the kind; None where the fit fails."""
+def propose(base: Fit, formula: Formula, kind: str) -> Proposal | None:
+    """Fit a formula beside those of a fit like any other effect, named after the kind; None where the fit fails."""
     taken = {known.name for known in known_effects()}
     numbered = (f"proposed_{kind}_{number}" for number in range(2, len(taken) + 3))
     table = effect_table(formula, next(n for n in chain((f"proposed_{kind}",), numbered) if n not in taken))
@@ -283,7 +283,6 @@ def propose(unexplained: Unexplained, formula: Formula, kind: str) -> Proposal |
         effect = effect_of(table)
     except TunnelError:
         return None
-    base = unexplained.fit
     start_of = {name: float(q["default"] or q["scale"]) for name, q in table["parameters"].items()}
     problem = dataclasses.replace(base.problem, effects=(*base.problem.effects, effect))
     own = np.array([start_of[name.split(".")[1]] for name in problem.names[len(base.problem.names) :]])

@@ -234,6 +234,8 @@ _MOTION = 0.4  # of the run's frequency: the same for the motion itself, whose f
 _LOWEST = 0.5  # of the run's frequency: below, drifts look like lines
 _APART = 0.5  # of the run's frequency, between two lines: a nearer one is the skirt of the first
 _PER_RUN = 2
+_OF_INPUT = 1e-3  # of the power of a run's input: less at a frequency may have been picked up by its wires
+_MULTIPLES = 3  # of the frequency of an input: of higher ones no response is the greater part of a gap
 
 
 @dataclass(frozen=True)
@@ -259,7 +261,7 @@ def residual_lines(
     lines: list[ResidualLine] = []
     for run, own in zip(runs, data, strict=True):
         local = np.convolve(run.power, np.ones(_WIDTH), mode="same")
-        open_to = away_from_motion(run.frequency / run.resonance)
+        open_to = away_from_motion(run.frequency / run.resonance) & ~of_drive(run.frequency.size, own)
         found: list[ResidualLine] = []
         for index in np.argsort(np.where(open_to, local, 0.0))[::-1][: 20 * _PER_RUN].tolist():
             excess = float(local[index]) - _WIDTH
@@ -283,6 +285,28 @@ def residual_lines(
             found.append(ResidualLine(run.id, frequency, excess / whole, amplitude))
         lines += found
     return tuple(lines)
+
+
+def of_drive(size: int, own: RunData) -> NDArray[np.bool_]:
+    """Where a line may be the response to the input of a driven run: where that has power, and at its multiples.
+
+    Args:
+        size: number of coefficients, n; the result has the shape (n,).
+    """
+    mask = np.zeros(size, dtype=bool)
+    if own.drive is None:
+        return mask
+    time = own.start + (np.arange(size) + 0.5) * own.interval
+    values = np.interp(time, own.drive.time_s + own.drive.delay, own.drive.values)
+    # Tapered, because a sinusoid that does not fit into the record leaks into all frequencies.
+    power = dct((values - values.mean()) * np.hanning(values.size), norm="ortho") ** 2
+    local = np.convolve(power, np.ones(_WIDTH), mode="same")
+    for index in np.flatnonzero(local >= _OF_INPUT * float(power.sum())).tolist():
+        for multiple in range(1, _MULTIPLES + 1):
+            # A multiple is as many times as wide.
+            reach = _WIDTH + multiple // 2
+            mask[max(multiple * index - reach, 0) : multiple * index + reach + 1] = True
+    return mask
 
 
 def away_from_motion(order: Array) -> NDArray[np.bool_]:

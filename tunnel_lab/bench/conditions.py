@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from nicegui import events, ui
@@ -12,7 +13,7 @@ from nicegui import events, ui
 from tunnel_lab.bench.parts import Fault, Frame, page_words, show_items
 from tunnel_lab.bench.workspace import Session
 from tunnel_sim.files.campaign_folder import CAMPAIGN_FILE, NO_CAMPAIGN, parse_document, read_campaign
-from tunnel_sim.files.importing.conditions import RIG_KEYS, RUN_KEYS, Conditions
+from tunnel_sim.files.importing.condition_names import RIG_KEYS, RUN_KEYS, Conditions
 from tunnel_sim.files.importing.records import ORIGINAL, campaign_text
 from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import read_json
@@ -44,6 +45,8 @@ MISSING = {
     "reference_length": "needed for Cnβ and Cnr",
 }
 """What is missing without these; the others are optional, or required (`faults`)."""
+_OF_JOINT = "0 for a joint without a spring"
+"""The stiffness of a driven run in still air."""
 _MOST_ROWS = 20  # of a table without a scroll bar
 _MOST_LINES = 8  # of faults that are listed
 _PASTE = """(event) => {
@@ -166,10 +169,19 @@ def _write(session: Session, document: dict[str, Any]) -> None:
     write_whole(path, campaign_text(document, comments).encode())
 
 
-def restore(session: Session, before: Cells) -> None:
-    """State again what was stated before a campaign was written anew; errors as of `save`."""
+def restore(
+    session: Session, before: Cells, held: Mapping[str, Mapping[str, float]] = MappingProxyType({})
+) -> None:
+    """State again what was stated before a campaign was written anew; errors as of `save`.
+
+    Args:
+        held: what the files state and the campaign takes only beside an air density, by row and key.
+    """
     kept = {
-        row: {key: before.get(row, {}).get(key) or text for key, text in cells.items()}
+        row: {
+            key: before.get(row, {}).get(key) or _texts(held.get(row, {}), (key,))[key] or text
+            for key, text in cells.items()
+        }
         for row, cells in stated(session).items()
     }
     save(session, kept)
@@ -215,6 +227,7 @@ class ConditionsPage:
         self._session, self._frame = session, frame
         self._cells = typed(session)
         self._runs = [row for row in self._cells if row != RIG]
+        self._driven = all("drive_hold" in run for run in _document(session)["runs"])
         ui.label(
             "Type, or paste a block from a spreadsheet into a cell. Valid values are saved at once in "
             f"{session.campaign / 'campaign.toml'}; nothing else of the campaign changes."
@@ -327,8 +340,9 @@ class ConditionsPage:
         cells = self._cells
         wrong = save(self._session, cells)
         windy = any(cells[run]["wind_speed"].strip() not in ("", "0") for run in self._runs)
+        words = MISSING | ({"spring_stiffness": _OF_JOINT} if self._driven and not windy else {})
         missing = {
-            (row, key): MISSING[key]
+            (row, key): words[key]
             for row, texts in cells.items()
             for key, text in texts.items()
             if key in MISSING and not text.strip() and (row != RIG or windy)

@@ -42,6 +42,7 @@ _WRITTEN = {
     "end": "Leave out samples after [s]",
     "rest": "Reading at rest of every run, to be subtracted [rad]",
     "name": "Conditions in the file names: S{spring}_V{wind_speed}_*",
+    "set": "Conditions of all runs, such as wind_speed=0 or wind_speed=V",
     "delimiter": "Delimiter of a text file: tab, blank, ; , or |",
     "decimal": "Decimal sign of a text file",
 }
@@ -102,6 +103,31 @@ def state(session: Session, changes: Mapping[str, Any]) -> None:
     write_whole(session.choices, tomli_w.dumps({"schema_version": 1, "choices": stated}).encode())
 
 
+def settings_of(choices: ImportChoices) -> str:
+    """The conditions that are stated for all runs, as ``--set`` takes them."""
+    numbers = choices.conditions.model_dump(exclude_none=True)
+    names = choices.stated_by.model_dump(exclude_none=True)
+    stated = [f"{key}={value:g}" for key, value in numbers.items()]
+    return ", ".join([*stated, *(f"{key}={name}" for key, name in names.items())])
+
+
+def settings_from(text: str | None) -> dict[str, Any]:
+    """The choices that state conditions of all runs, from a text as ``--set`` takes it.
+
+    Raises:
+        TunnelError: when it is not one.
+    """
+    from tunnel_sim.files.importing.conditions import parse_setting
+
+    if not (text or "").strip():
+        return {"conditions": None, "stated_by": None}
+    numbers, names = parse_setting(text or "", FIELDS["set"])
+    return {
+        "conditions": numbers.model_dump(exclude_none=True),
+        "stated_by": names.model_dump(exclude_none=True),
+    }
+
+
 def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> None:
     """State where a run begins, ends or rests.
 
@@ -128,30 +154,48 @@ def move(session: Session, mark: Mark, places: Mapping[str, float | None]) -> No
 
 
 def read(session: Session) -> tuple[Imported, tuple[TunnelError, ...]]:
-    """Read the dropped files.
+    """Read the dropped files; air densities that are missing are stated on the next page.
 
     Returns:
-        What was read, and the faults of the files that are left out because they cannot be read beside the others.
+        What was read, and the faults of the files that cannot be read beside the others.
 
     Raises:
-        TunnelError: for the first fault, as ``tunnel import`` does, where no file can be read.
+        TunnelError: for the first fault, as ``tunnel import`` does, where no file can be read, or where a condition
+            is open that only the user can state.
     """
+    from tunnel_sim.files.importing.conditions import Unstated
     from tunnel_sim.files.importing.records import read_records
 
     files, choices = files_of(session), choices_of(session)
     try:
-        return read_records(files, choices, name=session.name), ()
+        return read_records(files, choices, name=session.name, later=True), ()
+    except Unstated:
+        raise
     except TunnelError as error:
         good, faults = [], []
-        for path in files if len(files) > 1 else ():
+        for path in (path for path in files if path.name not in choices.leave_out):
+            if len(files) == 1:
+                break
             try:
-                read_records([path], choices, name=session.name)
+                alone = choices.model_copy(update={"leave_out": ()})
+                read_records([path], alone, name=session.name, later=True)
                 good.append(path)
             except TunnelError as fault:
                 faults.append(fault)
         if not good or not faults:
             raise error from None
-        return read_records(good, choices, name=session.name), tuple(faults)
+        others = tuple(path.name for path in files if path not in good)
+        left_out = choices.model_copy(update={"leave_out": (*choices.leave_out, *others)})
+        return read_records(files, left_out, name=session.name, later=True), tuple(faults)
+
+
+def leave_out(session: Session, names: Sequence[str]) -> None:
+    """State which files and runs are left out.
+
+    Raises:
+        TunnelError: when a name is not one.
+    """
+    state(session, {"leave_out": tuple(names)})
 
 
 def _tables(session: Session) -> Iterator[tuple[Path, Sequence[Table]]]:
@@ -234,15 +278,22 @@ def columns_of(session: Session) -> list[Column]:
             except TunnelError:  # it has to be chosen first
                 pairs = []
             for channel in table.channels:
-                found.setdefault(channel.name, _column(channel, pairs, choices))
+                found.setdefault(channel.name, _column(channel, table.channels, pairs, choices))
     return list(found.values())
 
 
-def _column(channel: Channel, pairs: list[ColumnPair], choices: ImportChoices) -> Column:
+def _column(
+    channel: Channel, channels: Sequence[Channel], pairs: list[ColumnPair], choices: ImportChoices
+) -> Column:
     import numpy as np
 
-    from tunnel_sim.files.importing.columns import guessed_angle_unit, guessed_time_unit, is_stated, is_time
-    from tunnel_sim.files.importing.conditions import condition_of
+    from tunnel_sim.files.importing.columns import (
+        guessed_angle_unit,
+        guessed_time_unit,
+        is_time,
+        stated_input,
+    )
+    from tunnel_sim.files.importing.condition_names import condition_of
     from tunnel_sim.files.importing.tables import is_input
 
     role: Role
@@ -250,7 +301,7 @@ def _column(channel: Channel, pairs: list[ColumnPair], choices: ImportChoices) -
         role, used, stated = "time", True, choices.time_unit
     elif condition_of(channel.name, channel.unit) is not None:
         return Column(channel.name, channel.unit, "a condition of the runs", "condition", True)
-    elif is_input(channel) or is_stated(channel, choices):
+    elif is_input(channel) or channel is stated_input(channels, choices):
         return Column(channel.name, channel.unit, "the input of a driven run", "input", True)
     else:
         used = any(channel is pair.reading for pair in pairs)
@@ -348,6 +399,7 @@ def show_choices(
 ) -> None:
     """The fields of the choices; a changed one calls with its name and new value, None: found from the files."""
     from tunnel_sim.files.importing.tables import UNITS
+    from tunnel_sim.vocabulary.drive import HOLDS, INPUT_COLUMNS
 
     now = choices_of(session)
     angle = [unit for kind, units in UNITS.items() if kind != "time" for unit in units]
@@ -364,6 +416,9 @@ def show_choices(
             ("unit", angle),
             ("time", columns),
             ("time_unit", list(UNITS["time"])),
+            ("input", [*columns, "none"]),
+            ("input_as", list(INPUT_COLUMNS)),
+            ("input_hold", list(HOLDS)),
         ):
             several = key == "angle"
             value = list(now.angle) if several else getattr(now, key)
@@ -378,7 +433,9 @@ def show_choices(
             ).props("dense")
         for key, label in _WRITTEN.items():
             field: ui.number | ui.input
-            if key in ("calibration", "name", "delimiter", "decimal"):
+            if key == "set":
+                field = ui.input(label, value=settings_of(now)).props("dense")
+            elif key in ("calibration", "name", "delimiter", "decimal"):
                 field = ui.input(label, value=getattr(now, key) or "").props("dense")
             else:
                 field = ui.number(label, value=getattr(now, key)).props("dense step=any")

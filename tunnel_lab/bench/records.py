@@ -20,7 +20,7 @@ from tunnel_lab.bench.parts import (
     show_parts,
 )
 from tunnel_lab.bench.uploads import drop_zone, more
-from tunnel_lab.bench.workspace import Session
+from tunnel_lab.bench.workspace import Session, rename
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
 if TYPE_CHECKING:
@@ -57,6 +57,12 @@ class RecordsPage:
             if session.imported:
                 frame.way_on()
         self._written = Fault()
+        self._naming = ui.element("div").classes("fields")
+        self._left_out = ui.element("div").classes("fields")
+        if not session.imported:
+            with self._naming:
+                name = ui.input("Name of the campaign", value=session.name).props("dense")
+                name.on("change", lambda: self._rename(str(name.value)))
         self._form_place = ui.expansion("What the files do not say, or was found wrongly").classes("choices")
         self._reading = 0
         self._charts: list[Chart] = []
@@ -96,9 +102,28 @@ class RecordsPage:
         with self._form_place:
             preview.show_choices(self._session, self._names, self._changed)
 
+    def _rename(self, name: str) -> None:
+        with self._fault.around():
+            ui.navigate.to(address(rename(self._session, name), "records"))
+
+    def _show_left_out(self, imported: Imported | None) -> None:
+        """The field for files and runs that are left out, with the runs that were found."""
+        chosen = list(preview.choices_of(self._session).leave_out)
+        files = [path.name for path in preview.files_of(self._session)]
+        runs = [] if imported is None else [part.id for part in imported.parts]
+        options = list(dict.fromkeys([*(files if len(files) > 1 else ()), *runs, *chosen]))
+        self._left_out.clear()
+        if len(options) < 2 and not chosen:
+            return
+        with self._left_out:
+            field = ui.select(options, label="Leave out files or runs", value=chosen, multiple=True)
+            field.props("dense use-chips").on_value_change(
+                lambda event: self._changed("leave_out", event.value)
+            )
+
     async def _changed(self, key: str, value: Any) -> None:
         with self._fault.around():
-            preview.state(self._session, {key: value})
+            preview.state(self._session, preview.settings_from(value) if key == "set" else {key: value})
             await self._read()
 
     async def _stated(self, changes: dict[str, Any]) -> None:
@@ -128,9 +153,11 @@ class RecordsPage:
         self._reading += 1
         mine = self._reading
         imported = None
+        faults: tuple[TunnelError, ...] = ()
         try:
             imported, faults = await asyncio.to_thread(preview.read, self._session)
-            said: TunnelError | str = "; ".join(f"left out: {fault}" for fault in faults)
+            said: TunnelError | str = "; ".join(map(str, faults))
+            said = f"{said}; state what is asked for, or leave out the file" if faults else ""
         except TunnelError as refused:
             said = refused
         if self._is_past(mine):
@@ -139,7 +166,12 @@ class RecordsPage:
         if imported is None and not redraw:
             return False
         self._imported = imported
-        self._write_button.props(remove="disabled") if imported else self._write_button.props("disabled")
+        # A campaign without files that were dropped is written only where the user has left them out.
+        if imported is not None and not faults:
+            self._write_button.props(remove="disabled")
+        else:
+            self._write_button.props("disabled")
+        self._show_left_out(imported)
         self._table.clear()
         if redraw:
             self._drawn.clear()
@@ -254,6 +286,8 @@ class RecordsPage:
 def write(session: Session, imported: Imported) -> None:
     """Write the campaign, as ``tunnel import`` does; conditions that were stated before are kept.
 
+    Conditions that a campaign takes only beside an air density stay with the draft until it is stated.
+
     Raises:
         TunnelError: when the folder cannot be written.
     """
@@ -261,7 +295,7 @@ def write(session: Session, imported: Imported) -> None:
     from tunnel_lab.plotting.runs import import_picture
     from tunnel_sim.files.importing.records import write_imported
 
-    before = conditions.stated(session) if session.imported else None
+    before = conditions.stated(session) if session.imported else {}
     write_imported(imported, session.campaign, overwrite=True, picture=import_picture)
-    if before is not None:
-        conditions.restore(session, before)
+    if before or imported.held:
+        conditions.restore(session, before, imported.held)

@@ -80,7 +80,7 @@ def add_uploads(app: FastAPI, folder: Path) -> None:
 
     @app.post(NEW)
     async def to_new(request: Request) -> Response:
-        return await _take(request, lambda name: new_session(folder, name))
+        return await _take(request, lambda names: new_session(folder, *names))
 
     @app.post("/{name}/upload")
     async def to_more(name: str, request: Request) -> Response:
@@ -88,13 +88,13 @@ def add_uploads(app: FastAPI, folder: Path) -> None:
         return await _take(request, lambda _: session)
 
 
-async def _take(request: Request, session_for: Callable[[str], Session]) -> Response:
-    """Keep the files of a request in the session for the name of the first of them."""
+async def _take(request: Request, session_for: Callable[[Sequence[str]], Session]) -> Response:
+    """Keep the files of a request in the session for their names."""
 
     def kept(files: Sequence[UploadFile]) -> Session:
         contents = [(file.filename or "", file.file.read()) for file in files]
         with _one_at_a_time:
-            session = session_for(contents[0][0])
+            session = session_for([name for name, _ in contents])
             keep(session, contents)
         return session
 

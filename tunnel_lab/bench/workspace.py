@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ from tunnel_sim.vocabulary.errors import TunnelError, one_line
 
 CAMPAIGN_FILE = "campaign.toml"  # as in campaign_schema, which is slow to load
 _LONGEST = 80  # characters of a file name
+_LEAST_NAME = 3  # characters of a name that files share
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # devices of Windows
 ESTIMATOR = "output_error"
 """The estimator whose estimate opens the diagnosis."""
@@ -117,12 +120,52 @@ def open_session(folder: Path, name: str) -> Session:
     return by_name[name]
 
 
-def new_session(folder: Path, file_name: str) -> Session:
-    """A session for dropped files, named after the first, with a name that nothing in the workspace has."""
-    stem = safe_name(Path(safe_name(file_name)).stem)
+def common_name(file_names: Sequence[str]) -> str:
+    """A name for a campaign of files: that of their folder, or what their names begin with, or the first one."""
+    paths = [re.split(r"[/\\]", unicodedata.normalize("NFKC", name)) for name in file_names]
+    if len(paths) == 1:
+        return safe_name(Path(safe_name(paths[0][-1])).stem)
+    folders = {tuple(path[:-1]) for path in paths}
+    if len(folders) == 1 and (folder := folders.pop()) and folder[-1].strip("."):
+        return safe_name(folder[-1])
+    stems = [Path(safe_name(path[-1])).stem for path in paths]
+    alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*stems, strict=False))
+    shared = "".join(letters[0] for letters in alike)
+    # A number that is cut in two, or a letter before numbers that differ, is not a name.
+    whole = re.sub(r"[\W_]*(?:[^\W\d_]?\d*)?$", "", shared) if shared not in stems else shared
+    return safe_name(whole) if len(whole) >= _LEAST_NAME else safe_name(stems[0])
+
+
+def new_session(folder: Path, *file_names: str) -> Session:
+    """A session for dropped files, by their `common_name` or one like it that nothing in the workspace has."""
+    stem = common_name(file_names)
     taken = {path.name.split(".")[0].lower() for path in _entries(folder)}
     names = [stem, *(f"{stem}-{number}" for number in range(2, len(taken) + 3))]
     return Session(folder, next(name for name in names if name.lower() not in taken))
+
+
+def rename(session: Session, name: str) -> Session:
+    """Give a session whose campaign has not been written another name.
+
+    Raises:
+        TunnelError: when it is not a name, is taken, or the campaign has been written.
+    """
+    where = f"the name '{one_line(name, 60)}'"
+    if session.imported:
+        remedy = "rename it before it is written"
+        raise TunnelError("the campaign has been written", where=where, remedy=remedy)
+    if name != safe_name(name) or "." in name:
+        remedy = f"use letters, digits, _, - and +, such as {safe_name(name).replace('.', '_')}"
+        raise TunnelError("is not the name of a campaign", where=where, remedy=remedy)
+    renamed = Session(session.folder, name)
+    if name == session.name:
+        return session
+    if name.lower() in {path.name.split(".")[0].lower() for path in _entries(session.folder)}:
+        raise TunnelError("is taken", where=where, remedy="choose another one")
+    for before, after in ((session.uploads, renamed.uploads), (session.choices, renamed.choices)):
+        if before.exists():
+            before.rename(after)
+    return renamed
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -211,7 +211,7 @@ def diagnose(
         return
     show(document)
     if propose is not None and proposed is None:
-        nothing = "nothing remains beyond chance, or beside a random moment, or a run is driven"
+        nothing = "nothing remains beyond chance, or beside a random moment, or nothing holds the body"
         say(f"No formula is proposed: {'none is supported' if document['closable'] else nothing}")
     say_written(json, report, summary, patch, proposed)
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from tunnel_lab.terminal.inputs import ending
+from tunnel_lab.terminal.inputs import LeaveOutOption, ending, split_names
 from tunnel_lab.terminal.outputs import parts_table, rich_table, say, show_tables
 from tunnel_sim.vocabulary.errors import TunnelError, counted
 
@@ -40,6 +40,10 @@ def import_files(
     input_as: Annotated[
         str | None,
         _column("--input-as", metavar="COLUMN", help="What the input is: moment_nm, drive or base_rad."),
+    ] = None,
+    input_hold: Annotated[
+        str | None,
+        _column("--input-hold", metavar="HOLD", help="The input between its samples: zero (held) or linear."),
     ] = None,
     time: Annotated[
         str | None, _column("--time", metavar="NAME", help="Column of the times, by name or number.")
@@ -72,7 +76,9 @@ def import_files(
     settings: Annotated[
         list[str] | None,
         _condition(
-            "--set", metavar="KEY=NUMBER", help="A condition of all runs, or a size. May be repeated."
+            "--set",
+            metavar="KEY=NUMBER",
+            help="A condition of all runs, or a size; or KEY=NAME of what states it. May be repeated.",
         ),
     ] = None,
     start: Annotated[float | None, _runs("--start", help="Leave out earlier samples, s.")] = None,
@@ -80,6 +86,7 @@ def import_files(
     rest: Annotated[
         float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
     ] = None,
+    leave_out: LeaveOutOption = None,
     cut: Annotated[
         bool | None, _runs("--cut/--no-cut", help="Cut records at releases.", show_default="--cut")
     ] = None,
@@ -109,7 +116,7 @@ def import_files(
 ) -> None:
     """Make a campaign from the files of a data logger, a spreadsheet or MATLAB.
 
-    Text of any dialect, Excel, MAT, TDMS, HDF5 and Parquet are read. Columns, units,
+    Text of any dialect, Excel, MAT, TDMS, HDF5, Parquet and JSON are read. Columns, units,
     sample rate, runs and releases are found; what was found, and why, is printed
     before anything is written. Options correct what was found wrongly. The campaign
     gets a picture (import.png), the choices made (import.toml, for --recipe), and
@@ -137,13 +144,17 @@ def import_files(
     if preview is not None:
         refuse_unwritable(preview)
     words: dict[str, float] = {}
+    names: dict[str, str] = {}
     for word in settings or ():
-        words |= parse_setting(word, "--set").model_dump(exclude_none=True)
+        numbers, columns = parse_setting(word, "--set")
+        words |= numbers.model_dump(exclude_none=True)
+        names |= columns.model_dump(exclude_none=True)
     stated = {
         "angle": tuple(angle or ()) or None,
         "unit": unit,
         "input": drive,
         "input_as": input_as,
+        "input_hold": input_hold,
         "time": time,
         "time_unit": time_unit,
         "rate": rate,
@@ -153,10 +164,12 @@ def import_files(
         "start": start,
         "end": end,
         "rest": rest,
+        "leave_out": split_names(leave_out) or None,
         "cut": cut,
         "delimiter": delimiter,
         "decimal": decimal,
         "conditions": words or None,
+        "stated_by": names or None,
     }
     kept = {} if recipe is None else read_recipe(recipe).model_dump(exclude_defaults=True)
     given = kept | {key: value for key, value in stated.items() if value is not None}

@@ -41,6 +41,7 @@ from tunnel_sim.vocabulary.errors import TunnelError
 
 if TYPE_CHECKING:
     from identification.estimators import Estimator
+    from tunnel_sim.vocabulary.turning_points import TurningPoints
 
 FEW_RUNS = 3
 """For up to this many runs the windows are shown by default."""
@@ -132,13 +133,20 @@ def run(
     """
     from identification import identify
     from tunnel_sim.files.writing import json_text, write_json
+    from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
     estimator, models = chosen_estimator(estimator), list(chosen_estimators(models))
     if models and not budget and uncertainties is None:
         raise TunnelError("needs --budget", where="--model", remedy="add --budget, or leave it out")
     to_stdout = json is not None and str(json) == "-"
     refuse_unwritable_files(None if to_stdout else json)
-    whole, left_out = given_campaign(campaign), split_names(leave_out)
+    try:
+        whole, left_out = given_campaign(campaign), split_names(leave_out)
+    except HoldsTurningPoints as held:
+        if leave_out or weights or budget or uncertainties or models or estimator != "output_error":
+            raise
+        _show_turning_points(held.points, json)
+        return
     data = whole.without(left_out)
     chosen: str | Estimator = estimator
     if weights is not None:
@@ -188,6 +196,47 @@ def run(
         say_written(json)
     if estimate.status.failed:
         raise typer.Exit(1)
+
+
+def _show_turning_points(points: TurningPoints, json: Path | None) -> None:
+    """Identify turning points by their own likelihood: ωn and ζ, in JSON as of a run."""
+    from identification.estimate import Estimate, Quantity, RunEstimate
+    from identification.printing import TextTable, with_std
+    from identification.signal.turning_points import fit_turning_points
+    from identification.status import Status
+    from tunnel_sim.files.writing import json_text, write_json
+
+    for line in points.said:
+        say(f"Note: {points.name}: {line}", stderr=True)
+    found = fit_turning_points(points)
+    omega = Quantity(found.omega_n.value, found.omega_n.std, "rad/s")
+    zeta = Quantity(found.zeta.value, found.zeta.std, "1")
+    zero = Quantity(found.zero.value, found.zero.std, "rad")
+    run = RunEstimate(points.name, omega_n=omega, zeta=zeta, sensor_zero=zero)
+    document = Estimate(points.name, "turning_points", (run,), (Status.NO_STIFFNESS,)).to_json_dict()
+    if json is not None and str(json) == "-":
+        typer.echo(printable_json(json_text(document)), nl=False)
+        return
+    if json is not None:
+        write_json(json, document)
+    rows = [
+        ("natural frequency ωn [rad/s]", found.omega_n),
+        ("damping ratio ζ", found.zeta),
+        ("period of the swing [s]", found.period),
+        ("logarithmic decrement of a period", found.decrement),
+        ("angle at rest [rad]", found.zero),
+        ("first swing from there [rad]", found.first_swing),
+    ]
+    cells = tuple((name, with_std(one.value, one.std)) for name, one in rows)
+    heading = "value ± one standard deviation"
+    title = f"{points.name}: {points.time_s.size} turning points"
+    show_tables(rich_table(TextTable(title, ("quantity", heading), cells, right=(heading,))))
+    for line in found.said:
+        say(f"Note: {line}")
+    say(
+        "Note: turning points give ωn and ζ alone; a campaign, and a diagnosis, need the angle between them too"
+    )
+    say_written(json)
 
 
 def with_estimators(text: str | None) -> str:

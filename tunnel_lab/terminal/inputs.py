@@ -54,9 +54,12 @@ def given_campaign(path: Path) -> Campaign:
         remedy = f"if it is a plan: tunnel simulate {shlex.quote(str(path))} --out FOLDER"
         raise TunnelError(f"is neither a record nor a {CAMPAIGN_FILE}", where=shown(path), remedy=remedy)
     from tunnel_sim.files.importing.records import read_records  # only here: a campaign needs none of it
+    from tunnel_sim.vocabulary.turning_points import HoldsTurningPoints
 
     try:
         imported = read_records([path])
+    except HoldsTurningPoints:
+        raise
     except TunnelError as error:
         remedy = f"tunnel import takes options: {error.remedy}"
         raise TunnelError(error.what, where=error.where, remedy=remedy) from None

@@ -294,19 +294,22 @@ def show_estimate(
 def parts_table(imported: Imported) -> TextTable:
     """The runs of an import: file where there are several, samples, rate, stretch, swing and conditions."""
     swing = f"swing\n[{imported.campaign.sensor.unit}]"
-    headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, "V\n[m/s]", "Kr\n[N m/rad]")
+    used = [part.run for part in imported.parts if part.run is not None]
+    windless = all(run.drive is not None and run.wind_speed == 0.0 for run in used)  # a joint
+    wind = () if windless else ("V\n[m/s]",)
+    headings = ("samples", "rate\n[Hz]", "from\n[s]", "to\n[s]", swing, *wind, "Kr\n[N m/rad]")
     several = len(imported.sources) > 1
     rows = []
     for part in imported.parts:
         time, run = part.raw.cleaned.time_s[part.piece.first : part.piece.last], part.run
-        cells = [f"{time.size}", "left out", "", "", "", "", ""]
+        cells = [f"{time.size}", "left out", *[""] * (len(headings) - 2)]
         if run is not None:
             cells[1:] = [
                 f"{run.record.sample_rate:.4g}",
                 f"{time[0]:.2f}",
                 f"{time[-1]:.2f}",
                 f"±{0.5 * (part.reading.max() - part.reading.min()):.3g}",
-                f"{run.wind_speed:g}",
+                *([f"{run.wind_speed:g}"] if wind else []),
                 "not stated" if run.spring_stiffness is None else f"{run.spring_stiffness:g}",
             ]
         rows.append((part.id, *([part.raw.source.name] if several else []), *cells))

@@ -67,6 +67,7 @@ class Effect:
     - ``autonomous``: whether its moment and its reading depend on angle and rate alone.
     - ``fitted``: whether a fit of the deterministic motion can find it; else it is read off records or spectra.
     - ``on_spring``: whether its moment is in proportion to the spring's stiffness.
+    - ``parts``: whether it parts the body from what holds it, as play does.
     - ``driven``: whether it acts on driven runs only.
     - ``lattice``: whether it changes the quantisation step.
     - ``scatters``: the number of a run that it scatters between runs: ``wind_speed``, ``spring_stiffness`` or
@@ -98,6 +99,7 @@ class Effect:
     autonomous: ClassVar[bool] = True
     fitted: ClassVar[bool] = True
     on_spring: ClassVar[bool] = False
+    parts: ClassVar[bool] = False
     driven: ClassVar[bool] = False
     lattice: ClassVar[bool] = False
     scatters: ClassVar[str] = ""

@@ -75,6 +75,7 @@ class FreePlay(Effect):
     condition = "always"
     on_spring = True
     size = "play of {half_width} to each side between spring and rod"
+    parts = True
     advice = "Take up the play between spring and rod"
     equation = "−Kr dz(β); dz = 0 within ±δ, β ∓ δ beyond"
     signature = "The frequency falls steeply as the amplitude nears the dead zone."

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 import polars as pl
 
-from tunnel_sim.files.importing.conditions import OF_REPEATABILITY
+from tunnel_sim.files.importing.condition_names import OF_REPEATABILITY
 from tunnel_sim.files.readers import COLUMNS
 from tunnel_sim.files.toml_input import shown
 from tunnel_sim.files.writing import write_encoded

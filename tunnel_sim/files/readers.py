@@ -75,13 +75,16 @@ class Reader:
 READERS: Mapping[str, str] = {
     ".csv": "tunnel_sim.files.readers:CSV",
     ".parquet": "tunnel_sim.files.importing.binary:PARQUET",
-    ".xlsx": "tunnel_sim.files.importing.binary:WORKBOOK",
-    ".xlsm": "tunnel_sim.files.importing.binary:WORKBOOK",
+    ".xlsx": "tunnel_sim.files.importing.workbook:WORKBOOK",
+    ".xlsm": "tunnel_sim.files.importing.workbook:WORKBOOK",
     ".mat": "tunnel_sim.files.importing.binary:MAT",
     ".h5": "tunnel_sim.files.importing.binary:HDF5",
     ".hdf5": "tunnel_sim.files.importing.binary:HDF5",
     ".hdf": "tunnel_sim.files.importing.binary:HDF5",
     ".tdms": "tunnel_sim.files.importing.binary:TDMS",
+    ".json": "tunnel_sim.files.importing.json_tables:JSON",
+    ".jsonl": "tunnel_sim.files.importing.json_tables:JSON_LINES",
+    ".ndjson": "tunnel_sim.files.importing.json_tables:JSON_LINES",
 }
 """Where the `Reader` of each ending is. A new format is a reader and a line; other files are imported as text."""
 

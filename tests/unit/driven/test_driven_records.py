@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tunnel_lab.terminal.outputs import parts_table
 from tunnel_sim.files.campaign_folder import read_campaign, write_campaign
 from tunnel_sim.files.exporting import export_campaign
 from tunnel_sim.files.importing.conditions import ImportChoices
-from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.records import import_records, read_records
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -184,3 +185,51 @@ def test_import_is_the_inverse_of_export(tmp_path: Path, kind: str, drive: Drive
     assert found is not None
     assert (found.column, found.hold, found.gain) == (drive.column, drive.hold, drive.gain)
     assert np.max(np.abs(found.values - drive.values)) < 1e-15 * (kind == "xlsx") + 1e-300
+
+
+def logged(folder: Path) -> Path:
+    """A robot's log: times, angle and torque, in headings as written."""
+    rows = "\n".join(f"{t:.2f},{y:.9f},{u:.9f}" for t, y, u in zip(TIME, RESPONSE, INPUT, strict=True))
+    path = folder / "joint.csv"
+    path.write_text(f"t [s],q [rad],tau_1 [Nm]\n{rows}\n")
+    return path
+
+
+@pytest.mark.parametrize("angle", ["q [rad]", "q (rad)", "q", "Q", "2", "q_rad"])
+@pytest.mark.parametrize("named", ["tau_1 [Nm]", "tau_1", "tau_1 (Nm)", "3", "none"])
+def test_columns_are_named_as_written_or_by_number(tmp_path: Path, angle: str, named: str) -> None:
+    choices = ImportChoices(angle=(angle,), input=named)
+    (run,) = read_records([logged(tmp_path)], choices).campaign.runs
+    np.testing.assert_allclose(run.record.yaw_rad, RESPONSE, atol=1e-8)
+    if named == "none":
+        assert run.drive is None
+    else:
+        assert run.drive is not None
+        assert run.drive.column == "moment_nm"
+        np.testing.assert_allclose(run.drive.values, INPUT, atol=1e-8)
+
+
+def test_the_number_of_the_input_is_not_that_of_the_angle(tmp_path: Path) -> None:
+    with pytest.raises(TunnelError, match="no column '2' for the input"):
+        read_records([logged(tmp_path)], ImportChoices(angle=("q",), input="2"))
+
+
+def test_the_hold_of_an_input_is_asked_for(tmp_path: Path) -> None:
+    path = logged(tmp_path)
+    found = read_records([path], ImportChoices(input="3"))
+    assert any("linear between samples is assumed; --input-hold zero" in line for line in found.remarks())
+    found = read_records([path], ImportChoices(input="3", input_hold="zero"))
+    assert found.campaign.runs[0].drive is not None
+    assert found.campaign.runs[0].drive.hold == "zero"
+    assert not any("--input-hold" in line for line in found.remarks())
+
+
+def test_the_import_of_a_joint_speaks_of_no_wind(tmp_path: Path) -> None:
+    imported = import_records([logged(tmp_path)], tmp_path / "joint", ImportChoices(input="3"))
+    text = (tmp_path / "joint" / "campaign.toml").read_text()
+    for word in ("Cn", "frontal_area", "reference_length", "air_density", "width"):
+        assert word not in text
+    assert "0 for a joint without a spring" in text
+    assert not any("wind" in line for line in imported.remarks())
+    assert "V\n[m/s]" not in parts_table(imported).columns
+    read_campaign(tmp_path / "joint")

@@ -136,7 +136,7 @@ def test_conditions_from_a_table(tmp_path: Path) -> None:
     ("text", "what"),
     [
         ("name,wind_speed\na,1\n", "no column file or run"),
-        ("file,speed\na.csv,1\n", "no column of conditions"),
+        ("file,colour\na.csv,1\n", "no column of conditions"),
         ("file,wind_speed\nb.csv,1\n", "no row for run 'a' of a.csv"),
         ("file,wind_speed\na.csv,fast\n", "wind_speed = 'fast' is not a number"),
         ("file,wind_speed\na.csv,1\na.csv,2\n", "'a.csv' occurs twice"),
@@ -209,7 +209,7 @@ def test_a_voltage_is_converted_by_formula_or_table(tmp_path: Path) -> None:
 
 
 def test_settings_are_checked() -> None:
-    assert parse_setting("wind_speed=12.5, width=0.2", "--set").width == 0.2
+    assert parse_setting("wind_speed=12.5, width=0.2", "--set")[0].width == 0.2
     for text, what in (
         ("wind_speed", "not of the form"),
         ("wind=1", "unknown key 'wind'"),

@@ -13,7 +13,6 @@ import pytest
 from tests.unit.importing.import_files import RATE, decay, written
 from tunnel_sim.files.importing.cleaning import (
     cleaned,
-    find_runs,
     from_zero,
     resolution,
     restarts,
@@ -21,6 +20,7 @@ from tunnel_sim.files.importing.cleaning import (
 )
 from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.records import read_records
+from tunnel_sim.files.importing.releases import find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.tables import Channel
 
 
@@ -47,6 +47,51 @@ def test_a_free_decay_is_not_cut(seed: int) -> None:
     (piece,) = find_runs(time, angle)
     assert piece.first == 0
     assert piece.last == time.size or zeta * omega * time[-1] > 5.0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_free_decay_of_rates_is_not_cut(seed: int) -> None:
+    rng = np.random.default_rng([8, seed])
+    time = np.arange(round(rng.uniform(8.0, 40.0) * RATE)) / RATE
+    phase, zeta = rng.uniform(0.0, 2.0 * np.pi), 10.0 ** rng.uniform(-3.0, -1.3)
+    omega = 2.0 * np.pi * rng.uniform(0.5, 4.0)
+    rate = np.exp(-zeta * omega * time) * np.cos(omega * time + phase) + rng.uniform(-0.05, 0.05)
+    rate += rng.choice([1e-4, 1e-2, 0.1]) * rng.standard_normal(time.size)
+    (piece,) = find_runs_of_rate(time, rate)
+    assert piece.first == 0
+    assert piece.last == time.size or zeta * omega * time[-1] > 4.0
+
+
+@pytest.mark.parametrize("hold", [0.0, 2.0])
+@pytest.mark.parametrize("bias", [0.0, 0.02])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_hand_before_a_release_is_cut_off_a_record_of_rates(hold: float, bias: float, seed: int) -> None:
+    rng = np.random.default_rng([9, seed])
+    time = np.arange(round(40.0 * RATE)) / RATE
+    free = -0.35 * 4.0 * np.pi * np.exp(-0.15 * time) * np.sin(4.0 * np.pi * time)
+    pull, steady = np.full(round(RATE), 0.35), 0.02 * rng.standard_normal(round(hold * RATE))
+    shaking = 0.3 * np.sin(2.0 * np.pi * 3.0 * np.arange(pull.size) / RATE) * np.hanning(pull.size)
+    before = np.concatenate([held(0.0, 1.0), pull + shaking, steady])
+    rate = np.concatenate([before, free]) + bias
+    rate += 2e-3 * rng.standard_normal(rate.size)
+    (piece,) = find_runs_of_rate(uniform(rate), rate)
+    # A quarter of a cycle of 0.5 s after the release, and never before it.
+    assert (piece.first - before.size) / RATE == pytest.approx(0.125, abs=0.03)
+    assert piece.last > before.size + 18.0 * RATE
+
+
+def test_an_imported_record_of_rates_begins_after_the_hand(tmp_path: Path) -> None:
+    time = np.arange(round(30.0 * RATE)) / RATE
+    free = -0.35 * 4.0 * np.pi * np.exp(-0.15 * time) * np.sin(4.0 * np.pi * time)
+    before = np.concatenate([held(0.0, 1.0), np.full(round(2.0 * RATE), 0.175), held(0.0, 1.0)])
+    rate = np.concatenate([before, free]) + 1e-3 * np.random.default_rng(1).standard_normal(
+        before.size + free.size
+    )
+    rows = "".join(f"{t:.3f},{y:.8f}\n" for t, y in zip(uniform(rate), rate, strict=True))
+    imported = read_records([written(tmp_path, "imu.csv", "time_s,yaw_rate_rad_s\n" + rows)])
+    (run,) = imported.campaign.runs
+    assert run.record.time_s[-1] == pytest.approx(29.87, abs=0.1)
+    assert any("at the largest rate after the release" in line for line in imported.remarks())
 
 
 def test_growing_motion_is_left_whole() -> None:

@@ -47,7 +47,7 @@ def test_columns_of_one_name_are_told_apart_by_their_place() -> None:
 
 def test_numbers_stated_above_the_table_are_in_seconds_and_hertz() -> None:
     found = layout("Rate: 2 kHz", "Step = 0,5 ms", "Gain: 3 V", "clock;swing")
-    assert found.facts == pytest.approx({"Rate": 2000.0, "Step": 5e-4, "Gain": 3.0})
+    assert found.facts == pytest.approx({"Rate": 2000.0, "Step (s)": 5e-4, "Gain (V)": 3.0})
 
 
 def pairs(*channels: Channel, headed: bool = True, **choices: object):

@@ -10,13 +10,8 @@ import pytest
 
 from tests.unit.importing.import_files import decay, written
 from tunnel_sim import Repeatability, TunnelError
-from tunnel_sim.files.importing.conditions import (
-    Conditions,
-    ImportChoices,
-    condition_of,
-    in_si,
-    parse_setting,
-)
+from tunnel_sim.files.importing.condition_names import Conditions, condition_of, in_si
+from tunnel_sim.files.importing.conditions import ImportChoices, parse_setting
 from tunnel_sim.files.importing.records import Imported, read_records
 from tunnel_sim.files.importing.units import split_unit
 
@@ -139,7 +134,7 @@ def test_a_condition_that_changes_between_releases_belongs_to_each_run(tmp_path:
 
 
 def test_a_unit_that_is_not_known_is_said_and_the_column_left_out(tmp_path: Path) -> None:
-    found = imported(tmp_path, ["Kr (N/m)", "Velocity (m/s)"], [16.12, 3.0])
+    found = imported(tmp_path, ["Kr (N/m)", "Velocity (m/s)"], [16.12, 3.0 * np.cos(TIME)])
     assert found.campaign.runs[0].spring_stiffness is None
     said = "\n".join(found.remarks())
     assert "'Kr (N/m)' is left out: its unit is not one of N m/rad" in said
@@ -186,7 +181,7 @@ def test_numbers_above_the_table_have_their_units(tmp_path: Path) -> None:
 
 def test_the_scatter_between_runs_may_be_stated(tmp_path: Path) -> None:
     path = table(tmp_path, ["Kr"], [16.12])
-    conditions = parse_setting(
+    conditions, _ = parse_setting(
         "repeatability_wind_speed=0.003, repeatability_mechanical_damping=0.01", "--set"
     )
     found = read_records([path], ImportChoices(conditions=conditions)).campaign

@@ -1,20 +1,19 @@
-"""Tables of binary formats: Parquet, workbooks, MATLAB, HDF5 and TDMS."""
+"""Tables of binary formats: Parquet, MATLAB, HDF5 and TDMS."""
 
 from __future__ import annotations
 
 import io
-import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from types import MappingProxyType
+from collections.abc import Iterator
 from typing import Any, Literal, cast
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from tunnel_sim.files.importing.arrays import RUN_IDS, check_size, tables_of_arrays
 from tunnel_sim.files.importing.tables import Channel, Table, by_texts, hold_order, names_runs
-from tunnel_sim.files.importing.text import find_layout, is_number, tables_of
+from tunnel_sim.files.importing.text import facts_in
 from tunnel_sim.files.importing.units import known_unit, split_unit
 from tunnel_sim.files.readers import USED_COLUMNS, FileTable, Reader, faults
 from tunnel_sim.files.reading import check_count, frame_schema, read_frame
@@ -60,134 +59,8 @@ def _read_tables(content: bytes, where: str) -> list[Table]:
 
 
 PARQUET = Reader("a Parquet file", limits.DATA_BYTES, (b"PAR1",), _read_run, _read_tables)
-
-_HEAD = 400
-
-
-def _read(content: bytes, where: str) -> list[Table]:
-    """The tables of a workbook, one for each sheet, or one for each run of it."""
-    fastexcel = library("fastexcel", "Excel", "import", where)
-    tables = []
-    with faults("an Excel workbook", where):
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            entries = archive.infolist()
-        size = sum(entry.file_size for entry in entries)
-        check_count(size, limits.DATA_BYTES, "bytes once unpacked", where, "save fewer sheets, or as text")
-        names = [entry.filename.lower() for entry in entries]
-        if "xl/workbook.xml" not in names:
-            raise TunnelError("is not an Excel workbook", where=where, remedy="save it as .xlsx, or as text")
-        for part, what in (("vbaproject", "macros"), ("externallink", "links to other files")):
-            if any(part in name for name in names):
-                remedy = "save a copy with values only, as .xlsx or as text"
-                raise TunnelError(f"the workbook holds {what}", where=where, remedy=remedy)
-        book = fastexcel.read_excel(content)
-        sheets: dict[str, list[list[str]]] = {}
-        described: dict[str, dict[str, Any]] = {}
-        for name in book.sheet_names:
-            sheet = book.load_sheet(name, header_row=None, dtypes="string", n_rows=_HEAD)
-            check_count(
-                sheet.width, limits.COLUMNS, "columns", where, "leave out columns that are not needed"
-            )
-            frame = sheet.to_polars().iter_rows() if sheet.width else ()
-            rows = [[cell or "" for cell in row] for row in frame]
-            heading = [cell.strip().lower() for cell in rows[0]] if rows else []
-            found: list[dict[str, Any]] = []
-            if "sheet" in heading:  # cells about other sheets; as texts, numbers would lose digits
-                texts = ("sheet", "run", "drive_hold")
-                kinds = {i: "string" if key in texts else "float" for i, key in enumerate(heading)}
-                body = book.load_sheet(name, header_row=None, skip_rows=1, dtypes=kinds).to_polars()
-                found = [dict(zip(heading, row, strict=True)) for row in body.iter_rows()]
-            if found and all(row["sheet"] in book.sheet_names for row in found):
-                described |= {row["sheet"]: row for row in found}
-            else:
-                sheets[name] = rows
-        for name, rows in sheets.items():
-            width = len(rows[0]) if rows else 0
-            layout = find_layout(rows, ["\t".join(row) for row in rows], ".", width)
-            if layout is None:
-                continue
-            numeric = [any(is_number(row[i]) for row in rows[layout.first :]) for i in range(width)]
-            kinds = {i: "float" if n and i != layout.runs else "string" for i, n in enumerate(numeric)}
-            body = book.load_sheet(name, header_row=None, skip_rows=layout.first, dtypes=kinds).to_polars()
-            headed = "names in the row above the numbers" if layout.headed else "no names of columns"
-            columns = counted(width, "column")
-            said = f"workbook: sheet '{name}', {columns}, numbers from row {layout.first + 1}, {headed}"
-            stated = described.get(name, {})
-            facts = {key: cell for key, cell in stated.items() if isinstance(cell, float)}
-            if hold := stated.get("drive_hold"):
-                facts["drive_hold"] = hold_order(hold)
-            run = stated.get("run") or ""
-            part = run or (name if len(book.sheet_names) > 1 else "")
-            labels = None if layout.runs is None else body.to_series(layout.runs)
-            table = Table((), part, {**layout.facts, **facts}, (said,), named=bool(run))
-            tables += tables_of(body, layout, ".", labels, table)
-    return tables
-
-
-WORKBOOK = Reader("an Excel workbook", limits.DATA_BYTES, (b"PK\x03\x04",), read_tables=_read)
-
-RUN_IDS = ("id", "run", "run_id")
-"""Members and attributes whose text is the name of the run that a group holds."""
-_LEAST = 16  # values: a shorter array is not a record
 _COMPRESSED = 15  # data type of an element that zlib has packed
 _HEADER = 128  # bytes before the first element of version 5
-_MOST_CHANNELS = 256  # rows of a matrix: it is turned so that they are fewer than its samples
-
-
-def tables_of_arrays(
-    arrays: Mapping[str, NDArray[np.generic]],
-    kind: str,
-    units: Mapping[str, str] = MappingProxyType({}),
-    runs: Mapping[str, str] = MappingProxyType({}),
-) -> list[Table]:
-    """Tables of arrays: those of the same group and length belong together.
-
-    Single numbers are facts of the tables of their group and below, those of a group ``rig`` of all beside
-    it.
-
-    Args:
-        arrays: by path, with ``/`` between groups; matrices hold one channel in each row or column.
-    """
-    facts: dict[str, dict[str, float]] = {}
-    groups: dict[tuple[str, int], list[Channel]] = {}
-    for path, array in arrays.items():
-        if array.dtype.kind not in "iufb":
-            continue
-        group, _, name = path.rpartition("/")
-        if array.size == 1:
-            above, _, last = group.rpartition("/")
-            facts.setdefault(above if last == "rig" else group, {})[name] = float(array.reshape(-1)[0])
-            continue
-        matrix = np.atleast_2d(np.squeeze(array))
-        if matrix.ndim != 2 or matrix.shape[1] == 0:
-            continue
-        if matrix.shape[0] > matrix.shape[1]:
-            matrix = matrix.T
-        if matrix.shape[1] < _LEAST or matrix.shape[0] > _MOST_CHANNELS:
-            continue
-        stem, unit = split_unit(name)
-        unit = units.get(path, unit)
-        for i, row in enumerate(matrix):
-            label = stem if matrix.shape[0] == 1 else f"{stem}[{i + 1}]"
-            channel = Channel(label, row.astype(np.float64), unit)
-            groups.setdefault((group, matrix.shape[1]), []).append(channel)
-    several = len({name for name, _ in groups}) > 1
-    tables = []
-    for (group, length), channels in groups.items():
-        part = runs.get(group) or (group.replace("/", "-") if several else "")
-        stated: dict[str, float] = {}
-        for above in sorted(facts, key=len):  # the nearest group counts
-            if above == "" or group == above or group.startswith(above + "/"):
-                stated |= facts[above]
-        said = f"{kind}: {counted(len(channels), 'channel')} of {counted(length, 'sample')}"
-        tables.append(Table(tuple(channels), part, stated, (said,), named=bool(runs.get(group))))
-    return tables
-
-
-def check_size(count: int, where: str) -> None:
-    """Refuse arrays whose number of values, as the file states it, is too large."""
-    most = limits.DATA_BYTES // 8
-    check_count(count, most, "numbers", where, "split the file, or leave out arrays that are not needed")
 
 
 def _read_hdf5(content: bytes, where: str) -> list[Table]:
@@ -217,6 +90,8 @@ def _read_hdf5(content: bytes, where: str) -> list[Table]:
                     runs[path] = stated
                 elif group and name == "drive_hold" and isinstance(stated := item.attrs[name], str):
                     attributes[f"{path}/{name}"] = np.array(hold_order(stated))
+                elif group and isinstance(stated := item.attrs[name], str):
+                    attributes.update(_number_in(path, name, stated))
 
         visit("", file)
         file.visititems(visit)  # does not follow links, so nothing outside the file is opened
@@ -273,7 +148,19 @@ def _read_mat(content: bytes, where: str) -> list[Table]:
             runs[group] = value
         elif below and name == "drive_hold":
             arrays[path] = np.array(hold_order(value))
+        else:
+            arrays |= _number_in(group, name, value)
     return tables_of_arrays(arrays, "MAT file", runs=runs)
+
+
+def _number_in(group: str, name: str, text: str) -> dict[str, NDArray[np.generic]]:
+    """The number that a text such as ``12 m/s`` states, by path; empty where it states none."""
+    found = facts_in([f"{name}: {text}"])
+    # A unit may hold the sign that separates the parts of a path.
+    return {
+        "/".join(filter(None, (group, one.replace("/", "∕")))): np.array(value)
+        for one, value in found.items()
+    }
 
 
 def _leaves(value: object, path: str = "") -> Iterator[tuple[str, NDArray[np.generic] | str]]:
@@ -320,9 +207,13 @@ def _read_tdms(content: bytes, where: str) -> list[Table]:
 
 
 def _tdms_numbers(properties: dict[str, object]) -> dict[str, float]:
-    return {
-        name: float(value) for name, value in properties.items() if isinstance(value, int | float | np.number)
-    }
+    found: dict[str, float] = {}
+    for name, value in properties.items():
+        if isinstance(value, int | float | np.number):
+            found[name] = float(value)
+        elif isinstance(value, str):  # such as "12 m/s"
+            found |= facts_in([f"{name}: {value}"])
+    return found
 
 
 HDF5 = Reader("an HDF5 file", limits.DATA_BYTES, (b"\x89HDF",), read_tables=_read_hdf5)

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from tunnel_sim.files.importing.cleaning import without_overflow
-from tunnel_sim.files.importing.conditions import ImportChoices, condition_of
-from tunnel_sim.files.importing.tables import Channel, Table, heading, is_input
-from tunnel_sim.files.importing.units import UNITS, kind_of, known_unit, written_unit
+from tunnel_sim.files.importing.condition_names import condition_of
+from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.tables import Channel, Table, is_input
+from tunnel_sim.files.importing.units import UNITS, claims, kind_of, known_unit, written_unit
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import Quantity
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
@@ -77,7 +78,7 @@ def find_pairs(table: Table, choices: ImportChoices, where: str) -> list[ColumnP
             if len(named) > 1:
                 said.append(f"times from '{time.name}', the first of {len(named)} columns of times")
         elif choices.rate is None:
-            for channel in _unconditional(block):
+            for channel in _unconditional(block, choices):
                 numbers = channel.values[np.isfinite(channel.values)][:_HEAD]
                 steps = np.diff(np.sort(numbers))
                 if channel.unit or _OTHER.search(channel.name) or steps.size < 8 or not steps.max() > 0.0:
@@ -110,27 +111,26 @@ def is_time(channel: Channel) -> bool:
     return kind == "time" or (kind == "" and _TIME.search(channel.name) is not None)
 
 
-def is_stated(channel: Channel, choices: ImportChoices) -> bool:
-    """Whether a column is stated to be the input, with its unit or without."""
-    bare = re.sub(r"\s*[(\[].*", "", channel.name.lower())
-    return choices.input is not None and choices.input.lower() in (
-        channel.name.lower(),
-        bare,
-        heading(channel),
-    )
+def stated_input(channels: Sequence[Channel], choices: ImportChoices) -> Channel | None:
+    """The column that is stated to be the input, by name, with its unit or without, or by number; None: none is."""
+    found = [] if choices.input is None else _named(channels, choices.input)
+    return found[0] if found else None
+
+
+def _named(channels: Sequence[Channel], wanted: str) -> list[Channel]:
+    """The columns of a name, as it is written in the file or without its unit, or of a number from 1 on."""
+    found = [channel for channel in channels if _matches(channel, wanted)]
+    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(channels):
+        found = [channels[int(wanted) - 1]]
+    return found
 
 
 def _matches(channel: Channel, wanted: str) -> bool:
-    name, unit = channel.name, channel.unit
-    return wanted.lower() in (
-        text.lower() for text in (name, stem(name), f"{name} ({unit})", f"{name}_{unit}")
-    )
+    return claims(wanted, channel.name, channel.unit) or claims(wanted, stem(channel.name), channel.unit)
 
 
 def _chosen(block: Sequence[Channel], wanted: str, option: str, where: str) -> list[Channel]:
-    found = [channel for channel in block if _matches(channel, wanted)]
-    if not found and wanted.isdigit() and 1 <= int(wanted) <= len(block):
-        found = [block[int(wanted) - 1]]
+    found = _named(block, wanted)
     if not found:
         what = f"no column '{one_line(wanted, 40)}' (columns found: {_listed(block)})"
         remedy = f"{option}: {did_you_mean(wanted, {channel.name for channel in block})}"
@@ -144,8 +144,9 @@ def _readings(
     if choices.angle:
         chosen = [c for name in choices.angle for c in _chosen(block, name, "--angle", where)]
         return [channel for channel in chosen if channel is not time]
-    free = [c for c in _unconditional(block) if c is not time]
-    others = [c for c in free if not is_input(c) and not is_stated(c, choices)]
+    free = [c for c in _unconditional(block, choices) if c is not time]
+    driving = stated_input(block, choices)
+    others = [c for c in free if not is_input(c) and c is not driving]
     levels: list[list[Channel]] = [[] for _ in range(7)]  # the most certain first
     for c in others:
         kind, named = kind_of(c.unit), _ANGLE.search(c.name) and not _RATE.search(c.name)
@@ -181,8 +182,14 @@ def _readings(
     return found
 
 
-def _unconditional(block: Sequence[Channel]) -> list[Channel]:
-    return [channel for channel in block if condition_of(channel.name, channel.unit) is None]
+def _unconditional(block: Sequence[Channel], choices: ImportChoices) -> list[Channel]:
+    stated = [text for text in choices.stated_by.model_dump().values() if text is not None]
+    return [
+        channel
+        for channel in block
+        if condition_of(channel.name, channel.unit) is None
+        and not any(claims(text, channel.name, channel.unit) for text in stated)
+    ]
 
 
 def _span(channel: Channel) -> float:
@@ -217,7 +224,7 @@ _HALF_TURN = pi  # half the span of an angle: more is taken as degrees
 _NUMBER = r"([+-]?\s*\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)"
 _FORMULA = re.compile(rf"^\s*(?:{_NUMBER}\s*(?=[+-]))?\s*{_NUMBER}?\s*\*?\s*[VvXx]\s*(?:{_NUMBER})?\s*$")
 _RATE_FACTS = re.compile(
-    r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate)($|[^a-z])"
+    r"(?i)(^|[^a-z])(fs|sample[ _]?rate|sampling[ _]?(rate|frequency)|samplerate|rate[ _]*\(?hz)($|[^a-z])"
 )
 _STEP_FACTS = re.compile(
     r"(?i)(^|[^a-z])(ts|dt|delta_?t|sample[ _]?(time|interval)|sampling[ _]?(time|interval)|wf_increment)($|[^a-z])"

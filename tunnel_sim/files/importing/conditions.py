@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from tunnel_sim.files.campaign_folder import IMPORT_RECIPE
-from tunnel_sim.files.importing.tables import Channel
+from tunnel_sim.files.importing.condition_names import (
+    RUN_KEYS,
+    Conditions,
+    condition_of,
+    in_si,
+    resembles,
+    units_of,
+)
+from tunnel_sim.files.importing.tables import names_runs
 from tunnel_sim.files.importing.text import read_cells
-from tunnel_sim.files.importing.units import UNITS, kind_of, split_unit
-from tunnel_sim.files.scatter_tables import SPREAD, Spread
+from tunnel_sim.files.importing.units import split_unit
 from tunnel_sim.files.toml_input import (
     NotNegative,
     OneLine,
@@ -27,36 +31,21 @@ from tunnel_sim.files.toml_input import (
     read_document,
     validate,
 )
-from tunnel_sim.vocabulary.drive import InputColumn
+from tunnel_sim.vocabulary.drive import Hold, InputColumn
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line, shown
 
 
-class Conditions(StrictModel):
-    """Conditions of runs, sizes of the rig and the scatter between runs, as in ``campaign.toml``."""
-
-    wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
-    spring_stiffness: NotNegative | None = optional(
-        "a number in N m/rad, 0 for a driven body without a spring"
-    )
-    air_density: Positive | None = optional("a positive number in kg/m3")
-    release_angle: float | None = optional("a number in rad")
-    yaw_inertia: Positive | None = optional("a positive number in kg m2")
-    frontal_area: Positive | None = optional("a positive number in m2")
-    reference_length: Positive | None = optional("a positive number in m")
-    width: Positive | None = optional("a positive number in m")
-    repeatability_wind_speed: Spread | None = optional(SPREAD)
-    repeatability_spring_stiffness: Spread | None = optional(SPREAD)
-    repeatability_mechanical_damping: Spread | None = optional(SPREAD)
+class Unstated(TunnelError):
+    """A condition of a run that only the user can state, whatever else is read beside it."""
 
 
-RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
-RUN_KEYS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
-OF_REPEATABILITY = "repeatability_"
-"""Begins the keys of ``[repeatability]`` where they stand beside conditions of the same names."""
+class StatedBy(StrictModel):
+    """``[choices.stated_by]``: the names of columns or numbers of the files that state a condition."""
 
-SPREAD_KEYS = tuple(key for key in Conditions.model_fields if key.startswith(OF_REPEATABILITY))
-OF_CAMPAIGN = (*RIG_KEYS, *SPREAD_KEYS)
-"""The keys that are the same in all runs."""
+    wind_speed: OneLine | None = optional("the name of a column or number")
+    spring_stiffness: OneLine | None = optional("the name of a column or number")
+    air_density: OneLine | None = optional("the name of a column or number")
+    release_angle: OneLine | None = optional("the name of a column or number")
 
 
 class Stretch(StrictModel):
@@ -90,6 +79,10 @@ class ImportChoices(StrictModel):
     rest: float | None = optional("the reading at rest in rad, to be subtracted from every run")
     input: OneLine | None = optional("the name of the input's column of a driven run, or 'none'")
     input_as: InputColumn | None = optional("'moment_nm', 'drive' or 'base_rad'")
+    input_hold: Hold | None = optional("'zero' or 'linear'")
+    leave_out: tuple[OneLine, ...] = Field(
+        default=(), strict=False, description="a list of names of runs or files"
+    )
     cut: bool = Field(default=True, description="false to keep records whole")
     stretches: tuple[Stretch, ...] = Field(
         default=(),
@@ -98,6 +91,7 @@ class ImportChoices(StrictModel):
     )
     name: OneLine | None = optional("a pattern of file names such as 'S{spring}_V{wind_speed}_*'")
     conditions: Conditions = Field(default=Conditions(), description="a [choices.conditions] table")
+    stated_by: StatedBy = Field(default=StatedBy(), description="a [choices.stated_by] table")
 
     def stretch_of(self, file: str, run: str) -> Stretch:
         """What is stated about where a run lies in its file and rests."""
@@ -129,18 +123,21 @@ def read_recipe(path: Path) -> ImportChoices:
     return read_document(Recipe, path, missing=missing).choices
 
 
-def parse_setting(text: str, where: str) -> Conditions:
-    """Conditions from ``key=value``, separated by commas, such as ``wind_speed=12.5, air_density=1.2``."""
-    values: dict[str, float] = {}
+def parse_setting(text: str, where: str) -> tuple[Conditions, StatedBy]:
+    """Conditions from ``key=value``, separated by commas; a value is a number, or a name in the files."""
+    numbers: dict[str, float] = {}
+    names: dict[str, str] = {}
     for part in text.split(","):
-        key, _, value = part.partition("=")
+        key, _, value = (piece.strip() for piece in part.partition("="))
         try:
-            values[key.strip()] = float(value)
+            numbers[key] = float(value)
         except ValueError:
-            what = f"'{part.strip()}' is not of the form key=number"
-            remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
-            raise TunnelError(what, where=where, remedy=remedy) from None
-    return validate(Conditions, values, Path(where))
+            if not value:
+                what = f"'{part.strip()}' is not of the form key=number"
+                remedy = f"give for example wind_speed=12.5; keys are {', '.join(Conditions.model_fields)}"
+                raise TunnelError(what, where=where, remedy=remedy) from None
+            names[key] = value
+    return validate(Conditions, numbers, Path(where)), validate(StatedBy, names, Path(where))
 
 
 _ALIASES = {
@@ -150,83 +147,6 @@ _ALIASES = {
     "angle": "release_angle",
 }
 _NUMBER = r"[+-]?\d+(?:[.,p]\d+)?"
-_NAMES = {
-    "wind_speed": r"(wind|air|flow|free ?stream|tunnel) ?(speed|velocity)|v ?wind|"
-    r"(wind|luft|str[öo]mungs|anstr[öo]m)geschwindigkeit",
-    "air_density": r"(air ?)?density|rho( ?air)?|ρ|(luft)?dichte",
-    "spring_stiffness": r"((spring|torsional|rotational) ?)?stiffness|spring ?(constant|rate)|k ?r|"
-    r"(torsions|dreh)?feder(konstante|steifigkeit|rate)|(dreh|torsions)?steifigkeit",
-    "release_angle": r"(release|initial|start) ?angle|(anfangs|start|auslenk)winkel|(theta|psi|beta|[θψβ]) ?0",
-}
-_KEYS = {key: re.compile(f"(?i)({names})") for key, names in _NAMES.items()}
-_SYMBOL = re.compile(r"(?i)[vu](_?(0|inf|∞))?|wind|speed")
-_KINDS = {
-    "wind_speed": "speed",
-    "air_density": "density",
-    "spring_stiffness": "stiffness",
-    "release_angle": "angle",
-}
-_OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
-_EVEN = 1e-9  # of a value: a column that varies less is constant
-
-
-def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
-    """The condition or size, a key of `Conditions`, that a column states, or a number ``alone``."""
-    if name in OF_CAMPAIGN and unit == "":
-        return name
-    name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
-    plain = re.sub(r"[\s_.-]+", " ", name).strip()
-    found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
-    # No unit of time measures what is named so.
-    symbol = kind_of(unit) == "speed" or unit == "ms" or (alone and unit == "" and plain.lower() == "speed")
-    return "wind_speed" if found is None and symbol and _SYMBOL.fullmatch(name) else found
-
-
-def in_si(key: str, unit: str) -> float | None:
-    """The factor to SI of a condition in a unit; None where the unit does not measure it."""
-    unit = "m/s" if (key, unit) == ("wind_speed", "ms") else unit  # no wind speed is in milliseconds
-    return 1.0 if unit == "" else UNITS[_KINDS[key]].get(unit)
-
-
-def from_facts(facts: Mapping[str, float], said: list[str]) -> dict[str, float]:
-    """Conditions and sizes, by key of `Conditions` and in its units, that numbers of a file state; each is said."""
-    found = {}
-    for heading, value in facts.items():
-        name, unit = split_unit(heading)
-        key = condition_of(name, unit, alone=True)
-        if key is not None and (factor := in_si(key, unit)) is not None:
-            found[key] = float(value) * factor
-        elif key is not None:
-            said.append(_no_unit(heading, key))
-    said += [f"{key} = {value:g} from the file" for key, value in found.items()]
-    return found
-
-
-def from_column(key: str, column: Channel, rows: NDArray[np.bool_], said: list[str]) -> float | None:
-    """The condition of a run that a column states, in the unit of `Conditions`; None where it says nothing."""
-    values = column.values[rows]
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return None
-    factor = in_si(key, column.unit)
-    if factor is None:
-        said.append(_no_unit(column.name, key))
-        return None
-    low, middle, high = map(float, np.quantile(values, (0.05, 0.5, 0.95)))
-    if high - low <= _EVEN * abs(middle):
-        return middle * factor
-    off = key == "wind_speed" and low <= 0.0 and middle < _OFF * (high - low)
-    said.append(
-        f"the column '{column.name}' varies from {low:.4g} to {high:.4g}: {key} is "
-        + ("zero, about which it lies" if off else f"its median, {middle * factor:.6g}")
-    )
-    return 0.0 if off else middle * factor
-
-
-def _no_unit(heading: str, key: str) -> str:
-    kind = ", ".join(UNITS[_KINDS[key]])
-    left = f"'{one_line(heading, 60)}' is left out"
-    return f"{left}: its unit is not one of {kind}; --set {key}=NUMBER states it"
 
 
 def name_pattern(text: str) -> re.Pattern[str]:
@@ -265,21 +185,34 @@ def _same(name: str) -> str:
     return unicodedata.normalize("NFC", name).lower()
 
 
+_OF_FILES = re.compile(r"(?i)(file|datei)(_? ?name)?|sheet|blatt|tabelle|id")
+
+
 class ConditionTable:
-    """A table of conditions in a text file, one row for each file or run, with keys of ``campaign.toml``."""
+    """A table of conditions in a text file, one row for each file or run, with the names that files use too."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         names, rows = read_cells(path)
-        keys = [name.strip().lower() for name in names]
-        self._key = next((i for i, name in enumerate(keys) if name in ("file", "run", "id")), None)
-        used = {name: i for i, name in enumerate(keys) if name in RUN_KEYS}
+        split = [split_unit(name) for name in names]
+        keys = [condition_of(*heading, alone=True) or resembles(*heading) for heading in split]
+        self._key = next((i for i, name in enumerate(names) if _names_a_run(name)), None)
+        used = {key: i for i, key in enumerate(keys) if key in RUN_KEYS}
         if self._key is None or not used:
             wanted = "file or run" if self._key is None else "of conditions"
             what = f"no column {wanted} (columns found: {one_line(', '.join(names), 80)})"
             remedy = f"name the columns file (or run) and {', '.join(RUN_KEYS)}"
             raise TunnelError(what, where=shown(path), remedy=remedy)
-        self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and keys[i] not in used)
+        factors = {key: in_si(key, split[i][1]) for key, i in used.items()}
+        for key in (key for key, factor in factors.items() if factor is None):
+            what = f"the column '{one_line(names[used[key]], 40)}' is not in a unit of {key}"
+            raise TunnelError(what, where=shown(path), remedy=f"use one of {units_of(key)}")
+        self.ignored = tuple(n for i, n in enumerate(names) if i != self._key and i not in used.values())
+        self.said = [
+            f"{path.name}: {key} from '{names[i]}'"
+            for key, i in used.items()
+            if key and names[i].strip().lower() != key
+        ]
         self._rows: dict[str, dict[str, float]] = {}
         for row in rows:
             name = row[self._key].strip()
@@ -289,12 +222,12 @@ class ConditionTable:
             values = {}
             for key, text in ((key, row[i]) for key, i in used.items() if row[i].strip()):
                 try:
-                    values[key] = float(text.replace(",", "."))
+                    values[key] = float(text.replace(",", ".")) * (factors[key] or 1.0)
                 except ValueError:
                     raise TunnelError(
                         f"{key} = '{one_line(text, 30)}' is not a number",
                         where=f"{shown(path)}, '{one_line(name)}'",
-                        remedy="give a number in SI units",
+                        remedy="give a number",
                     ) from None
             validate(Conditions, values, path)
             self._rows[_same(name)] = values
@@ -306,3 +239,7 @@ class ConditionTable:
                 return self._rows[_same(name)]
         what = f"no row for run '{one_line(run)}' of {one_line(path.name)}"
         raise TunnelError(what, where=shown(self.path), remedy="add a row with that run or file")
+
+
+def _names_a_run(heading: str) -> bool:
+    return names_runs(heading) or _OF_FILES.fullmatch(heading.strip()) is not None

@@ -2,91 +2,77 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
 from tunnel_sim.files.campaign_folder import IMPORT_PICTURE, IMPORT_RECIPE, write_campaign
-from tunnel_sim.files.importing.cleaning import (
-    RecordPiece,
-    find_runs,
-    from_rest,
-    from_zero,
-    resolution,
-    stated_piece,
-)
+from tunnel_sim.files.importing.cleaning import resolution
 from tunnel_sim.files.importing.columns import read_calibration, stem
-from tunnel_sim.files.importing.conditions import (
+from tunnel_sim.files.importing.condition_names import (
     OF_CAMPAIGN,
     OF_REPEATABILITY,
     RIG_KEYS,
-    RUN_KEYS,
     SPREAD_KEYS,
-    Conditions,
+)
+from tunnel_sim.files.importing.conditions import (
     ConditionTable,
     ImportChoices,
     from_name,
     name_pattern,
 )
+from tunnel_sim.files.importing.imported_run import ImportedRun as ImportedRun
+from tunnel_sim.files.importing.imported_run import imported_run
 from tunnel_sim.files.importing.raw_records import RawRecord, raw_records
+from tunnel_sim.files.importing.releases import RecordPiece, find_runs, find_runs_of_rate
 from tunnel_sim.files.importing.source import Source, read_source
-from tunnel_sim.files.plausible import checked_record, plausible_values
+from tunnel_sim.files.importing.stated import name_hints
+from tunnel_sim.files.plausible import plausible_values
 from tunnel_sim.files.reading import check_count
-from tunnel_sim.files.toml_input import one_line, shown, validate
+from tunnel_sim.files.toml_input import one_line, shown
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.campaign import (
     Campaign,
     Quantity,
     Repeatability,
     RigProperties,
-    Run,
     SensorProperties,
-    needs_density,
 )
-from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
-from tunnel_sim.vocabulary.errors import TunnelError
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.record import Array
 
-_JUDGED = 500_000  # samples in which the cycles of a long record are counted
-_WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
-
-
-@dataclass(frozen=True, eq=False)
-class ImportedRun:
-    """A run, or what was taken for one.
-
-    Args:
-        rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
-    """
-
-    id: str
-    raw: RawRecord
-    piece: RecordPiece
-    run: Run | None
-    said: tuple[str, ...]
-    rest: float | None
-    sizes: Mapping[str, float]
-
-    @property
-    def reading(self) -> Array:
-        """Of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
-        return self.raw.cleaned.reading[self.piece.first : self.piece.last]
+_FINDERS: Mapping[Quantity, Callable[[Array, Array], list[RecordPiece]]] = {
+    "angle": find_runs,
+    "rate": find_runs_of_rate,
+}
+"""How releases are found; in accelerations a hand that holds the body does not show."""
 
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """What was read from files."""
+    """What was read from files.
+
+    Args:
+        sizes: of the rig and the scatter between runs, by key of `Conditions`.
+    """
 
     campaign: Campaign
     parts: tuple[ImportedRun, ...]
     sources: tuple[Source, ...]
     choices: ImportChoices
     said: tuple[str, ...]
+    sizes: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def held(self) -> dict[str, dict[str, float]]:
+        """Conditions by run, and sizes under the empty name, that are taken once the air density is stated."""
+        if not any(part.without_density for part in self.parts):
+            return {}
+        rig = {key: value for key, value in self.sizes.items() if key in _WITH_DENSITY}
+        return {"": rig, **{part.id: dict(part.held) for part in self.parts if part.held}}
 
     def remarks(self, path: Path | None = None) -> list[str]:
         """How all files or one were read and what was changed, each once with the runs that it concerns."""
@@ -111,37 +97,51 @@ def read_records(
     *,
     conditions: Path | None = None,
     name: str = "",
+    later: bool = False,
 ) -> Imported:
-    """Read files as instruments write them; nothing is written, and what ``choices`` leave open is found."""
+    """Read files as instruments write them; nothing is written, and what ``choices`` leave open is found.
+
+    Args:
+        conditions: a table of conditions; None: none.
+        name: of the campaign; empty: that of the first file.
+        later: whether air densities that are missing may be stated later (`Imported.held`).
+    """
     calibration = read_calibration(choices.calibration)
     pattern = None if choices.name is None else name_pattern(choices.name)
     table = None if conditions is None else ConditionTable(conditions)
     sources: list[Source] = []
     raws: list[RawRecord] = []
-    for path in files:
+    for path in (path for path in files if path.name not in choices.leave_out):
         source = read_source(path, choices)
         named = from_name(pattern, path)
         raws += raw_records(source, choices, calibration, named, several=len(files) > 1)
         sources.append(source)
     if not raws:
-        raise TunnelError("no files", remedy="name at least one")
+        what = "every file is left out" if files else "no files"
+        raise TunnelError(what, remedy="name at least one")
     kinds = {raw.quantity for raw in raws}
     if len(kinds) > 1:
         remedy = "import one quantity at a time, with --angle"
         raise TunnelError(f"the runs hold {' and '.join(sorted(kinds))}", remedy=remedy)
-    ids = [raw.id for raw in raws]
+    ids, hints = [raw.id for raw in raws], name_hints([source.path for source in sources])
     parts = []
     for at, raw in enumerate(raws):
         label = raw.id if ids.count(raw.id) == 1 else f"{raw.id}-{ids[: at + 1].count(raw.id)}"
         time, reading = raw.cleaned.time_s, raw.cleaned.reading
-        cut = choices.cut and raw.quantity == "angle" and not raw.whole and raw.input is None
-        pieces = find_runs(time, reading) if cut else [RecordPiece(0, time.size)]
+        find = _FINDERS.get(raw.quantity)
+        cut = choices.cut and not raw.whole and raw.input is None
+        pieces = find(time, reading) if cut and find is not None else [RecordPiece(0, time.size)]
         for number, piece in enumerate(pieces, 1):
             run = label if len(pieces) == 1 else f"{label}-{number}"
-            parts.append(_part(run, raw, piece, choices, table))
+            parts.append(imported_run(run, raw, piece, choices, table, hints[raw.source], later=later))
+    names = {*(part.id for part in parts), *(path.name for path in files)}
+    for left in (left for left in choices.leave_out if left not in names):
+        what = f"no run or file '{one_line(left, 60)}' to leave out"
+        raise TunnelError(what, where="--leave-out", remedy=did_you_mean(left, names))
     count = sum(part.piece.last - part.piece.first for part in parts)
     check_count(count, limits.CAMPAIGN_SAMPLES, "samples in all files", "", "import fewer files at a time")
-    campaign = _campaign(parts, choices, name or one_line(files[0].stem), raws[0].quantity)
+    sizes = _sizes(parts, choices)
+    campaign = _campaign(parts, sizes, name or one_line(files[0].stem), raws[0].quantity)
     # For the recipe: what was found, where all records share it.
     known: dict[str, Any] = {**sources[0].known}
     units, columns = {raw.unit for raw in raws}, tuple(dict.fromkeys(stem(raw.column) for raw in raws))
@@ -159,84 +159,18 @@ def read_records(
         said.append(
             "the runs' stated rests differ: every run is fitted with a zero of its own (zero = 'per_run')"
         )
+    said += [] if table is None else table.said
     if table is not None and table.ignored:
         said.append(f"columns of {table.path.name} that are not conditions: {', '.join(table.ignored)}")
-    return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said))
+    return Imported(campaign, tuple(parts), tuple(sources), resolved, tuple(said), sizes)
 
 
-def _part(
-    name: str, raw: RawRecord, piece: RecordPiece, choices: ImportChoices, table: ConditionTable | None
-) -> ImportedRun:
-    where = f"{shown(raw.source)}, run '{name}'"
-    stretch = choices.stretch_of(raw.source.name, name)
-    piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
-    kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
-    time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
-    said = []
-    if piece.first:
-        said.append(f"begins at {time[0]:.4g} s, where the body is released")
-    if piece.last < raw.cleaned.time_s.size:
-        said.append(f"ends at {time[-1]:.4g} s, with the motion or before the next run")
-    rest = choices.rest if stretch.rest is None else stretch.rest
-    if rest is not None:
-        reading = from_rest(reading, rest, sensor.unit, said, where)
-    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
-    in_table = {} if table is None else table.of(raw.source, name)
-    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
-    measured = raw.measured(float(time[0]), float(time[-1]), said)
-    stated = raw.stated | measured | raw.named | in_table | given
-    sizes = {key: stated.pop(key) for key in OF_CAMPAIGN if key in stated}
-    sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
-    validate(Conditions, stated | sizes, raw.source)
-    plausible_values(stated | sizes, where)
-    if "wind_speed" not in stated:
-        if _WIND_ON.search(f"{raw.source.stem} {name}"):
-            what = "the name says that the wind is on, but not how fast"
-            remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
-            raise TunnelError(what, where=where, remedy=remedy)
-        said.append("wind_speed is not stated: wind-off is assumed")
-    rig = choices.conditions
-    scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
-    if "air_density" not in stated and needs_density(stated.get("wind_speed", 0.0), *scales):
-        what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
-        raise TunnelError(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
-    drive = None
-    if raw.input is not None:
-        column, values = raw.input
-        order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
-        hold: Hold = HOLDS[int(order)] if order in (0.0, 1.0) else "linear"
-        gain = gain if column == "drive" else None
-        said += [f"drive_hold = {hold} from the file"] if order in (0.0, 1.0) else []
-        said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
-        drive = Drive(column, values[kept], hold, gain)
-    without_spring_needs_drive(stated.get("spring_stiffness"), drive, where)
-    time = from_zero(time)
-    try:
-        record, stride = None, time.size // _JUDGED
-        release = None if drive is not None else stated.get("release_angle")
-        if drive is None and stride > 1:
-            # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
-            with suppress(TunnelError):
-                checked_record(time[::stride], reading[::stride], "the reading", sensor, release, where)
-                record = Record(time, reading)
-        if record is None:
-            record = checked_record(time, reading, "the reading", sensor, release, where, drive)
-    except TunnelError as error:
-        return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
-    run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
-    return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes)
+_WITH_DENSITY = ("frontal_area", "reference_length")
+"""Sizes that a campaign takes beside wind-on runs only where these state their air density."""
 
 
-def _campaign(
-    parts: Sequence[ImportedRun], choices: ImportChoices, name: str, quantity: Quantity
-) -> Campaign:
-    runs = tuple(part.run for part in parts if part.run is not None)
-    if not runs:
-        part = parts[0]
-        what = f"no run can be used; the first one is {part.said[-1]}"
-        remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
-        raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
-    # The sizes of the rig and the scatter between runs, as stated or else from the files.
+def _sizes(parts: Sequence[ImportedRun], choices: ImportChoices) -> dict[str, float]:
+    """The sizes of the rig and the scatter between runs, as stated or else from the files."""
     common = choices.conditions.model_dump(include=set(OF_CAMPAIGN), exclude_none=True)
     plausible_values(common, "--set")
     for part in parts:
@@ -245,12 +179,28 @@ def _campaign(
                 what = f"{key} = {value:g}, and {common[key]:g} in another run"
                 remedy = f"give --set {key}=NUMBER, or import them separately"
                 raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
+    return common
+
+
+def _campaign(
+    parts: Sequence[ImportedRun], sizes: Mapping[str, float], name: str, quantity: Quantity
+) -> Campaign:
+    runs = tuple(part.run for part in parts if part.run is not None)
+    if not runs:
+        part = parts[0]
+        what = f"no run can be used; the first one is {part.said[-1]}"
+        remedy = "check --time, --time-unit, --rate, --angle and --unit, or keep it whole with --no-cut"
+        raise TunnelError(what, where=f"{shown(part.raw.source)}, run '{part.id}'", remedy=remedy)
+    open_density = any(part.without_density for part in parts)
+    rig = {
+        key: sizes[key] for key in RIG_KEYS if key in sizes and not (open_density and key in _WITH_DENSITY)
+    }
     files = list(dict.fromkeys(part.raw.source.name for part in parts))
     used = [part for part in parts if part.run is not None]
-    spread = {key.removeprefix(OF_REPEATABILITY): common[key] for key in SPREAD_KEYS if key in common}
+    spread = {key.removeprefix(OF_REPEATABILITY): sizes[key] for key in SPREAD_KEYS if key in sizes}
     return Campaign(
         name,
-        RigProperties(**{key: common[key] for key in RIG_KEYS if key in common}),
+        RigProperties(**rig),
         SensorProperties(
             # Of the readings as they are in the files: what is subtracted need not be a whole number of steps.
             resolution=resolution([part.reading for part in used]),
@@ -280,6 +230,12 @@ _RUN = {
     "air_density": "kg/m3: needed for Cnβ and Cnr",
     "release_angle": "rad, nominal; optional",
 }
+_RIG_OF_JOINT = {"yaw_inertia": "kg m2, nominal inertia about the joint; optional"}
+_RUN_OF_JOINT = {
+    "spring_stiffness": "N m/rad: 0 for a joint without a spring",
+    "drive_gain": "N m per unit of a column drive; estimated where it is not stated",
+}
+"""Of driven runs in still air: no coefficient of the wind is sought in them."""
 ORIGINAL = "# Original: "
 _RUNS_HEAD = "# What the files do not say about the runs: fill it in, and remove the # before it."
 
@@ -345,11 +301,20 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too."""
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
-    unknown = [f"# {key} =   # {why}" for key, why in _RIG.items() if key not in rig]
+    joint = _is_joint(document)
+    unknown = [
+        f"# {key} =   # {why}" for key, why in (_RIG_OF_JOINT if joint else _RIG).items() if key not in rig
+    ]
     head = [tomli_w.dumps(tables), "\n".join(["[rig]", *unknown, tomli_w.dumps(rig)])]
     head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
     blocks = []
     for run in document["runs"]:
-        unknown = [f"# {key} =   # {why}" for key, why in _RUN.items() if key not in run]
+        wanted = _RUN_OF_JOINT if joint else _RUN
+        unknown = [f"# {key} =   # {why}" for key, why in wanted.items() if key not in run]
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
     return "\n".join([*originals, *head, *blocks])
+
+
+def _is_joint(document: Mapping[str, Any]) -> bool:
+    """Whether all runs are driven, and none is in wind."""
+    return all("drive_hold" in run and not run.get("wind_speed") for run in document["runs"])

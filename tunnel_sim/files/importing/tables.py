@@ -26,7 +26,9 @@ _RUN_NAMES = re.compile(
     r"(?i)(run|trial|versuch|lauf)[ _]?(id|name|no|nr|number|nummer|#)?\.?|"
     r"(mess(ung|reihe)|versuchs)[ _]?(nr|nummer)\.?"
 )
-_LEAST_ROWS = 8  # of a run, on average: a column that changes more often numbers something else
+LEAST_ROWS = 16
+"""Of a record: a shorter table beside longer ones holds conditions or sizes."""
+_LEAST_EACH = 8  # rows of a run, on average: a column that changes more often numbers something else
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +126,7 @@ def by_label(table: Table, column: str, starts: NDArray[np.integer], names: Sequ
     """A table as one for each run that its column names; as it is where the column cannot name runs."""
     runs = [name for name in names if name]
     rows = table.channels[0].values.size if table.channels else 0
-    if not 0 < len(names) <= rows / _LEAST_ROWS or len(set(runs)) < len(runs):
+    if not 0 < len(names) <= rows / _LEAST_EACH or len(set(runs)) < len(runs):
         return [table]
     channels = [channel for channel in table.channels if channel.name != column]
     said = (*table.said, f"the column '{column}' names the runs")

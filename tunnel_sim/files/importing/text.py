@@ -29,11 +29,13 @@ _NUMBER = {
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
 }
 _FACT = re.compile(
-    r"(?:^|[,;|\t])\W*([^\W\d_][^\d:=,;\t]*?)\s*[:=,;\t]\s*([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
+    r"(?:^|[,;|\t])\W*([^\W\d_](?:[^\d:=,;\t]|(?<=[^\W_])\d|(?<=\^)-?\d)*?)\s*[:=,;\t]\s*"
+    r"(?:([^\s\d:=,;\t|][^:=,;\t|]{0,14}?)\s*[;,\t]\s*)?([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
     r" *([;,\t]? *[^\s\d;,\t|=:][^;,\t|=:]*(?![^;,\t|]))?"
 )
-"""A name, a number, and its unit, perhaps in the next cell."""
+"""A name, perhaps a cell with its unit, a number, and its unit, perhaps in the next cell."""
 _HERTZ = {"hz": 1.0, "khz": 1e3, "mhz": 1e6}
+_SI = {kind: next(unit for unit, factor in units.items() if factor == 1.0) for kind, units in UNITS.items()}
 _LONG_UNIT = 8  # characters: a longer text is a name
 
 
@@ -62,6 +64,28 @@ class Layout:
         """Index of the column that says to which run a row belongs."""
         columns = enumerate(zip(self.names, self.units, strict=True))
         return next((i for i, (name, unit) in columns if names_runs(name) and not unit), None)
+
+
+def facts_in(lines: Sequence[str]) -> dict[str, float]:
+    """Numbers that lines state, such as ``Sample rate: 1000 Hz`` or ``V = 54 km/h``, by name and unit.
+
+    Returns:
+        Values in SI units where the unit is known, which the name then ends with in brackets.
+    """
+    facts = {}
+    for line in (line.replace('"', "") for line in lines if len(line) <= _LONG_LINE):
+        for name, before, number, behind in _FACT.findall(line):
+            name = name.strip()
+            if before and known_unit(before) is None:  # a cell that is the name, behind a heading
+                name, before = before, ""
+            text = (before or behind.lstrip(";,\t ")).strip("()[] ")
+            unit, value = known_unit(text), float(number.replace(",", "."))
+            if unit is not None:
+                text, value = _SI[kind_of(unit)], value * UNITS[kind_of(unit)][unit]
+            elif text.lower() in _HERTZ:
+                text, value = "", value * _HERTZ[text.lower()]
+            facts[f"{name} ({text})" if text else name] = value
+    return facts
 
 
 def find_layout(
@@ -105,15 +129,7 @@ def find_layout(
     names = list(above[-1][1]) if above else []
     split = [split_unit(name) for name in names]
     named = [name or f"column {i + 1}" for i, (name, _) in enumerate(split)]
-    facts = {}  # such as "Sample rate: 1000 Hz" or "V = 54 km/h", in SI units where the unit is known
-    for line in (line for line in lines[: above[-1][0] if above else first] if len(line) <= _LONG_LINE):
-        for fact, number, text in _FACT.findall(line):
-            text = text.lstrip(";,\t ").strip("()[] ")
-            unit = known_unit(text) or ""
-            factor = _HERTZ.get(text.lower()) or UNITS.get(kind_of(unit), {}).get(unit, 1.0)
-            strange = text and not unit and text.lower() not in _HERTZ
-            heading = f"{fact.strip()} ({text})" if strange else fact.strip()
-            facts[heading] = float(number.replace(",", ".")) * factor
+    facts = facts_in(lines[: above[-1][0] if above else first])
     if len(set(named)) < len(named):  # ambiguous names: the position distinguishes them
         named = [name if named.count(name) == 1 else f"{name} #{i + 1}" for i, name in enumerate(named)]
     return Layout(
@@ -183,7 +199,7 @@ def read_text_tables(
     check_count(lines, limits.CAMPAIGN_SAMPLES, "lines", where, "split the file, or thin it out")
     cells = lines * dialect.width
     check_count(cells, limits.CELLS, "cells", where, "leave out columns that are not needed")
-    layout = find_layout([dialect.split(line) for line in head], head, dialect.decimal, dialect.width)
+    layout = find_layout([_cells(line, dialect) for line in head], head, dialect.decimal, dialect.width)
     sample = [dialect.split(line) for line in body if line.strip()]
     if layout is None:
         what = f"no numbers in the first {counted(len(head), 'line')}"
@@ -230,6 +246,17 @@ def read_text_tables(
     except pl.exceptions.PolarsError as error:
         what = f"not a table of text ({one_line(error, 60)})"
         raise TunnelError(what, where=where, remedy="give every line one value for each column") from None
+
+
+def _cells(line: str, dialect: Dialect) -> list[str]:
+    """The cells of a line of the head, which may have names between other delimiters than the numbers below."""
+    own = dialect.split(line)
+    if len(own) != 1 or dialect.width < 2:
+        return own
+    others = (
+        Dialect(sign, dialect.decimal, dialect.width).split(line) for sign in _NAMES.values() if sign != " "
+    )
+    return next((cells for cells in others if len(cells) == dialect.width and all(cells)), own)
 
 
 def _holds_texts(rows: Sequence[Sequence[str]], column: int, decimal: str) -> bool:

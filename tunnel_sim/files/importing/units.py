@@ -56,7 +56,7 @@ _WORDS = {
 }
 _UNIT_OF = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 _ALIKE = str.maketrans(
-    {"µ": "u", "μ": "u", "²": "2", "³": "3", "¹": "1", "⁻": "-", "−": "-", "º": "°", "˚": "°"}
+    {"∕": "/", "µ": "u", "μ": "u", "²": "2", "³": "3", "¹": "1", "⁻": "-", "−": "-", "º": "°", "˚": "°"}
     | dict.fromkeys(" ·⋅*")
 )
 _GERMAN = re.compile(
@@ -84,8 +84,13 @@ def known_unit(text: str) -> str | None:
     """The unit that a text names; None where it names none that is known."""
     word = text.strip().strip("()[]{}<>").strip()
     word = re.sub(r"\bGrad\b", "altgrad", word)  # a German degree; "grad" is the gon in English
-    word = word.lower().translate(_ALIKE)
+    word = squeezed(word)
     return _UNIT_OF.get(word) or _UNIT_OF.get(word.removesuffix("."))
+
+
+def squeezed(text: str) -> str:
+    """A unit in small letters, without blanks and dots, and with plain digits for raised ones."""
+    return text.lower().translate(_ALIKE)
 
 
 def kind_of(unit: str) -> str:
@@ -109,6 +114,20 @@ def split_unit(heading: str) -> tuple[str, str]:
     if run:
         name = f"{name}{run[0]}"
     return name, "°C" if unit == "deg" and _TEMPERATURE.search(name) else unit
+
+
+def claims(text: str, name: str, unit: str) -> bool:
+    """Whether a text names a column or a number as a heading does: by its name alone, or with its unit."""
+    wanted = text.strip().lower()
+    if wanted in (one.lower() for one in (name, _bare(name), f"{name}_{unit}", f"{name} ({unit})")):
+        return True
+    first, written = split_unit(text)
+    return (_bare(first).lower(), written) == (_bare(name).lower(), unit)
+
+
+def _bare(name: str) -> str:
+    """A name without a unit that is not known, which `split_unit` leaves in it; the number of a channel stays."""
+    return re.sub(r"\s*[(\[{<](?!\d+[)\]}>]).*", "", name)
 
 
 def unit_beside(name: str, text: str) -> str:

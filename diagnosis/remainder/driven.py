@@ -1,0 +1,98 @@
+"""The formula for what an answer leaves of driven runs: laws of a short list, each fitted like any effect.
+
+Where dry friction holds a driven body, the moment missing at rest is whatever the input asks for, and not a
+function of the measured path. What could be closed is therefore not bounded from linear responses, as along free
+decays; the laws are integrated with the motion instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.special import chdtri
+
+from diagnosis.facts.remainder import Ceiling, Closable
+from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.paths import Ranges, paths, ranges
+from diagnosis.remainder.formula import Formula, Proposal, Term, propose
+from diagnosis.remainder.laws import held_out_share, stated_law
+from diagnosis.search.study import Study
+
+_OF_RATE = ("abs(r)*r", "r^3", "sign(r)")
+_OF_SLOW_RATE = ("exp(-(r/v)^2)*sign(r)", "tanh(r/v)")
+"""The rise of friction at low rates (Stribeck), and friction that is smooth about rest."""
+_OF_ANGLE = ("b^2", "b^3", "abs(b)*b")
+_OF_BOTH = ("b^2*r", "b*sign(r)", "abs(b)*sign(r)")
+_WIDTHS = (0.05, 0.2)  # of the greatest rate, from which a fit finds those between
+_FIRST = 0.01  # of the greatest restoring moment: where the fit of a coefficient starts
+
+
+def closable_driven(study: Study, *, significant: bool) -> Closable | None:
+    """The law of a short list that predicts held-out data best; None where none does, or none is sought.
+
+    Args:
+        significant: whether what the answer leaves is beyond chance.
+
+    Returns:
+        In the measured campaign's units, with the share that the law closes for what could be closed.
+
+    Raises:
+        LinAlgError: when the equations of a fit cannot be solved.
+    """
+    base = study.chosen
+    if not study.causes or not significant or study.random is not None or base.excess <= 0.0:
+        return None
+    found = [
+        (kind, proposal)
+        for kind, formula in _formulas(base)
+        if (proposal := propose(base, formula, kind)) is not None
+    ]
+    if not found:
+        return None
+    settings = base.settings.remainder
+    kind, best = min(found, key=lambda one: one[1].fit.total)
+    # A rate for all laws of the list together.
+    if base.total - best.fit.total < chdtri(1 + _own_numbers(best), settings.term_rate / len(found)):
+        return None
+    closed, std, held_out = held_out_share(base, best.fit)
+    law = stated_law(base, best, study.similarity, closed, std)
+    if law is None:
+        return None
+    return Closable(
+        excess=base.excess / base.problem.data.mean_block,
+        ceilings=(Ceiling(kind, closed, std, held_out),),
+        kind=kind,
+        events=(),
+        curve=None,
+        law=law,
+        alike=(),
+        next_most=None,
+        line=None,
+    )
+
+
+def _own_numbers(proposal: Proposal) -> int:
+    return len(proposal.table["parameters"]) - 1
+
+
+def _formulas(base: Fit) -> Iterator[tuple[str, Formula]]:
+    """The laws that are tried, with the kind of each; their first coefficients are small."""
+    motions = paths(base)
+    r = ranges(motions)
+    moment = _FIRST * r.angle * r.stiffness
+    delta = np.zeros(base.point.common.size)
+    for kind, term in _terms(r):
+        at = {"b": r.angle, "r": r.rate}
+        # Where a law is greatest is not at the ends of the motion for all of them.
+        inside = [
+            float(np.max(np.abs(term.value({k: s * v for k, v in at.items()})))) for s in (0.05, 0.3, 1.0)
+        ]
+        yield kind, Formula((term,), (-moment / max(*inside, 1e-300),), False, delta, 0.0)
+
+
+def _terms(r: Ranges) -> Iterator[tuple[str, Term]]:
+    for kind, texts in (("rate", _OF_RATE), ("angle", _OF_ANGLE), ("state", _OF_BOTH)):
+        yield from ((kind, Term(text)) for text in texts)
+    for text in _OF_SLOW_RATE:
+        yield from (("rate", Term(text, {"v": width * r.rate})) for width in _WIDTHS)

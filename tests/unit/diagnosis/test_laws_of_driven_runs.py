@@ -1,0 +1,81 @@
+"""The formula for what no effect explains of driven runs. Truth: the friction that was simulated."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis import Diagnosis, diagnose, vocabulary
+from tunnel_lab.commands.diagnose import write_proposal
+from tunnel_sim.effects.expression_effect import read_effects
+from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
+from tunnel_sim.vocabulary.drive import Drive
+from tunnel_sim.vocabulary.record import Array, Record
+
+RATE, STEP, SECONDS = 100.0, 5e-4, 20.0
+INERTIA, DAMPING, STIFFNESS = 0.12, 0.1, 3.0
+SLIDING, RISE, WIDTH = 0.06, 0.06, 0.15  # N m, N m and rad/s
+
+
+def multisine(seed: int, peak: float) -> Callable[[Array], Array]:
+    lines = np.arange(0.2, 3.0, 0.1)
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size)
+
+    def moment(time: Array) -> Array:
+        return np.asarray(peak / 8.0 * np.sin(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1))
+
+    return moment
+
+
+def campaign(rise: float) -> Campaign:
+    """Three runs of a body on a spring, with friction that rises at low rates."""
+    runs = []
+    clock = np.arange(round(SECONDS / STEP)) * STEP
+    every = round(1.0 / (RATE * STEP))
+    for seed, peak in enumerate((2.0, 1.6, 1.2)):
+        moment = multisine(seed, peak)(clock)
+        angle, rate, found = 0.0, 0.0, np.empty(clock.size)
+        for i, given in enumerate(moment.tolist()):
+            found[i] = angle
+            rate += STEP / INERTIA * (given - STIFFNESS * angle - DAMPING * rate)
+            friction = SLIDING + rise * np.exp(-((rate / WIDTH) ** 2))
+            rate = float(np.sign(rate)) * max(abs(rate) - STEP * friction / INERTIA, 0.0)
+            angle += STEP * rate
+        reading = found[::every] + 2e-4 * np.random.default_rng([seed, 1]).standard_normal(
+            clock[::every].size
+        )
+        drive = Drive("moment_nm", moment[::every])
+        runs.append(Run(f"r{seed + 1}", Record(clock[::every], reading), 0.0, STIFFNESS, drive=drive))
+    return Campaign("driven", RigProperties(), SensorProperties(RATE), tuple(runs))
+
+
+@pytest.fixture(scope="module")
+def answer() -> Diagnosis:
+    return diagnose(campaign(RISE), kinds=vocabulary(include=["coulomb_friction"]))
+
+
+def test_the_rise_of_friction_at_low_rates_is_proposed(answer: Diagnosis, tmp_path: Path) -> None:
+    assert answer.closable is not None
+    law = answer.closable.law
+    assert law is not None
+    assert law.effect["moment"] == "k*exp(-(r/v1)^2)*sign(r)"
+    assert law.closed > 0.9
+    size, width = law.parameters["k"][0], law.parameters["v1"][0]
+    # The simulation's own steps, of first order, allow for a few per cent.
+    assert size == pytest.approx(-RISE, rel=0.05)
+    assert width == pytest.approx(WIDTH, rel=0.05)
+    assert "The formula k*exp(-(r/v1)^2)*sign(r) closes" in answer.to_json_dict()["closable"]["words"]
+    path = write_proposal(tmp_path / "law.toml", answer.to_json_dict())
+    assert path is not None
+    assert tomllib.loads(path.read_text())["effects"][0]["name"] == "proposed_rate"
+    assert [kind.name for kind in read_effects(path)] == ["proposed_rate"]
+
+
+def test_plain_dry_friction_needs_no_formula() -> None:
+    found = diagnose(campaign(0.0), kinds=vocabulary(include=["coulomb_friction"]))
+    assert found.causes == ("coulomb_friction",)
+    assert found.closable is None or found.closable.law is None

@@ -1,0 +1,104 @@
+"""Conditions of runs and sizes of a rig: their keys, names and units in files, and what only looks like one."""
+
+from __future__ import annotations
+
+import re
+
+from tunnel_sim.files.importing.units import UNITS, kind_of, squeezed
+from tunnel_sim.files.scatter_tables import SPREAD, Spread
+from tunnel_sim.files.toml_input import NotNegative, Positive, StrictModel, optional
+
+
+class Conditions(StrictModel):
+    """Conditions of runs, sizes of the rig and the scatter between runs, as in ``campaign.toml``."""
+
+    wind_speed: NotNegative | None = optional("a number in m/s, 0 for wind-off")
+    spring_stiffness: NotNegative | None = optional(
+        "a number in N m/rad, 0 for a driven body without a spring"
+    )
+    air_density: Positive | None = optional("a positive number in kg/m3")
+    release_angle: float | None = optional("a number in rad")
+    yaw_inertia: Positive | None = optional("a positive number in kg m2")
+    frontal_area: Positive | None = optional("a positive number in m2")
+    reference_length: Positive | None = optional("a positive number in m")
+    width: Positive | None = optional("a positive number in m")
+    repeatability_wind_speed: Spread | None = optional(SPREAD)
+    repeatability_spring_stiffness: Spread | None = optional(SPREAD)
+    repeatability_mechanical_damping: Spread | None = optional(SPREAD)
+
+
+RIG_KEYS = ("yaw_inertia", "frontal_area", "reference_length", "width")
+RUN_KEYS = ("wind_speed", "spring_stiffness", "air_density", "release_angle")
+OF_REPEATABILITY = "repeatability_"
+"""Begins the keys of ``[repeatability]`` where they stand beside conditions of the same names."""
+
+SPREAD_KEYS = tuple(key for key in Conditions.model_fields if key.startswith(OF_REPEATABILITY))
+OF_CAMPAIGN = (*RIG_KEYS, *SPREAD_KEYS)
+"""The keys that are the same in all runs."""
+
+
+_NAMES = {
+    "wind_speed": r"(wind|air|flow|free ?stream|tunnel) ?(speed|velocity)|v ?wind|"
+    r"(wind|luft|str[öo]mungs|anstr[öo]m)geschwindigkeit",
+    "air_density": r"(air ?)?density|rho( ?air)?|ρ|(luft)?dichte",
+    "spring_stiffness": r"((spring|torsional|rotational) ?)?stiffness|spring ?(constant|rate)|k ?r|"
+    r"(torsions|dreh)?feder(konstante|steifigkeit|rate)|(dreh|torsions)?steifigkeit",
+    "release_angle": r"(release|initial|start) ?angle|(anfangs|start|auslenk)winkel|(theta|psi|beta|[θψβ]) ?0",
+    "frontal_area": r"frontal ?area|stirnfl[äa]che",
+    "reference_length": r"reference ?length|bezugsl[äa]nge",
+    "yaw_inertia": r"yaw ?inertia|i ?zz",
+}
+_KEYS = {key: re.compile(f"(?i)({names})") for key, names in _NAMES.items()}
+_SYMBOL = re.compile(r"(?i)[vu](_?(0|inf|∞))?|wind|speed")
+_LIKE = {
+    "wind_speed": re.compile(rf"{_SYMBOL.pattern}|velocity|geschwindigkeit|wind\W.*"),
+    "spring_stiffness": re.compile(r"(?i)k|spring|feder"),
+}
+"""Names without a unit that may be those of a condition, and of other things."""
+_KINDS = {
+    "wind_speed": "speed",
+    "air_density": "density",
+    "spring_stiffness": "stiffness",
+    "release_angle": "angle",
+}
+_SIZES = {
+    "yaw_inertia": {"kgm2": 1.0, "kgm^2": 1.0, "gcm2": 1e-7, "gcm^2": 1e-7},
+    "frontal_area": {"m2": 1.0, "m^2": 1.0, "cm2": 1e-4, "cm^2": 1e-4, "mm2": 1e-6, "mm^2": 1e-6},
+    "reference_length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "width": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+}
+"""Factors to SI of the units of sizes: they name no column, and are not among `UNITS`."""
+
+
+def condition_of(name: str, unit: str, *, alone: bool = False) -> str | None:
+    """The condition or size, a key of `Conditions`, that a column states, or a number ``alone``."""
+    if name in OF_CAMPAIGN and (unit == "" or name != "width"):
+        return name
+    name = re.sub(r"\s*[(\[{<].*", "", name)  # a unit that is not known stays in the name
+    plain = re.sub(r"[\s_.-]+", " ", name).strip()
+    found = next((key for key, pattern in _KEYS.items() if pattern.fullmatch(plain)), None)
+    # No unit of time measures what is named so.
+    symbol = kind_of(unit) == "speed" or unit == "ms" or (alone and unit == "" and plain.lower() == "speed")
+    return "wind_speed" if found is None and symbol and _SYMBOL.fullmatch(name) else found
+
+
+def resembles(name: str, unit: str) -> str | None:
+    """The condition that a name without a unit, or a unit alone, suggests and does not state; None: none."""
+    if unit:
+        return next((key for key, kind in _KINDS.items() if kind == kind_of(unit) and kind != "angle"), None)
+    return next((key for key, pattern in _LIKE.items() if pattern.fullmatch(name.strip())), None)
+
+
+def in_si(key: str, unit: str) -> float | None:
+    """The factor to SI of a condition or size in a unit; None where the unit does not measure it."""
+    if unit == "":
+        return 1.0
+    if key in _KINDS:
+        unit = "m/s" if (key, unit) == ("wind_speed", "ms") else unit  # no wind speed is in milliseconds
+        return UNITS[_KINDS[key]].get(unit)
+    return _SIZES.get(key, {}).get(squeezed(unit))
+
+
+def units_of(key: str) -> str:
+    """The units in which a condition or size may be stated, for a message."""
+    return ", ".join(UNITS[_KINDS[key]] if key in _KINDS else _SIZES.get(key, {"1": 1.0}))

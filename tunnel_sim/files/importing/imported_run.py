@@ -1,0 +1,190 @@
+"""A run of an import: its part of a record, and its conditions, stated or still open."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.files.importing.cleaning import from_rest, from_zero
+from tunnel_sim.files.importing.condition_names import OF_CAMPAIGN, RUN_KEYS, Conditions
+from tunnel_sim.files.importing.conditions import ConditionTable, ImportChoices, Unstated
+from tunnel_sim.files.importing.raw_records import RawRecord
+from tunnel_sim.files.importing.releases import RecordPiece, stated_piece
+from tunnel_sim.files.importing.stated import Hint
+from tunnel_sim.files.plausible import checked_record, plausible_values
+from tunnel_sim.files.toml_input import shown, validate
+from tunnel_sim.vocabulary.campaign import Run, SensorProperties, needs_density
+from tunnel_sim.vocabulary.drive import HOLDS, Drive, Hold, without_spring_needs_drive
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array, Record
+
+_JUDGED = 500_000  # samples in which the cycles of a long record are counted
+_WIND_ON = re.compile(r"wind[\s_-]*on(?![a-z])", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedRun:
+    """A run, or what was taken for one.
+
+    Args:
+        rest: the reading at rest that is stated and subtracted, rad (rad/s or rad/s²); None: not stated.
+        sizes: of the rig, and scatter between runs, as the file states them.
+        held: conditions that a campaign takes only beside an air density, which is still to be stated.
+        without_density: whether it is.
+    """
+
+    id: str
+    raw: RawRecord
+    piece: RecordPiece
+    run: Run | None
+    said: tuple[str, ...]
+    rest: float | None
+    sizes: Mapping[str, float]
+    held: Mapping[str, float] = field(default_factory=dict)
+    without_density: bool = False
+
+    @property
+    def reading(self) -> Array:
+        """Of the run, before its rest is subtracted: shape (n,), rad (rad/s or rad/s²)."""
+        return self.raw.cleaned.reading[self.piece.first : self.piece.last]
+
+
+def imported_run(
+    name: str,
+    raw: RawRecord,
+    piece: RecordPiece,
+    choices: ImportChoices,
+    table: ConditionTable | None,
+    named: Sequence[Hint],
+    *,
+    later: bool,
+) -> ImportedRun:
+    """A run of a record.
+
+    Args:
+        piece: of the record, that is the run.
+        named: what the name of its file seems to state.
+        later: whether an air density that is missing may be stated later (`ImportedRun.held`).
+
+    Raises:
+        Unstated: where a condition is open that only the user can state.
+    """
+    where = f"{shown(raw.source)}, run '{name}'"
+    stretch = choices.stretch_of(raw.source.name, name)
+    piece = stated_piece(raw.cleaned.time_s, piece, stretch, where)
+    if name in choices.leave_out:
+        return ImportedRun(name, raw, piece, None, ("left out as stated",), None, {})
+    kept, sensor = slice(piece.first, piece.last), SensorProperties(quantity=raw.quantity)
+    time, reading = raw.cleaned.time_s[kept], raw.cleaned.reading[kept]
+    said = []
+    if piece.first:
+        at = (
+            "at the largest rate after the release"
+            if raw.quantity == "rate"
+            else "where the body is released"
+        )
+        said.append(f"begins at {time[0]:.4g} s, {at}")
+    if piece.last < raw.cleaned.time_s.size:
+        said.append(f"ends at {time[-1]:.4g} s, with the motion or before the next run")
+    rest = choices.rest if stretch.rest is None else stretch.rest
+    if rest is not None:
+        reading = from_rest(reading, rest, sensor.unit, said, where)
+    stated, hints = _stated(raw, raw.rows(float(time[0]), float(time[-1])), name, choices, table, said)
+    sizes = {key: stated.pop(key) for key in OF_CAMPAIGN if key in stated}
+    sizes = {} if list(sizes) == ["width"] else sizes  # many things have a width
+    validate(Conditions, stated | sizes, raw.source)
+    plausible_values(stated | sizes, where)
+    _check_wind(raw, name, stated, [*hints, *named], said, where)
+    rig = choices.conditions
+    scales = stated.get("spring_stiffness"), rig.frontal_area, rig.reference_length
+    held: dict[str, float] = {}
+    windy = needs_density(stated.get("wind_speed", 0.0), *scales) and "air_density" not in stated
+    if windy and later:
+        held = {key: stated.pop(key) for key in ("spring_stiffness",) if key in stated}
+        said.append(f"air_density is not stated (wind-on, {stated['wind_speed']:g} m/s)")
+    elif windy:
+        what = f"wind-on ({stated['wind_speed']:g} m/s) without air_density"
+        raise Unstated(what, where=where, remedy="give --set air_density=1.2 (kg/m3, about 1.2 for air)")
+    drive = _drive(raw, kept, choices, said)
+    without_spring_needs_drive((stated | held).get("spring_stiffness"), drive, where)
+    time = from_zero(time)
+    try:
+        record, stride = None, time.size // _JUDGED
+        release = None if drive is not None else stated.get("release_angle")
+        if drive is None and stride > 1:
+            # A long record that passes when thinned out passes as a whole, which takes seconds to find out.
+            with suppress(TunnelError):
+                checked_record(time[::stride], reading[::stride], "the reading", sensor, release, where)
+                record = Record(time, reading)
+        if record is None:
+            record = checked_record(time, reading, "the reading", sensor, release, where, drive)
+    except TunnelError as error:
+        return ImportedRun(name, raw, piece, None, (*said, f"left out: {error.what}"), rest, sizes)
+    run = Run(name, record, **({"wind_speed": 0.0} | stated), drive=drive)
+    return ImportedRun(name, raw, piece, run, tuple(said), rest, sizes, held, windy)
+
+
+def _stated(
+    raw: RawRecord,
+    rows: NDArray[np.bool_],
+    run: str,
+    choices: ImportChoices,
+    table: ConditionTable | None,
+    said: list[str],
+) -> tuple[dict[str, float], list[Hint]]:
+    """Conditions and sizes of a run, by key, and what the file holds that looks like one and is not used.
+
+    Args:
+        rows: which rows of the record are the run's, shape (n,).
+    """
+    given = choices.conditions.model_dump(include=set(RUN_KEYS), exclude_none=True)
+    in_table = {} if table is None else table.of(raw.source, run)
+    # Precedence: --set, the table, the name of the file, the columns, and other numbers of the file.
+    found = {**raw.stated.numbers, **raw.stated.measured(rows, said), **raw.named, **in_table, **given}
+    return found, raw.stated.unused(rows)
+
+
+def _check_wind(
+    raw: RawRecord,
+    run: str,
+    stated: Mapping[str, float],
+    hints: Sequence[Hint],
+    said: list[str],
+    where: str,
+) -> None:
+    """Say what looks like a condition and is not used; refuse to assume wind-off beside a hint of a wind."""
+    open_ones = [hint for hint in hints if hint.key not in stated]
+    said += [hint.words for hint in open_ones]
+    if "wind_speed" in stated:
+        return
+    wind_off = "--set wind_speed=0 states wind-off"
+    for hint in open_ones:
+        if hint.key == "wind_speed" and hint.value != 0.0:
+            what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
+            raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
+    if _WIND_ON.search(f"{raw.source.stem} {run}"):
+        what = "the name says that the wind is on, but not how fast"
+        remedy = "give --set wind_speed=SPEED (m/s), --conditions or --name"
+        raise Unstated(what, where=where, remedy=remedy)
+    if raw.input is None:
+        said.append("wind_speed is not stated: wind-off is assumed")
+
+
+def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str]) -> Drive | None:
+    """The input of a run; None of a free decay."""
+    if raw.input is None:
+        return None
+    column, values = raw.input
+    order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
+    hold: Hold = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else "linear")
+    gain = gain if column == "drive" else None
+    if choices.input_hold is None:
+        asked = "linear between samples is assumed; --input-hold zero if a controller holds each command"
+        said.append(f"drive_hold = {hold} from the file" if order in (0.0, 1.0) else f"drive_hold: {asked}")
+    said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
+    return Drive(column, values[kept], hold, gain)

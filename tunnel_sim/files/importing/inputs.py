@@ -1,0 +1,154 @@
+"""The input of a driven run: which column it is, found by name, unit and correlation with the motion."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.files.importing.columns import stated_input
+from tunnel_sim.files.importing.condition_names import condition_of
+from tunnel_sim.files.importing.conditions import ImportChoices
+from tunnel_sim.files.importing.tables import Channel, heading, is_input
+from tunnel_sim.files.importing.units import UNITS, kind_of
+from tunnel_sim.vocabulary.drive import Drive, InputColumn, checked_drive
+from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.record import Array, Record
+
+
+@dataclass(frozen=True, eq=False)
+class RunInput:
+    """The input of a run.
+
+    Args:
+        channel: that holds it.
+        values: N m, any unit or rad, as ``column`` says; shape (n,).
+    """
+
+    column: InputColumn
+    channel: Channel
+    values: Array
+
+
+_MOMENTS = ("nm", "n-m", "n*m", "n·m", "newton metre", "newton meter", "n_m")
+_NAMES = re.compile(
+    r"(?<![a-z])(torque|moment|drehmoment|drive|input|excitation|anregung|command|cmd|control|motor|shaker|actuator|"
+    r"tau|effort|u|base|root)(?![a-z])",
+    re.IGNORECASE,
+)
+_BASE = re.compile(r"(?<![a-z])(base|root)(?![a-z])", re.IGNORECASE)
+_CORRELATED = 0.3  # greatest correlation at any lag, from which on a column drives the motion
+
+
+def find_input(
+    channels: Sequence[Channel],
+    beside: Sequence[Channel | None],
+    reading: Array,
+    choices: ImportChoices,
+    said: list[str],
+    where: str,
+) -> RunInput | None:
+    """The input of a run; None of a free decay.
+
+    Args:
+        beside: the columns of times and reading.
+        reading: shape (n,), rad, rad/s or rad/s².
+    """
+    if choices.input == "none":
+        return None
+    others = [channel for channel in channels if all(channel is not one for one in beside)]
+    if choices.input is not None:
+        named = stated_input(channels, choices)
+        if named is None or all(named is not one for one in others):
+            what = f"no column '{one_line(choices.input, 40)}' for the input"
+            remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
+            raise TunnelError(what, where=where, remedy=remedy)
+        return _as_input(named, reading, choices, said)
+    # a column that is empty here is the input of other runs of the file
+    exact = [channel for channel in others if is_input(channel) and np.isfinite(channel.values).any()]
+    found = exact
+    for channel in () if exact else others:
+        good = np.isfinite(channel.values) & np.isfinite(reading)
+        plausible = _moment_unit(channel) or _NAMES.search(channel.name)
+        conditional = condition_of(channel.name, channel.unit) is not None
+        if conditional or not plausible or np.count_nonzero(good) < 16:
+            continue
+        record = Record(np.arange(np.count_nonzero(good), dtype=np.float64), reading[good])
+        with suppress(TunnelError):  # it correlates with the motion, and is not the motion itself
+            checked_drive(Drive("drive", channel.values[good]), record, "", judged=False)
+            if correlation(channel.values, reading)[0] >= _CORRELATED:
+                found.append(channel)
+    if len(found) > 1:
+        listed = ", ".join(f"'{one_line(c.name, 40)}'" for c in found)
+        remedy = f'give --input "{one_line(found[0].name, 40)}", another of them, or --input none'
+        raise TunnelError(f"{len(found)} columns may be the input: {listed}", where=where, remedy=remedy)
+    return _as_input(found[0], reading, choices, said) if found else None
+
+
+def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: list[str]) -> RunInput:
+    name = heading(channel)
+    guessed: InputColumn = (
+        "moment_nm"
+        if name == "moment_nm" or _moment_unit(channel)
+        else "base_rad"
+        if kind_of(channel.unit) == "angle" and (name == "base_rad" or _BASE.search(channel.name))
+        else "drive"
+    )
+    column = choices.input_as or guessed
+    factor = UNITS["angle"].get(channel.unit, 1.0) if column == "base_rad" else 1.0
+    meaning = {
+        "moment_nm": "a known moment in N m",
+        "drive": "an input of unknown gain",
+        "base_rad": "the angle of the spring's root",
+    }[column]
+    size, lag = correlation(channel.values, reading)
+    said.append(
+        f"driven by '{one_line(channel.name, 40)}', {meaning} ({column}): its correlation with the reading is "
+        f"{size:.2f} at a lag of {lag} samples; --input none if it is a free decay"
+    )
+    return RunInput(column, channel, channel.values * factor)
+
+
+def _moment_unit(channel: Channel) -> bool:
+    return channel.unit.strip().lower() in _MOMENTS
+
+
+def correlation(values: Array, reading: Array) -> tuple[float, int]:
+    """The greatest correlation of an input with a later reading, from 0 to 1, and its lag in samples.
+
+    The lag is a quarter of the record at most.
+
+    Args:
+        values: of the input, any unit, shape (n,).
+        reading: shape (n,), any unit.
+    """
+    good = np.isfinite(values) & np.isfinite(reading)
+    x, y = values[good] - values[good].mean(), reading[good] - reading[good].mean()
+    scale = float(np.sqrt((x @ x) * (y @ y)))
+    if not scale > 0.0:
+        return 0.0, 0
+    size = 2 * x.size
+    lags = np.fft.irfft(np.conj(np.fft.rfft(x, size)) * np.fft.rfft(y, size), size)[: max(1, x.size // 4)]
+    best = int(np.argmax(np.abs(lags)))
+    return float(min(1.0, abs(lags[best]) / scale)), best
+
+
+def at_times(values: Array, time: Array, reading: Array, kept: Array) -> Array:
+    """The input at the times that the clean-up of a record has kept: that of the nearest row, shape (n,).
+
+    Args:
+        values: of the input at every row, shape (m,).
+        time: of the rows, shape (m,), s.
+        reading: of the rows, shape (m,).
+        kept: times from the first sample on, shape (n,), s, increasing.
+    """
+    good = np.flatnonzero(np.isfinite(time) & np.isfinite(reading))
+    order = good[np.argsort(time[good], kind="stable")]
+    if order.size == kept.size:
+        return values[order]
+    since = time[order] - time[order[0]]
+    after = np.clip(np.searchsorted(since, kept), 1, since.size - 1)
+    return values[order[np.where(kept - since[after - 1] < since[after] - kept, after - 1, after)]]

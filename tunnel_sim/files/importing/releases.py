@@ -1,0 +1,212 @@
+"""Where runs begin and end in a record.
+
+A free decay crosses its centre every half cycle and never grows much from one half cycle to the next. Where a
+crossing takes longer and the excursions after it are larger than before, a hand has moved the body or held
+it. Any other record is one run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tunnel_sim.files.importing.conditions import Stretch
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+_BAND = 0.05  # of the largest excursion: a smaller one counts as rest
+_NOISES = 5.0  # standard deviations: smaller excursions are noise
+_NOISE_OF = 200_000  # samples in which the noise is looked for
+_CENTRED = 2  # times the centre is estimated
+_LONGER = 1.8  # usual half cycles: no free motion takes as long from crossing to crossing
+_SLOWER = 1.25  # times the way back: a pull at the start of a record takes longer
+_GROWN = 1.5  # times the excursion before: no free decay grows as much within half a cycle
+_STILL_GROWING = 1.1  # times the excursion before: the hand has not let go
+_LEAST_HALVES = 6  # half cycles: a shorter motion is not a run
+_AT_TURN = 0.005  # of an excursion: the reading stays as near the turning point while the body is held
+_HELD = 0.5  # of a half cycle: a free turning point is not that flat for longer
+
+
+@dataclass(frozen=True)
+class RecordPiece:
+    """A run in a record: the index of its first sample, and that behind its last one."""
+
+    first: int
+    last: int
+
+
+def find_runs(time_s: Array, reading: Array, drift: float = 0.0) -> list[RecordPiece]:
+    """The runs of a record: one for each release; the whole record where no hand is seen in it.
+
+    Args:
+        time_s: increasing, shape (n,), s.
+        reading: shape (n,).
+        drift: up to which its centre may wander, in the unit of the reading.
+    """
+    whole = [RecordPiece(0, reading.size)]
+    noise = max(_noise_of(reading), drift)
+    centred = _centred(reading, noise)
+    if centred is None:
+        return whole
+    away, starts, ends = centred
+    clear = noise <= _BAND * float(np.abs(away).max())
+    peaks = np.array([np.abs(away[a:b]).max() for a, b in zip(starts, ends, strict=True)])
+    middle = 0.5 * (time_s[ends[:-1] - 1] + time_s[starts[1:]])
+    crossings = np.concatenate([[time_s[0]], middle, [time_s[-1]]])
+    lengths = np.diff(crossings)
+    usual = float(np.median(lengths[:-1]))
+    turn = time_s[starts[0] + int(np.argmax(np.abs(away[starts[0] : ends[0]])))]
+    if turn - time_s[0] > _SLOWER * (crossings[1] - turn) + (time_s[1] - time_s[0]):
+        lengths[0] = np.inf  # pulled aside: a free swing takes no longer out than back
+    # Dry friction may hold the body beside the centre: a last stretch of one sign that long is a rest.
+    moved = int(starts[-1] if time_s[ends[-1] - 1] - time_s[starts[-1]] > _LONGER * usual else ends[-1])
+    # the excursions in which a hand moves the body, each with the one from which on the motion is free
+    found: list[tuple[int, int]] = []
+    for k in np.flatnonzero(lengths[:-1] > _LONGER * usual).tolist():
+        before = peaks[k - 1] if k else 0.0
+        if max(peaks[k], peaks[k + 1]) <= _GROWN * before:
+            continue
+        at = k
+        while at + 1 < peaks.size and peaks[at + 1] > _STILL_GROWING * peaks[at]:
+            at += 1
+        if not found or at > found[-1][1]:
+            found.append((k, at))
+    if found and found[0][0] >= _LEAST_HALVES:  # the record begins in free motion
+        found.insert(0, (0, 0))
+    until = [*(k for k, _ in found), peaks.size][1:]
+    found = [
+        (k, at)
+        for (k, at), end in zip(found, until, strict=True)
+        if peaks[at:end].max() <= _STILL_GROWING * peaks[at]
+    ]
+    if not found:
+        return [RecordPiece(0, _without_long_rest(time_s, 0, moved, clear=clear))]
+    pieces = []
+    for place, (_, released) in enumerate(found):
+        # From the first sample of the largest reading, or from the last one of a hold.
+        size = np.abs(away[starts[released] : ends[released]])
+        near = int(starts[released]) + np.flatnonzero(size >= (1.0 - _AT_TURN) * size.max())
+        held = time_s[near[-1]] - time_s[near[0]] > _HELD * usual
+        first = int(near[-1]) if held else int(starts[released]) + int(np.argmax(size))
+        if place + 1 < len(found):
+            hand = found[place + 1][0]
+            last = max(int(ends[hand - 1]), int(np.searchsorted(time_s, time_s[starts[hand]] - usual)))
+            halves = hand - released
+        else:
+            last = _without_long_rest(time_s, first, moved, clear=clear)
+            halves = peaks.size - released
+        if halves >= _LEAST_HALVES:
+            pieces.append(RecordPiece(first, last))
+    return pieces or whole
+
+
+def find_runs_of_rate(time_s: Array, rate: Array) -> list[RecordPiece]:
+    """The runs of a record of rates: from the largest rate after each release, which no hand can have caused.
+
+    Args:
+        time_s: increasing, shape (n,), s.
+        rate: shape (n,), rad/s.
+    """
+    whole = [RecordPiece(0, rate.size)]
+    noise = _noise_of(rate)
+    centred = _centred(rate, noise)
+    if centred is None:
+        return whole
+    # A hand shows in the angle: the body is held, or pulled aside for longer than it takes to swing back.
+    rate, starts, ends = centred
+    angle = _without_drift(
+        time_s,
+        np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time_s))]),
+        starts,
+        ends,
+    )
+    drift = noise * sqrt(float(time_s[-1] - time_s[0]) * float(np.median(np.diff(time_s))))  # of summed noise
+    found = []
+    for piece in find_runs(time_s, angle, drift):
+        inside = np.flatnonzero((ends > piece.first) & (starts < piece.last))
+        peaks = np.array([np.abs(rate[starts[i] : ends[i]]).max() for i in inside])
+        if piece.first == 0 or peaks.size < _LEAST_HALVES:
+            found.append(piece)
+            continue
+        later = np.append(np.maximum.accumulate(peaks[::-1])[::-1][1:], 0.0)
+        free = int(inside[np.flatnonzero(later <= _STILL_GROWING * peaks)[0]])
+        first = int(starts[free]) + int(np.argmax(np.abs(rate[starts[free] : ends[free]])))
+        found.append(RecordPiece(first, piece.last))
+    return found
+
+
+def stated_piece(time_s: Array, found: RecordPiece, stated: Stretch, where: str) -> RecordPiece:
+    """A run with the start and the end that are stated; refused where fewer than two samples lie between.
+
+    Args:
+        time_s: of the record, shape (n,), s.
+    """
+    if stated.start is None and stated.end is None:
+        return found
+    start = time_s[found.first] if stated.start is None else stated.start
+    end = time_s[found.last - 1] if stated.end is None else stated.end
+    # Half a step of slack: a marker between two samples belongs to the closer one.
+    slack = 0.5 * float(np.median(np.diff(time_s)))
+    first, last = (int(place) for place in np.searchsorted(time_s, [start - slack, end + slack]))
+    if last - first < 2:
+        remedy = "state a start before the end, within the record"
+        raise TunnelError(f"no samples from {start:g} to {end:g} s", where=where, remedy=remedy)
+    return RecordPiece(first, last)
+
+
+def _without_drift(time_s: Array, angle: Array, starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
+    """An angle summed from rates without the drift that a bias of the sensor adds to it, shape (n,).
+
+    Args:
+        starts: of the excursions of the rate, between which the body turns; ``ends`` behind their last samples.
+    """
+    at = (ends[:-1] + starts[1:]) // 2
+    if at.size < _LEAST_HALVES:
+        return angle
+    turns = angle[at]
+    # Of three turning points in turn, so that a decay cancels.
+    centres, times = 0.25 * (turns[:-2] + 2.0 * turns[1:-1] + turns[2:]), time_s[at[1:-1]]
+    half = times.size // 2
+    slopes = (centres[half:] - centres[: times.size - half]) / (times[half:] - times[: times.size - half])
+    drifted: Array = angle - float(np.median(slopes)) * time_s
+    return drifted
+
+
+def _noise_of(reading: Array) -> float:
+    """A size that noise hardly exceeds, by fourth differences, in which a swing hardly shows."""
+    some = np.abs(np.diff(reading[:_NOISE_OF], 4))
+    return _NOISES * (float(np.median(some)) / (0.6745 * sqrt(70.0))) if some.size else 0.0
+
+
+def _centred(reading: Array, noise: float) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]] | None:
+    """A reading from its centre on, shape (n,), and its excursions; None where it has too few."""
+    away: Array = reading - np.median(reading)
+    for _ in range(_CENTRED):
+        starts, ends = _excursions(away, noise)
+        if starts.size < _LEAST_HALVES:
+            return None
+        # A hold or a pull draws the median aside; most swings have their centre between two turning points.
+        swings = (away[a:b] for a, b in zip(starts, ends, strict=True))
+        turns = np.array([swing[int(np.argmax(np.abs(swing)))] for swing in swings])
+        away = away - np.median(0.5 * (turns[1:] + turns[:-1]))
+    starts, ends = _excursions(away, noise)
+    return None if starts.size < _LEAST_HALVES else (away, starts, ends)
+
+
+def _excursions(away: Array, noise: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The stretches of one sign outside the band around the centre: first samples, and those behind the last."""
+    outside = np.flatnonzero(np.abs(away) > max(_BAND * float(np.abs(away).max()), noise))
+    change = np.flatnonzero(np.diff(np.sign(away[outside])) != 0.0)
+    if not outside.size:
+        return outside, outside
+    return outside[np.concatenate([[0], change + 1])], outside[np.concatenate([change, [-1]])] + 1
+
+
+def _without_long_rest(time_s: Array, first: int, end: int, *, clear: bool) -> int:
+    """Where a record ends that rests for longer than it moves: as much rest as motion is kept."""
+    if not clear:  # the motion goes on in the noise
+        return time_s.size
+    return int(np.searchsorted(time_s, 2.0 * time_s[end - 1] - time_s[first], side="right"))

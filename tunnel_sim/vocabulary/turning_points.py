@@ -1,0 +1,77 @@
+"""Turning points of a swing, as a hand reads them: the times of its extremes and the angles there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.record import Array
+
+LEAST = 6
+"""Turning points from which a period, a decrement and the scatter about both can be told."""
+_GROWS = 1.25  # of the swing before: the next one of a decay that a hand has read is no longer
+_SHRINKS = 0.4  # of the swing before: a decay from one side to the other is no faster where it oscillates
+_MISSED = 0.35  # of half a period: times of turning points are as close to whole numbers of it
+
+
+@dataclass(frozen=True, eq=False)
+class TurningPoints:
+    """The extremes of a free decay, from one side to the other.
+
+    Args:
+        name: of the file or run.
+        time_s: shape (n,), s, increasing.
+        angle_rad: shape (n,), rad.
+        time_std: standard deviation of the times as stated, s, shape (n,); None where nothing is stated.
+        angle_std: of the angles, rad, shape (n,); likewise.
+        said: how they were read.
+    """
+
+    name: str
+    time_s: Array
+    angle_rad: Array
+    time_std: Array | None = None
+    angle_std: Array | None = None
+    said: tuple[str, ...] = ()
+
+    @property
+    def half_periods(self) -> Array:
+        """The number of half periods from the first turning point to each, shape (n,)."""
+        steps = np.diff(self.time_s)
+        counted: Array = np.concatenate([[0.0], np.cumsum(np.round(steps / np.median(steps)))])
+        return counted
+
+
+def are_turning_points(time_s: Array, angle: Array) -> bool:
+    """Whether every reading of a table is on the other side of the one before, as its turning points are.
+
+    Args:
+        time_s: increasing, shape (n,), s.
+        angle: shape (n,).
+    """
+    if time_s.size < LEAST:
+        return False
+    swings, steps = np.diff(angle), np.diff(time_s)
+    halves = steps / np.median(steps)
+    sizes = np.abs(swings)
+    if not (sizes > 0.0).all() or (np.sign(swings[1:]) == np.sign(swings[:-1])).any():
+        return False
+    ratio = sizes[1:] / sizes[:-1]
+    whole = np.round(halves)  # a turning point may be missing on either side, two at a time
+    even = np.abs(halves - whole) <= _MISSED
+    return bool((ratio < _GROWS).all() and (ratio > _SHRINKS).all() and (even & (whole % 2.0 == 1.0)).all())
+
+
+class HoldsTurningPoints(TunnelError):
+    """A table holds turning points, of which no campaign can be made."""
+
+    def __init__(self, points: TurningPoints, where: str) -> None:
+        self.points = points
+        super().__init__(
+            f"holds {points.time_s.size} turning points, from one side to the other, without the motion between",
+            where=where,
+            remedy="tunnel identify FILE gives ωn and ζ from them; a campaign, and a diagnosis, need the angle "
+            "between them too, with five samples a cycle or more",
+        )
