@@ -250,8 +250,8 @@ def _two_springs_off(found: Mapping[str, Any]) -> str:
     """Springs that would explain the gap together."""
     beside = f" beside {plain(*found['beside'])}" if found["beside"] else ""
     return (
-        f"Two springs that are not as stiff as stated would explain the gap{beside}, such as "
-        f"{' and '.join(map(_spring_off, found['springs']))}: measure their stiffness again."
+        f"Two springs that are not as stiff as stated would explain the gap{beside}: for example, "
+        f"{' and '.join(map(_spring_off, found['springs']))}. Measure their stiffness again."
     )
 
 

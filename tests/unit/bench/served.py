@@ -55,6 +55,7 @@ def bench(folder: Path, *, crash: bool = False, prelude: str = "") -> Iterator[B
 
     With ``crash`` it is killed in the end. The server runs the Python code of ``prelude`` first.
     """
+    folder.mkdir(exist_ok=True)
     start = f"{prelude}\nfrom tunnel_lab.cli import main\nraise SystemExit(main())"
     words = [sys.executable, "-c", start, "bench", folder.name, "--no-browser"]
     # NiceGUI takes a server under pytest for one of its own tests.

@@ -92,7 +92,7 @@ def test_the_package_runs_as_a_module_from_the_tree() -> None:
         (["simulate", "missing.toml", "--out", "x"], ["missing.toml"]),
         (
             ["identify", "missing", "--estimator", "output_eror"],
-            ["output_eror", "did you mean 'output_error'?"],
+            ["output_eror", "did you mean 'output_error'"],
         ),
     ],
 )

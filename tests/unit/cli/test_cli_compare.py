@@ -81,7 +81,7 @@ def test_gap_answer_parameters_and_coefficients_stand_side_by_side(
     assert gaps["share closed"] == ("98.8 %", "–")
     assert gaps["causes"] == ("quadratic_damping", "none")
     assert gaps["or"] == ("coulomb_friction", "–")
-    assert gaps["probability"] == (0.91, 0.99)
+    assert gaps["probability"] == ("91 %", "99 %")
     assert parameters == [
         {
             "effect": "quadratic_damping", "parameter": "coefficient",

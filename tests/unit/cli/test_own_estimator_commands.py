@@ -155,7 +155,7 @@ def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
 
 
 def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
-    words = ("sweep", "small.toml", "--out", "out", "--workers", "1", "-e", "own_method:Mine")
+    words = ("sweep", "small.toml", "--out", "out", "--jobs", "1", "-e", "own_method:Mine")
     done = in_a_process(*words, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     rows = pl.read_parquet(folder / "out" / "results" / "*.parquet")
@@ -171,9 +171,7 @@ def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_sweep_prints_the_first_traceback(tunnel) -> None:
-    status, _, err = tunnel(
-        "sweep", "small.toml", "--out", "out", "--workers", "1", "-e", "own_method:Broken"
-    )
+    status, _, err = tunnel("sweep", "small.toml", "--out", "out", "--jobs", "1", "-e", "own_method:Broken")
     assert status == 1
     assert "estimates raised an exception: see status 'raised' in the results. The first:" in err
     assert err.count("Traceback") == 1

@@ -240,7 +240,7 @@ def test_processes_give_the_answers_of_one(blind, monkeypatch):
         (lambda f: append(f / "answers" / "c0001.json", " "), "not the answer that was given"),
         (lambda f: (f / "answers" / "seal.json").unlink(), "answer the set first"),
         (lambda f: (f / "key.json").unlink(), "--key"),
-        (lambda f: (f / "c0001").rename(f / "c0009"), "no answer"),
+        (lambda f: (f / "c0001").rename(f / "c0009"), "without an answer"),
     ],
 )
 def test_nothing_is_scored_that_is_not_as_sealed(blind, spoil, complaint):
@@ -334,7 +334,7 @@ def test_half_of_the_campaigns_scatter_unless_said_otherwise(tmp_path, monkeypat
         (["score", "SET", "--markdown", "no/page.md"], "its folder does not exist"),
         (
             ["score", "SET", "--figure", "a.jpg"],
-            "--figure a.jpg: is not a .png; name a file that ends in .png",
+            "a.jpg: does not end in .png; name a file that ends in .png, the format that is written",
         ),
     ],
 )

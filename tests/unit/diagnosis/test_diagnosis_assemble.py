@@ -318,7 +318,7 @@ def test_the_source_of_the_noise_is_said():
 
 def test_the_probability_in_words_is_that_of_the_first_candidate(found):
     answer = assemble(found, *localise(found)).in_words()
-    assert f"(probability {answer.candidates[0].probability:.2f})" in answer.verdict
+    assert f"(probability {100.0 * answer.candidates[0].probability:.0f} %)" in answer.verdict
     doubtful = replace(found, gap=replace(found.gap, test=replace(found.gap.test, p_value=9e-4)))
     (none,) = [c for c in candidates(doubtful, excess_base(doubtful)) if c.effect == "none"]
     assert none.probability == pytest.approx(9e-4 / 1.0009)

@@ -39,6 +39,7 @@ KNOWN_IN_SEVERAL = {
     "freed_hypotheses": "growth frees the forms of fewer beside other effects",
     "mode_runs": "of a free and of an excited mode",
     "part_price": "a part is tried, taken and compared at one price",
+    "term_rate": "a term of a law is taken at one rate, whether the runs are free or driven",
     "model_error": "a misfit that needs no cause needs no form either",
     "leak": "wherever channels are compared",
     "own_number_gain": "wherever an instant or a phase counts",

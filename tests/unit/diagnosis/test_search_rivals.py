@@ -40,8 +40,8 @@ def test_two_springs_off_are_unknown_and_said_in_words(two_off):
     found = diagnose(two_off, kinds=KINDS)
     assert tuple(found.causes) == UNKNOWN
     stated = sorted({run.spring_stiffness for run in two_off.runs})
-    assert "Two springs that are not as stiff as stated would explain the gap, such as " in found.verdict
-    named = [spring for spring in stated if f"{spring:.4g} N m/rad by " in found.verdict]
+    assert "Two springs that are not as stiff as stated would explain the gap: for example, " in found.verdict
+    named = [spring for spring in stated if f"{spring:.4g} N m/rad is " in found.verdict]
     assert len(named) == 2
 
 

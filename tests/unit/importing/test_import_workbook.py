@@ -108,5 +108,5 @@ def test_a_sheet_of_conditions_that_names_no_sheet_is_said(tmp_path: Path) -> No
 
 def test_a_sheet_that_no_row_names_is_not_taken_for_wind_off(tmp_path: Path) -> None:
     table = [("Blatt", "V [m/s]", "rho"), ("A", 12, 1.2)]
-    with pytest.raises(Unstated, match="run 'B': 'V' of 1 values in 'Bedingungen'"):
+    with pytest.raises(Unstated, match="run 'B': 'V' of 1 value in 'Bedingungen'"):
         read_records([book(tmp_path, {"A": None, "B": None, "Bedingungen": table})])

@@ -46,7 +46,7 @@ def test_bars_of_the_answers(given: Document) -> None:
     words = [text for text in axes.texts if text.get_text()]
     assert [round(text.get_position()[1]) for text in words] == list(range(4))
     for text, candidate in zip(words, shown, strict=True):
-        assert text.get_text() == f"{candidate['probability']:.2f}"
+        assert text.get_text() == f"{100.0 * candidate['probability']:.0f} %"
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == [c["effect"].replace("_", " ") for c in shown]
     ticks = zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
@@ -69,7 +69,7 @@ def test_a_bar_next_to_all_is_no_whole(given: Document) -> None:
     given["candidates"][0]["probability"] = 0.9996
     fig = answer.candidates_figure(given)
     assert fig is not None
-    assert fig.axes[0].texts[0].get_text() == "> 0.99"
+    assert fig.axes[0].texts[0].get_text() == "> 99 %"
 
 
 def rms(excess: Any) -> Any:

@@ -15,7 +15,7 @@ from tunnel_sim.files.importing.conditions import ImportChoices
 from tunnel_sim.files.importing.tables import Channel, heading, is_input
 from tunnel_sim.files.importing.units import UNITS, kind_of
 from tunnel_sim.vocabulary.drive import Drive, InputColumn, checked_drive
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 from tunnel_sim.vocabulary.record import Array, Record
 
 
@@ -107,7 +107,7 @@ def _as_input(channel: Channel, reading: Array, choices: ImportChoices, said: li
     size, lag = correlation(channel.values, reading)
     said.append(
         f"driven by '{one_line(channel.name, 40)}', {meaning} ({column}): its correlation with the reading is "
-        f"{size:.2f} at a lag of {lag} samples; --input none if it is a free decay"
+        f"{size:.2f} at a lag of {counted(lag, 'sample')}; --input none if it is a free decay"
     )
     return RunInput(column, channel, channel.values * factor)
 

@@ -14,7 +14,7 @@ from tunnel_sim.files.importing.condition_names import condition_of, in_si, rese
 from tunnel_sim.files.importing.conditions import ImportChoices, from_name, name_pattern
 from tunnel_sim.files.importing.tables import Channel, Table
 from tunnel_sim.files.importing.units import claims, split_unit
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean, one_line
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean, one_line
 
 _OFF = 0.5  # of the range: the median of a wind speed that starts late is further from zero
 _EVEN = 1e-9  # of a value: a column that varies less is constant
@@ -214,7 +214,7 @@ def of_short_table(table: Table) -> list[Hint]:
         values = channel.values[np.isfinite(channel.values)]
         if key is None or not values.any():
             continue
-        what = f"'{one_line(channel.name, 60)}' of {values.size} values"
+        what = f"'{one_line(channel.name, 60)}' of {counted(values.size, 'value')}"
         part = f" in '{one_line(table.part, 40)}'" if table.part else ""
         why = f"it may state {key}, but not of which run"
         found.append(Hint(key, float("nan"), what + part, why, "--conditions RUNS.csv states it run by run"))
