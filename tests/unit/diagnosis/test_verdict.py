@@ -295,7 +295,7 @@ def test_springs_that_may_be_off_are_said_with_what_would_tell():
         "would explain the gap beside coulomb friction, such as 16.12 N m/rad is 1.961 ± 0.010 % softer than "
         "stated and 21 N m/rad"
     ) in text
-    assert text.endswith(": measure their stiffness again.")
+    assert text.endswith(". Measure their stiffness again.")
 
 
 def test_a_second_mode_is_said_before_the_gap():
