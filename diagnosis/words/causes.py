@@ -101,7 +101,14 @@ def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
         )
         return f"{one_of_springs(document)}, {' or '.join(each)}"
     values = {full: one["value"] for full, one in given.items()}
-    return kind.phrase(values, {full: one["std"] for full, one in given.items()}, for_people)
+    said = {info.unit: given[info.name]["unit"] for info in kind.parameters() if info.name in given}
+
+    def text(value: float, std: float | None, unit: str) -> str:
+        return for_people(
+            value, std, said.get(unit, unit)
+        )  # moments are per inertia where nothing states one
+
+    return kind.phrase(values, {full: one["std"] for full, one in given.items()}, text)
 
 
 def one_of_springs(document: Document) -> str:
@@ -145,15 +152,27 @@ def consequence(document: Document) -> str:
         if two is None or not one["value"] or not all(g.get("determined", True) for g in (one, two)):
             continue
         label = COEFFICIENTS.get(name, name)
+        if two["std"] is not None and two["std"] > _OPEN * abs(two["value"]):
+            said.append(
+                f"{label} stays open ({for_people(two['value'], two['std'], unit_mark(two['unit']))})"
+            )
+            continue
+        label = f"the size of {label}" if one["value"] < 0.0 and two["value"] < 0.0 else label
         share = 100.0 * (abs(two["value"]) / abs(one["value"]) - 1.0)
         values = f"{_digits(one['value'])} → {_digits(two['value'])}"
         if one["value"] * two["value"] < 0.0:
-            said.append(f"{label} changes its sign ({values})")
+            said.append(f"{COEFFICIENTS.get(name, name)} changes its sign ({values})")
         elif abs(share) < 0.5:
             said.append(f"{label} changes by less than 1 %")
         else:
             said.append(f"{label} {'falls' if share < 0.0 else 'rises'} by {abs(share):.0f} % ({values})")
-    return f"{listed(said)}." if said else ""
+    if not said:
+        return ""
+    text = listed(said)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+_OPEN = 0.5  # standard deviations, as a share of the value, beyond which its change says nothing
 
 
 def _digits(value: float) -> str:

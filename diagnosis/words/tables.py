@@ -287,11 +287,12 @@ def hidden_line(document: Document) -> str:
     for name, given in after.items():
         move = first["moves"].get(name)
         if move is not None and given.get("std") and move["value"] > given["std"]:
-            by = f"{significant(move['value'], 2)} {unit_mark(given['unit'])}"
-            moved.append(f"{COEFFICIENTS.get(name, name)} by {by}")
+            by = f"{significant(move['value'], 2)} {'' if given['unit'] == '1' else unit_mark(given['unit'])}"
+            moved.append(f"{COEFFICIENTS.get(name, name)} by {by.strip()}")
     if not moved:
         return ""
-    size = f"{significant(abs(first['size']['value']), 2)} {unit_mark(first['size']['unit'])}"
+    mark = "" if first["size"]["unit"] == "1" else unit_mark(first["size"]["unit"])
+    size = f"{significant(abs(first['size']['value']), 2)} {mark}"
     return (
         f"What could hide: {plain(first['effect'])} of up to {size.strip()}, which these runs do not exclude, "
         f"would move {' and '.join(moved)}. The intervals allow for it."

@@ -104,7 +104,11 @@ def _answer(document: Document, rest: str) -> str:
     closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
     if not document["decided"]:
         said = f"There is a gap ({size}), and its cause is undecided."
-        with_first = "" if causes == _UNKNOWN else f"With the first of them added, {closes}"
+        with_first = (
+            ""
+            if causes == _UNKNOWN
+            else f"With {plain(*without_scatter(causes)) or BETWEEN_RUNS} added, {closes}"
+        )
         return " ".join(filter(None, (said, undecided_words(document), repeats, with_first)))
     if causes == _UNKNOWN:
         nearly = "" if found["nearly"] is None else _nearly(found["nearly"])
@@ -142,7 +146,7 @@ def undecided_words(document: Document) -> str:
     for name, value in common["channels"].items():
         if name not in named:
             parts.append(f"act on the {name} ({probability(value)})")
-    said = f"The likely answers {' and '.join(parts or ['have no effect and no channel in common'])}."
+    said = f"The likely answers {' and '.join(parts)}. " if parts else ""
     answers = []
     for one in credible[:most_named]:
         answers.append(f"{_among_answers(one['effect'])} ({probability(one['probability'])})")
@@ -152,8 +156,8 @@ def undecided_words(document: Document) -> str:
     together = probability(sum(one["probability"] for one in credible))
     if document["unpredictive"]:
         best = _among_answers(document["unpredictive"]).capitalize()
-        said += f" {best} fits best, but does not predict readings held out of the fit."
-    return f"{said} The answer is one of these, with probability {together} together: {most}."
+        said += f"{best} fits best, but does not predict readings held out of the fit. "
+    return f"{said}The answer is one of these, with probability {together} together: {most}."
 
 
 def _among_answers(effect: str) -> str:

@@ -81,8 +81,12 @@ def import_files(
             help="A condition of all runs, or a size; or KEY=NAME of what states it. May be repeated.",
         ),
     ] = None,
-    start: Annotated[float | None, _runs("--start", help="Leave out earlier samples, s.")] = None,
-    end: Annotated[float | None, _runs("--end", help="Leave out later samples, s.")] = None,
+    start: Annotated[
+        float | None, _runs("--start", help="Leave out samples before this time of the file, s.")
+    ] = None,
+    end: Annotated[
+        float | None, _runs("--end", help="Leave out samples after this time of the file, s.")
+    ] = None,
     rest: Annotated[
         float | None, _condition("--rest", help="Reading at rest of every run, rad: it is subtracted.")
     ] = None,
