@@ -69,7 +69,7 @@ class _Subject:
         before = [(run.record.time_s.copy(), run.record.yaw_rad.copy()) for run in campaign.runs]
         try:
             found = self.estimator.estimate(campaign)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             what = f"raises an exception with {of}: {raised_line(error)}"
             remedy = "return an Estimate whose statuses say what failed"
             if "read-only" in str(error):

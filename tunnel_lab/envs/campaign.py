@@ -190,10 +190,12 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             goal is reached, whether the runs are used up, info.
 
         Raises:
-            TunnelError: when the action is not in the menu, or there was no reset.
+            TunnelError: when the action is not in the menu, there was no reset, or the runs are used up.
         """
         if self._session is None:
             raise refusal("there is no episode", "call reset() first")
+        if len(self.known.choices) >= self.max_runs:
+            raise refusal("the runs of the episode are used up", "call reset() first")
         before = self.known
         self.known = self._session.perform(before, self.conditions.menu.choice(action))
         if self.conditions.effects:

@@ -124,7 +124,7 @@ def estimate_rows(
     try:
         estimate: Estimate | None = identify(campaign, estimator, throw=False)
         status = "" if estimate is None else estimate.status.name.lower()
-    except Exception as error:  # any exception of an estimator is counted and shown
+    except (Exception, SystemExit) as error:  # whatever an estimator raises is counted and shown
         estimate, status = None, f"raised {type(error).__name__}"
         raised = {"traceback": own_traceback(error)}
     milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)

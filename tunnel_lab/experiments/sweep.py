@@ -151,7 +151,7 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
                     found = identify(campaign, _estimator(name), throw=False)
                 except TunnelError as error:
                     found = Failure(REFUSED, one_line(error))
-                except Exception as error:
+                except (Exception, SystemExit) as error:
                     found = Failure(RAISED, one_line(raised_line(error)), own_traceback(error))
             answers.append((case, name, found))
     if not plan.document.estimators:

@@ -56,6 +56,13 @@ class Loud:
 
     def estimate(self, campaign):
         raise NotImplementedError
+
+
+class Leaves:
+    name = "leaves"
+
+    def estimate(self, campaign):
+        raise SystemExit(3)
 '''
 GRID = """
 schema_version = 1
@@ -125,6 +132,14 @@ def test_score_takes_it_into_its_processes(folder: Path) -> None:
     assert "broken raised an exception 4 times; counted as failures. The first:" in done.stderr
     assert done.stderr.count("Traceback") == 1
     assert RAISED in done.stderr
+
+
+@pytest.mark.usefixtures("folder")
+def test_one_that_leaves_the_program_is_counted_as_a_failure(tunnel) -> None:
+    status, out, err = tunnel("score", "--jobs", "0", "grid.toml", "-e", "own_method:Leaves")
+    assert status == 0
+    assert " leaves " in out
+    assert "leaves raised an exception 4 times; counted as failures. The first:" in err
 
 
 @pytest.mark.usefixtures("folder")

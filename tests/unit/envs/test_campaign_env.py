@@ -160,6 +160,8 @@ def test_it_is_truncated_when_the_runs_are_used_up():
     *_, terminated, truncated, info = env.step(OFF)
     assert (terminated, truncated) == (False, True)
     assert len(info["campaign"].runs) == 2
+    with pytest.raises(TunnelError, match="the runs of the episode are used up; call reset"):
+        env.step(OFF)
 
 
 def test_a_lost_run_costs_its_time_and_gives_no_information():

@@ -186,6 +186,14 @@ def test_an_exception_comes_with_its_traceback() -> None:
     assert 'raise ZeroDivisionError("no swing")' in note
 
 
+def test_leaving_the_program_is_an_exception() -> None:
+    def leaves(found: Estimate, campaign: Campaign) -> Estimate:
+        raise SystemExit(3)
+
+    with pytest.raises(TunnelError, match="raises an exception with .*SystemExit: 3"):
+        check_estimator(Pencil(leaves))
+
+
 def test_the_same_without_a_fault_passes() -> None:
     check_estimator(Pencil(lambda found, _: found))
 
