@@ -169,7 +169,8 @@ def consequence(document: Document) -> str:
     if not said:
         return ""
     text = listed(said)
-    return f"{text[0].upper()}{text[1:]}."
+    first = text[0].upper() if text[0].isascii() else text[0]  # a Greek letter is a symbol
+    return f"{first}{text[1:]}."
 
 
 _OPEN = 0.5  # standard deviations, as a share of the value, beyond which its change says nothing

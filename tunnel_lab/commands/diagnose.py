@@ -274,6 +274,9 @@ def show(document: dict[str, Any]) -> None:
     show_tables(*(rich_table(table(document)) for table in behind))
     for line in (*tables.patch_lines(document), *tables.closing_lines(document)):
         say(line)
+    say("What to do next:")
+    for number, step in enumerate(verdict.next_steps(document), 1):
+        say(f"{number}. {step}")
 
 
 def compare(

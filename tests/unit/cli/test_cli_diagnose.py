@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.words.verdict import next_steps
 from tests.reference.free_decays import Setting, campaign
 from tests.unit.cli.conftest import PROGRESS
 from tunnel_sim.effects import ALL_EFFECTS
@@ -69,7 +70,11 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
     assert {c["effect"] for c in document["candidates"]} <= {CAUSE, "quadratic_damping", "none", "unknown"}
     for text in ("friction_moment", "± ", " N m", "Cnβ [1/rad]", "before", "after", "cannot show", "Where: "):
         assert text in out
-    lines = [line.split() for line in out.splitlines()]
+    printed = out.splitlines()
+    steps = printed[printed.index("What to do next:") + 1 :]
+    assert [f"{number}. {step}" for number, step in enumerate(next_steps(document), 1)] == steps
+    assert steps
+    lines = [line.split() for line in printed]
     assert any(words[:1] == [CAUSE] for words in lines)
     for run in document["gap"]["runs"]:
         assert any(words[:1] == [run["id"]] for words in lines)
