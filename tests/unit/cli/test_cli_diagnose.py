@@ -72,8 +72,8 @@ def test_a_planted_effect_is_named_in_words_and_in_the_json(
         assert text in out
     printed = out.splitlines()
     steps = printed[printed.index("What to do next:") + 1 :]
-    assert [f"{number}. {step}" for number, step in enumerate(next_steps(document), 1)] == steps
-    assert steps
+    assert [f"{number}. {step}" for number, step in enumerate(next_steps(document), 1)] == steps[:-1]
+    assert len(steps) > 2  # and where the document is
     lines = [line.split() for line in printed]
     assert any(words[:1] == [CAUSE] for words in lines)
     for run in document["gap"]["runs"]:

@@ -394,9 +394,8 @@ def test_what_the_causes_change_is_said_in_per_cent():
     for place, when in enumerate(("before", "after")):
         for name, pair in values.items():
             one["coefficients"][when][name]["value"] = pair[place]
-    assert "Cnβ falls by 9 % (0.590 → 0.537) and the size of Cnr rises by 2 % (−0.200 → −0.204)." in verdict(
-        one, ""
-    )
+    words = "Cnβ falls by 9 % (0.590 → 0.537) and the size of Cnr rises by 2 % (−0.200 → −0.204)."
+    assert words in verdict(one, "")
     one["found"]["immaterial"] = {"cn_beta": 0.001}
     assert "Cnβ falls by" not in verdict(one, "")
 

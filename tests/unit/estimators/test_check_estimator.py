@@ -187,10 +187,10 @@ def test_an_exception_comes_with_its_traceback() -> None:
 
 
 def test_leaving_the_program_is_an_exception() -> None:
-    def leaves(found: Estimate, campaign: Campaign) -> Estimate:
+    def leaves(_: Estimate, __: Campaign) -> Estimate:
         raise SystemExit(3)
 
-    with pytest.raises(TunnelError, match="raises an exception with .*SystemExit: 3"):
+    with pytest.raises(TunnelError, match=r"raises an exception with .*SystemExit: 3"):
         check_estimator(Pencil(leaves))
 
 
