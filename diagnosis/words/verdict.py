@@ -104,11 +104,9 @@ def _answer(document: Document, rest: str) -> str:
     closes = f"{share(gap['closed'])} of the gap closes {gap['closed_on']}."
     if not document["decided"]:
         said = f"There is a gap ({size}), and its cause is undecided."
-        with_first = (
-            ""
-            if causes == _UNKNOWN
-            else f"With {plain(*without_scatter(causes)) or BETWEEN_RUNS} added, {closes}"
-        )
+        first = without_scatter(causes)
+        added = f"With {plain(*first)} added," if first else "With these differences allowed for,"
+        with_first = "" if causes == _UNKNOWN else f"{added} {closes}"
         return " ".join(filter(None, (said, undecided_words(document), repeats, with_first)))
     if causes == _UNKNOWN:
         nearly = "" if found["nearly"] is None else _nearly(found["nearly"])
