@@ -169,6 +169,7 @@ def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
     assert RAISED in traceback
 
 
+@pytest.mark.slow
 def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
     words = ("sweep", "small.toml", "--out", "out", "--jobs", "1", "-e", "own_method:Mine")
     done = in_a_process(*words, cwd=folder)
@@ -184,6 +185,7 @@ def test_sweep_takes_it_into_its_processes(folder: Path) -> None:
     assert "the sweep was begun with estimator mine" in again.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("folder")
 def test_sweep_prints_the_first_traceback(tunnel) -> None:
     status, _, err = tunnel("sweep", "small.toml", "--out", "out", "--jobs", "1", "-e", "own_method:Broken")

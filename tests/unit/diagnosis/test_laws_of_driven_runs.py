@@ -75,6 +75,7 @@ def test_the_rise_of_friction_at_low_rates_is_proposed(answer: Diagnosis, tmp_pa
     assert [kind.name for kind in read_effects(path)] == ["proposed_rate"]
 
 
+@pytest.mark.slow
 def test_plain_dry_friction_needs_no_formula() -> None:
     found = diagnose(campaign(0.0), kinds=vocabulary(include=["coulomb_friction"]))
     assert found.causes == ("coulomb_friction",)

@@ -45,6 +45,7 @@ def campaign(hum: float = 0.0) -> Campaign:
     return Campaign("driven", RigProperties(), SensorProperties(RATE), tuple(runs))
 
 
+@pytest.mark.slow
 def test_the_drive_is_not_called_a_force_on_the_rig() -> None:
     found = diagnose(campaign(), kinds=vocabulary(include=["coulomb_friction"]))
     assert found.where is not None
@@ -52,6 +53,7 @@ def test_the_drive_is_not_called_a_force_on_the_rig() -> None:
     assert "spectral line" not in where_words(found.to_json_dict())
 
 
+@pytest.mark.slow
 def test_a_line_beside_the_drive_is_still_found() -> None:
     found = diagnose(campaign(hum=2.0), kinds=vocabulary(include=["coulomb_friction"]))
     assert found.where is not None

@@ -15,6 +15,7 @@ def printed(code: str, *paths: Path) -> str:
     return done.stdout + done.stderr.strip().rpartition("\n")[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["FreeDecay-v0", "Campaign-v0"])
 def test_the_name_with_its_module_needs_no_import(name: str) -> None:
     code = f'env = gymnasium.make("tunnel_sim.envs:tunnel_sim/{name}")\nprint(env.spec.id, len(env.reset(seed=1)))'
