@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import shutil
 import sys
@@ -108,11 +109,12 @@ def find_faults(plan: CampaignPlan, folder: Path) -> list[str]:
     from tunnel_sim.files.writing import write_json, write_whole
 
     files = Session(folder, CAMPAIGN)  # named as on the bench, which opens them as they are
-    text = (resources.files("tunnel_lab") / "data" / PLAN).read_bytes()
+    text = (resources.files("tunnel_lab") / "data" / PLAN).read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^seed = \d+", f"seed = {plan.seed}", text, count=1)  # comments stay as they are
     with bar("simulating runs", len(plan.conditions)) as progress:
         campaign = simulate_campaign(plan, progress=progress)
     write_campaign(campaign, files.campaign, truth=truth_document(plan), overwrite=True)
-    write_whole(folder / PLAN, text)
+    write_whole(folder / PLAN, text.encode())
     # Everything is written before anything is printed: the reader of a pipe may close it early.
     estimate = identify(campaign, CHECKED_ESTIMATOR, throw=False)
     write_json(files.estimate(CHECKED_ESTIMATOR), estimate.to_json_dict())

@@ -121,7 +121,7 @@ def test_the_faults_are_found_whatever_the_noise(tunnel: Tunnel, tmp_path: Path,
     assert json.loads(session.diagnosis.read_text("utf-8"))["decided"]
     assert json.loads(session.estimate("output_error").read_text("utf-8"))["cn_beta"]
     assert json.loads((session.campaign / "truth.json").read_text("utf-8"))["seed"] == seed
-    assert load_plan(tmp_path / PLAN).name == "demo"
+    assert (load_plan(tmp_path / PLAN).name, load_plan(tmp_path / PLAN).seed) == ("demo", seed)
 
 
 def test_every_estimator_of_the_comparison_is_kept_and_shown(
