@@ -24,7 +24,7 @@ from tunnel_reference.readings import ReadingTerm
 from tunnel_reference.readings import read_motion as read_reference
 from tunnel_reference.severity import bind_effects, simulate_motions
 from tunnel_sim.effects import Effect, EffectChain, effect_from, the_effect
-from tunnel_sim.effects.base import read_motion
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate_motion
 from tunnel_sim.files.rig_file import load_rig

@@ -15,7 +15,7 @@ from tunnel_lab.bench import work
 from tunnel_lab.bench.parts import Chart, Fault, address, button
 from tunnel_lab.bench.workspace import new_session
 from tunnel_sim.effects import Effect, EffectChain, effect_class, known_effects
-from tunnel_sim.effects.base import read_motion
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.files.writing import write_whole
 from tunnel_sim.physics.forward import forward_motion

@@ -22,7 +22,7 @@ from identification.estimators import free_decay_estimators
 from tunnel_lab.experiments.bounds import coefficients_bound, decay_bound
 from tunnel_lab.terminal.inputs import NO_EFFECT, parse_effect
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
-from tunnel_sim.effects.base import read_motion
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.plan_file import check_size, first_twice
 from tunnel_sim.files.reading import as_described, check_count, check_shape
 from tunnel_sim.files.rig_file import load_rig

@@ -107,7 +107,7 @@ class ShownRun:
 
     def record(self) -> Record:
         """The potentiometer's reading, simulated at each call with the same bits."""
-        from tunnel_sim.effects.base import read_motion
+        from tunnel_sim.effects.chain import read_motion
         from tunnel_sim.engine.model import build_model
         from tunnel_sim.engine.simulate import simulate_motion
 

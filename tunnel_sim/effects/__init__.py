@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tunnel_sim.effects.base import Effect, EffectChain
+from tunnel_sim.effects.base import Effect
+from tunnel_sim.effects.chain import EffectChain
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.effects.registry import (
     ALL_EFFECTS,

@@ -1,6 +1,6 @@
-"""The base class of all effects: parameters, hooks where an effect acts, traits for finding it; a run's chain.
+"""The base class of all effects: parameters, hooks where an effect acts, traits for finding it.
 
-The hooks of the effects of a run are called by its chain and nowhere else.
+The hooks of the effects of a run are called by its chain (`tunnel_sim.effects.chain`) and nowhere else.
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 import numpy as np
 
 from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import Circumstances, ParameterInfo, Trial, WindOnRun, moment_scale
-from tunnel_sim.physics.run_settings import Motion, RunSettings
+from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import SensorModel
-from tunnel_sim.vocabulary.record import Array, Record
+from tunnel_sim.vocabulary.record import Array
 
 REFERENCE_SPEED = 20.0
 """Wind speed at which a speed-dependent form equals the textbook form, m/s."""
@@ -428,160 +428,3 @@ def make_effect(kind: type[Effect], parameters: Mapping[str, float]) -> Effect:
             remedy = did_you_mean(name, known)
             raise TunnelError(f"unknown parameter {name!r}", where=f"effect {kind.name}", remedy=remedy)
     return kind(**parameters)
-
-
-@dataclass(frozen=True, eq=False)
-class EffectChain:
-    """The effects that act in one run.
-
-    Args:
-        effects: in the order in which they act.
-        drawn: the random part of each effect in this run.
-        deviations: of the true wind speed, spring and mechanical damping from what is stated, relative, by name.
-    """
-
-    stated: RunSettings
-    effects: tuple[Effect, ...]
-    drawn: tuple[Drawn, ...]
-    deviations: Mapping[str, float] = field(default_factory=dict)
-
-    @classmethod
-    def draw(cls, stated: RunSettings, effects: Sequence[Effect], rng: np.random.Generator) -> EffectChain:
-        """Draw the random parts of the effects in one run.
-
-        Args:
-            effects: in the order in which they act.
-            rng: parent generator. Each effect draws from generators spawned from it, one for the motion and one
-                for the sensor, so an effect never changes what is later drawn from ``rng`` itself.
-        """
-        motion, sensor = rng.spawn(len(effects)), rng.spawn(len(effects))
-        drawn = tuple(
-            effect.draw(stated, of_sensor if _overrides(effect, *_SEEN) else of_motion)
-            for effect, of_motion, of_sensor in zip(effects, motion, sensor, strict=True)
-        )
-        return cls(stated, tuple(effects), drawn)
-
-    def physics(self) -> RunSettings:
-        """The physics of the run with the effects; a spring whose root moves pulls with its true stiffness."""
-        run = self.stated
-        for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            run = effect.on_run(run, self.stated, drawn)
-        if self.deviations:
-            run = run.with_deviations(self.deviations)
-        if run.drive is None or run.drive.on_body:
-            return run
-        return replace(run, drive=replace(run.drive, scale=run.spring_stiffness))
-
-    @property
-    def skips(self) -> bool:
-        """Whether the motion is read at other times than stated."""
-        return any(effect.skips and not effect.is_null for effect in self.effects)
-
-    def true_times(self, time_s: Array) -> Array:
-        """When the motion is read.
-
-        Args:
-            time_s: by the time stamps, s, shape (n,).
-
-        Returns:
-            The true times since the release, s, shape (n,).
-        """
-        for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            time_s = effect.on_time(time_s, self.stated, drawn)
-        return time_s
-
-    def seen(self, motion: Motion, time_s: Array, derivative: int = 0) -> Array:
-        """What the sensor sees of a motion before its zero and noise.
-
-        Args:
-            motion: of the rod's upper end, as long as `physics` asks for.
-            time_s: of the samples by their time stamps, s, shape (n,); need not be those of the motion.
-            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
-
-        Returns:
-            The angle seen, rad, or its derivative, rad/s or rad/s², shape (n,); cubic between the motion's own
-            times.
-        """
-        from scipy.interpolate import CubicHermiteSpline  # only here: slow to load
-
-        true = self.true_times(time_s)
-        path = CubicHermiteSpline(motion.time_s, motion.angle, motion.rate)
-        return self.angle(np.asarray(path(true, derivative), np.float64), true, derivative)
-
-    def angle(self, angle: Array, time_s: Array, derivative: int = 0) -> Array:
-        """The angle that the sensor measures, before zero and noise are added.
-
-        Args:
-            angle: of the rod's upper end, or its derivative, rad, rad/s or rad/s², shape (n,).
-            time_s: true times since the release, s, shape (n,).
-            derivative: which derivative of the angle the sensor measures: 0, 1 or 2.
-
-        Returns:
-            The measured angle or its derivative, in the same unit, shape (n,).
-        """
-        stated = self.stated
-        if stated.drive is not None:  # as it acts
-            stated = replace(stated, drive=self.physics().drive)
-        for effect, drawn in zip(self.effects, self.drawn, strict=True):
-            beside = effect.oscillation(time_s, stated, drawn, derivative)
-            seen = angle if beside is None else angle + beside
-            angle = effect.on_angle(seen, time_s, self.stated, drawn)
-        return angle
-
-    def sensor(self, sensor: SensorModel) -> SensorModel:
-        """The true sensor, given the stated one."""
-        for effect in self.effects:
-            sensor = effect.on_sensor(sensor)
-        return sensor
-
-    def reading(self, reading: Array) -> Array:
-        """Change the reading after noise and before quantisation.
-
-        Args:
-            reading: with zero and noise, rad, shape (n,).
-
-        Returns:
-            The changed reading, rad, shape (n,).
-        """
-        for effect in self.effects:
-            reading = effect.on_reading(reading)
-        return reading
-
-    @property
-    def reads_plainly(self) -> bool:
-        """Whether no effect changes the measured angle or the reading."""
-        return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in self.effects)
-
-
-_SEEN = ("oscillation", "on_angle")
-
-
-def _overrides(effect: Effect, *hooks: str) -> bool:
-    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
-
-
-def read_motion(
-    motion: Motion, sensor: SensorModel, rng: np.random.Generator, chain: EffectChain | None = None
-) -> Record:
-    """The reading y = quantised(β + zero + noise) with the effects on sensor and reading; of unlimited range."""
-    angle, time = motion.angle, motion.time_s
-    if chain is not None and chain.skips:
-        time = time[: round(chain.stated.duration / (time[1] - time[0]))]
-        angle = chain.seen(motion, time)
-    elif chain is not None:
-        angle = chain.angle(angle, time)
-    sensor = sensor if chain is None else chain.sensor(sensor)
-    reading = angle + sensor.zero + sensor.noise_std * rng.standard_normal(angle.shape)
-    if chain is not None:
-        reading = chain.reading(reading)
-    return Record(time, quantise(reading, sensor.resolution))
-
-
-def quantise(reading: Array, step: float) -> Array:
-    """Round to a multiple of the resolution.
-
-    Args:
-        reading: rad, any shape.
-        step: rad; 0 leaves the reading as it is.
-    """
-    return np.round(reading / step) * step if step > 0.0 else reading

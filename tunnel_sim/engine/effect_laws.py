@@ -12,7 +12,8 @@ from functools import cache
 import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.base import make_effect, read_motion
+from tunnel_sim.effects.base import make_effect
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.engine.simulate import simulate, simulate_motion, simulate_motions
 from tunnel_sim.files.rig_file import load_rig

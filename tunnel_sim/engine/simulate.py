@@ -14,7 +14,7 @@ import numpy as np
 from mujoco import batch as mujoco_batch
 
 from tunnel_sim.effects import Effect, EffectChain
-from tunnel_sim.effects.base import read_motion
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.model import Model, build_model
 from tunnel_sim.physics.moment_law import forward_library
 from tunnel_sim.physics.run_settings import Motion, RunSettings, sampling

@@ -12,8 +12,9 @@ import mujoco
 import numpy as np
 
 from tunnel_sim.effects import Effect, EffectChain, effect_from, known_effects
-from tunnel_sim.effects.base import SPRING_TOLERANCE, read_motion
+from tunnel_sim.effects.base import SPRING_TOLERANCE
 from tunnel_sim.effects.between_runs import BetweenRuns
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.engine.simulate import Progress, simulate_motions
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings

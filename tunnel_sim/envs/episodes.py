@@ -1,6 +1,6 @@
 """Parallel episodes: readings, information, end, and the campaign they give; a vector environment has many.
 
-Readings are bit-identical to those of `tunnel_sim.effects.base.read_motion`: zero, noise and quantisation are
+Readings are bit-identical to those of `tunnel_sim.effects.chain.read_motion`: zero, noise and quantisation are
 vectorised, effects act run by run.
 """
 
@@ -17,7 +17,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tunnel_sim.effects import EffectChain
-from tunnel_sim.effects.base import quantise
+from tunnel_sim.effects.chain import quantise
 from tunnel_sim.engine.virtual_campaign import stated_run
 from tunnel_sim.envs import EnvError, as_env_error
 from tunnel_sim.envs.conditions import FreeDecayConfig, RunPlan, angle_limit, plan_run

@@ -12,7 +12,7 @@ from diagnosis.likelihood.per_run import skip
 from identification.signal.driven import driven_rows
 from tests.unit.gap_campaigns import nominal
 from tunnel_sim.effects import EffectChain, effect_class, effect_from
-from tunnel_sim.effects.base import read_motion
+from tunnel_sim.effects.chain import read_motion
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.forward import forward_motion
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
