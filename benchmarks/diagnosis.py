@@ -24,7 +24,8 @@ from rich.table import Table
 from benchmarks.throughput import numbers
 from diagnosis import diagnose
 from diagnosis.likelihood.least_squares import Fit, fit
-from diagnosis.likelihood.problem import Problem, campaign_rig
+from diagnosis.likelihood.motions import campaign_rig
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import StartingPoint, nominal_start, starting_points
 from diagnosis.model.blocks import prepare
 from diagnosis.noise.sensor_noise import campaign_noise

@@ -22,6 +22,7 @@ from identification.campaign.between_runs import (
     width_quantiles,
 )
 from tunnel_sim.effects import ALL_EFFECTS
+from tunnel_sim.physics.settings_table import SettingsTable
 
 _CENTRAL = (0.05, 0.5, 0.95)  # levels of the quantiles
 _NUMBERS = 2  # by which a run may deviate: its frequency and its damping
@@ -155,7 +156,8 @@ class _Runs:
         run, pair = problem.data.runs[index], self.alone
         stated = problem.stated(self.fitted.point.common, self.fitted.point.release[index], run)
         inertia, damping, stiffness = linear_coefficients(self.fitted, index)
-        changes = np.array([one.change(stated, problem.data) for one in self.scatter])
+        table = SettingsTable.of([stated])
+        changes = np.concatenate([one.change(table, problem.data) for one in self.scatter])
         # a change of the run's own spring and damper is one of its frequency and its damping
         per = np.array([changes[pair[0], 0] / (2.0 * stiffness), changes[pair[1], 1] / damping])
         deviation = self.columns.deviations[index][:, pair]

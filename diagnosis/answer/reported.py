@@ -10,7 +10,8 @@ import numpy as np
 from diagnosis.answer.held_out import Base, HeldOut
 from diagnosis.facts.closure import FITTED, ON_RUNS, Confirmation, Misfit, Waterfall, share_closed
 from diagnosis.likelihood.least_squares import Fit
-from diagnosis.likelihood.problem import Problem, blocks_beyond, campaign_rig, condensed, sample_means
+from diagnosis.likelihood.motions import blocks_beyond, campaign_rig, condensed, sample_means
+from diagnosis.likelihood.problem import Problem
 from diagnosis.model.parameters import Point
 from diagnosis.result import GapSummary, RunGap
 from diagnosis.search.prepared import COARSE_STEP

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from diagnosis.model.parameters import Parameter, Prior
 from diagnosis.model.run_data import Data
 from tunnel_sim.effects import Effect
 from tunnel_sim.effects.base import Drawn
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.record import Array
 
 _WIDE = 10.0  # widths of a usual scatter that steps of differences are a share of
 #: Share of the air's damping that deviations of the damping are relative to at least: a bearing may have none.
@@ -57,17 +61,18 @@ class Chance:
         """The same with another width."""
         return replace(self, width=float(width))
 
-    def change(self, stated: RunSettings, data: Data) -> tuple[float, float]:
-        """What a relative deviation of 1 changes of a run's stiffness (N m/rad) and damping (N m s/rad).
+    def change(self, stated: SettingsTable, data: Data) -> Array:
+        """What a relative deviation of 1 changes of stiffness (N m/rad) and damping (N m s/rad), shape (runs, 2).
 
         Args:
-            stated: the nominal physics of the run.
+            stated: the nominal physics of the runs.
         """
-        pressure, speed = data.air_moment(stated), stated.wind_speed
-        rate = pressure * data.reference_length / speed if speed > 0.0 else 0.0
+        pressure, speed = data.air_moments(stated), stated.wind_speed
+        rate = pressure * data.reference_length / np.where(speed > 0.0, speed, np.inf)
         stiffness, damping = pressure * self.derivatives.cn_beta, rate * self.derivatives.cn_r
-        own = max(self.damping, _LEAST_DAMPING * abs(damping))
-        return self.kind.departure(stated.spring_stiffness, own, stiffness, damping)
+        own = np.maximum(self.damping, _LEAST_DAMPING * np.abs(damping))
+        changes = self.kind.departure(stated.spring_stiffness, own, stiffness, damping)
+        return np.stack([np.broadcast_to(change, speed.shape) for change in changes], axis=1)
 
 
 class RunDeparture(Effect):
@@ -85,22 +90,27 @@ class RunDeparture(Effect):
             mechanical_damping=run.mechanical_damping + float(damping),
         )
 
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Add stiffness and damping."""
+        del stated
+        added = np.stack([effect.drawn_numbers(d) for effect, d in zip(effects, drawn, strict=True)])
+        runs.spring_stiffness[:] = np.maximum(runs.spring_stiffness + added[:, 0], 0.0)
+        runs["mechanical_damping"][:] += added[:, 1]
+
 
 #: The chance differences of a fit.
 Scatter = tuple[Chance, ...]
 
 
-def departure(
-    scatter: Sequence[Chance], deviations: Sequence[float], stated: RunSettings, data: Data
-) -> tuple[float, float]:
-    """What the deviations of a run change of its stiffness (N m/rad) and damping (N m s/rad).
+def departure(scatter: Sequence[Chance], deviations: Array, stated: SettingsTable, data: Data) -> Array:
+    """What the deviations of runs change of stiffness (N m/rad) and damping (N m s/rad), shape (runs, 2).
 
     Args:
-        deviations: relative, one for each chance difference.
-        stated: the nominal physics of the run.
+        deviations: relative, by run one for each chance difference, shape (runs, differences).
+        stated: the nominal physics of the runs.
     """
-    changes = [one.change(stated, data) for one in scatter]
-    return (
-        sum(k * e for (k, _), e in zip(changes, deviations, strict=True)),
-        sum(c * e for (_, c), e in zip(changes, deviations, strict=True)),
-    )
+    changes = np.stack([one.change(stated, data) for one in scatter])
+    return np.asarray(np.einsum("drk,rd->rk", changes, deviations), np.float64)

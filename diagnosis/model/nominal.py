@@ -20,9 +20,9 @@ from tunnel_sim.effects import Effect
 from tunnel_sim.effects.parameters import ParameterInfo
 from tunnel_sim.physics.expression import Expression, parse
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import Drive
-from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 
 if TYPE_CHECKING:
@@ -192,21 +192,40 @@ class NominalModel:
         Args:
             values: of all parameters by name, those of the run and those held among them.
         """
-        spring = self.spring(values, run)
-        return RunSettings(
-            spring_stiffness=max(spring, 0.0),
-            derivatives=AeroDerivatives(values.get("cn_beta", 0.0), values.get("cn_r", 0.0)),
-            yaw_inertia=values.get("yaw_inertia", 1.0),
-            mechanical_damping=values["mechanical_damping"],
-            wind_speed=run.wind_speed,
-            air_density=run.air_density,
-            release_angle=values["release_angle"],
-            release_rate=values["release_rate"],
-            duration=run.duration,
-            parameters=self.law_parameters,
-            program=_program(self.moment, spring) if self.moment else (),
-            drive=run.moment(values.get("drive_gain", 1.0), values.get("moment_offset", 0.0)),
-        )
+        return self.settings({name: np.array([value]) for name, value in values.items()}, [run]).row(0)
+
+    def settings(self, values: Mapping[str, Array], runs: Sequence[RunData]) -> SettingsTable:
+        """The physics of several runs.
+
+        Args:
+            values: of all parameters by name, those of each run and those held among them, shape (runs,) each.
+            runs: the same run may be among them with several values.
+        """
+        table, names = SettingsTable.empty(len(runs)), tuple(values)
+        rows = [
+            dict(zip(names, row, strict=True))
+            for row in zip(*(one.tolist() for one in values.values()), strict=True)
+        ]
+        spring = [self.spring(row, run) for row, run in zip(rows, runs, strict=True)]
+        columns = {
+            "spring_stiffness": np.maximum(spring, 0.0),
+            "yaw_inertia": values.get("yaw_inertia", 1.0),
+            "wind_speed": [run.wind_speed for run in runs],
+            "air_density": [run.air_density for run in runs],
+            "duration": [run.duration for run in runs],
+            **{name: values[name] for name in ("mechanical_damping", "release_angle", "release_rate")},
+            **{name: values[name] for name in ("cn_beta", "cn_r") if name in values},
+        }
+        for name, column in columns.items():
+            table[name][:] = column
+        table.set(slice(None), self.law_parameters)
+        for place, (row, run) in enumerate(zip(rows, runs, strict=True)):
+            if self.moment:
+                table.program[place] = _program(self.moment, spring[place])
+            if run.drive is not None:
+                gain, offset = row.get("drive_gain", 1.0), row.get("moment_offset", 0.0)
+                table.drive[place] = run.moment(gain, offset)
+        return table
 
     def spring(self, values: Mapping[str, float], run: RunData) -> float:
         """Stiffness of the spring in a run, N m/rad."""

@@ -15,6 +15,7 @@ from diagnosis.model.run_noise import RunNoise
 from diagnosis.model.similarity import AS_MEASURED, REFERENCE_FREQUENCY, Similarity
 from diagnosis.settings import Settings
 from tunnel_sim.physics.run_settings import DriveMoment, RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import aerodynamic_stiffness
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -352,6 +353,16 @@ class Data:
             1.0,
             air_density=run.air_density,
             wind_speed=run.wind_speed,
+            frontal_area=self.frontal_area,
+            reference_length=self.reference_length,
+        )
+
+    def air_moments(self, runs: SettingsTable) -> Array:
+        """The same of several runs, N m, shape (runs,)."""
+        return aerodynamic_stiffness(
+            1.0,
+            air_density=runs.air_density,
+            wind_speed=runs.wind_speed,
             frontal_area=self.frontal_area,
             reference_length=self.reference_length,
         )

@@ -16,8 +16,9 @@ from diagnosis.facts.closure import ON_RUNS, ON_STRETCHES
 from diagnosis.facts.found import Fact
 from diagnosis.facts.patch import NativeClosure, PatchedModel
 from diagnosis.likelihood.least_squares import Fit
+from diagnosis.likelihood.motions import blocks_beyond, condensed, sample_means
 from diagnosis.likelihood.partial import fit_seen
-from diagnosis.likelihood.problem import Problem, blocks_beyond, condensed, sample_means
+from diagnosis.likelihood.problem import Problem
 from diagnosis.model.joint import Joint, LooseJoint, reach
 from diagnosis.model.run_data import FOLDS
 from diagnosis.model.similarity import REFERENCE_FREQUENCY

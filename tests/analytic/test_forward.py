@@ -102,10 +102,11 @@ def _compensated(step: float, spring: float) -> tuple[np.ndarray, np.ndarray]:
     """Ten seconds in compensated steps, and the closed form."""
     settings = replace(Case("", spring=spring, speed=0.0).settings(), duration=10.0, release_rate=1.0)
     run, keep = forward_run(settings)
-    law, longer = compensated(settings.law(RIG), 0.0, step)
+    given = parameter_vector(settings.law(RIG))[None]
+    law, (longer,) = compensated(given, np.zeros(1), np.array([step]))
     run["step"], run["steps"] = longer, 1
     time = np.arange(round(10.0 / step)) * step
-    angle, _, _ = integrate(parameter_vector(law)[None], run, time.size)
+    angle, _, _ = integrate(law, run, time.size)
     del keep
     rig = RIG.dynamics
     stiffness, damping = spring / rig.yaw_inertia, rig.mechanical_damping / rig.yaw_inertia

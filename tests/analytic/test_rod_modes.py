@@ -12,6 +12,7 @@ from tests.marks import slow
 from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
 from tunnel_sim.physics.moment_law import parameter_vector
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, spring_end_angle
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.physics.steps import compensated, fit_stride
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
@@ -104,13 +105,14 @@ def test_a_rod_that_swings_almost_like_the_body_is_not_separated():
 )
 def test_a_step_over_several_blocks_moves_as_short_steps_do(terms):
     settings = replace(run(spring=15.0, **terms), rod_twist=None)
-    stride = fit_stride(RIG, settings, INTERVAL)
+    stride = stride_of(settings)
     assert stride == 2
-    law, step = compensated(settings.law(RIG), settings.wind_speed, stride * INTERVAL)
+    given = parameter_vector(settings.law(RIG))[None]
+    law, (step,) = compensated(given, np.array([settings.wind_speed]), np.array([stride * INTERVAL]))
     row, keep_alive = forward_run(settings)
     row["stride"], row["step"] = stride, step / stride
     for samples in (SAMPLES, SAMPLES - 1):  # the last step may cover more than is asked for
-        angle, rate, status = integrate(parameter_vector(law)[None], row, samples)
+        angle, rate, status = integrate(law, row, samples)
         assert status == 0
         assert np.max(np.abs(angle[0] - followed(settings)[:samples])) < 5e-6
         slope = np.gradient(angle[0], INTERVAL, edge_order=2)
@@ -118,18 +120,22 @@ def test_a_step_over_several_blocks_moves_as_short_steps_do(terms):
     del keep_alive
 
 
+def stride_of(settings):
+    return int(fit_stride(RIG, SettingsTable.of([settings]), np.array([INTERVAL]))[0])
+
+
 def test_a_wind_that_stiffens_shortens_the_steps():
     settings = replace(run(spring=15.0, speed=40.0), rod_twist=None)
     stiff = replace(settings, derivatives=AeroDerivatives(-2.0, -0.11))
-    assert fit_stride(RIG, settings, INTERVAL) == 2
-    assert fit_stride(RIG, stiff, INTERVAL) == 1
+    assert stride_of(settings) == 2
+    assert stride_of(stiff) == 1
 
 
 @pytest.mark.parametrize(
     "rough", [{"friction_moment": 0.01}, {"free_play": 0.01}, {"gravity_stiffness": 1.0}]
 )
 def test_kinks_and_curved_springs_keep_short_steps(rough):
-    assert fit_stride(RIG, replace(run(spring=15.0, **rough), rod_twist=None), INTERVAL) == 1
+    assert stride_of(replace(run(spring=15.0, **rough), rod_twist=None)) == 1
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-10, 3e-7, 0.02])

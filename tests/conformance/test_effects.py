@@ -16,6 +16,7 @@ from tunnel_sim.engine import effect_laws
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Record
@@ -183,3 +184,35 @@ def test_only_a_second_mode_may_be_the_motion_itself(kind: type[Effect]) -> None
     implausible = [ratio for ratio in (0.5, 0.9, 1.0, 1.2, 1.5, 1.9, 2.2, 3.1, 3.5, 6.0)
                    if not example(kind).plausible(EXAMPLE_FREQUENCY / ratio)]  # fmt: skip
     assert implausible == ([0.9, 1.0, 1.2] if kind.name == "second_mode" else [])
+
+
+def table_of(count: int) -> SettingsTable:
+    return SettingsTable.of(
+        [replace(WIND_ON, wind_speed=float(10 * n), spring_stiffness=16.0 + n) for n in range(count)]
+    )
+
+
+@each_effect
+def test_many_runs_change_as_each_of_them_does(kind: type[Effect]) -> None:
+    """Among them a null effect, a run without wind, and speeds and springs that differ."""
+    null = effect_from(kind.name, {kind.parameters()[0].name: 0.0})
+    effects = [example(kind), example(kind), example(kind), null]
+    if kind.chosen_spring() is not None:
+        effects[1] = replace(effects[1], **{str(kind.chosen_spring()): 17.0})
+    stated = table_of(len(effects))
+    drawn = [effect.draw(stated.row(n), np.random.default_rng(n)) for n, effect in enumerate(effects)]
+    together, apart = stated.copy(), stated.copy()
+    kind.on_rows(together, stated, effects, drawn)
+    for n, (effect, own) in enumerate(zip(effects, drawn, strict=True)):
+        apart.put(n, effect.on_run(stated.row(n), stated.row(n), own))
+    np.testing.assert_allclose(together.numbers, apart.numbers, rtol=1e-14)
+    assert together.series == apart.series
+    assert together.rod_twist == apart.rod_twist
+    assert together.program == apart.program
+    assert together.drive == apart.drive
+
+
+def test_a_table_gives_back_the_runs_it_was_made_of() -> None:
+    runs = [WIND_ON, replace(WIND_OFF, parameters={"friction_moment": 0.02}, release_rate=-0.3)]
+    table = SettingsTable.of(runs)
+    assert [replace(table.row(n), timestep=run.timestep) for n, run in enumerate(runs)] == runs

@@ -22,6 +22,7 @@ from tunnel_sim.effects.parameters import (
     settling,
 )
 from tunnel_sim.physics.run_settings import RunSettings, Series
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
 
 
@@ -155,6 +156,15 @@ class FlowMisalignment(Effect):
         if stated.wind_speed > 0.0:
             grown *= (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
         return run.with_parameters({"flow_angle": grown})
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Set the flow angle in the moment law."""
+        del drawn
+        speed = np.where(stated.wind_speed > 0.0, stated.wind_speed, REFERENCE_SPEED) / REFERENCE_SPEED
+        runs["flow_angle"][:] = cls.column(effects, "angle") * speed ** cls.column(effects, "exponent")
 
 
 @dataclass(frozen=True)
@@ -332,3 +342,21 @@ class VortexShedding(Effect):
             return run
         shedding = {"shedding_amplitude": self.amplitude, "strouhal_number": self.strouhal_number}
         return run.with_parameters(shedding | {"shedding_phase": self.drawn_number(drawn)})
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Set the terms of the moment law, with the phases drawn for the runs."""
+        del stated
+        acts = np.array([not effect.is_null for effect in effects])
+        phase = [
+            0.0 if effect.is_null else effect.drawn_number(d)
+            for effect, d in zip(effects, drawn, strict=True)
+        ]
+        for name, values in (
+            ("shedding_amplitude", cls.column(effects, "amplitude")),
+            ("strouhal_number", cls.column(effects, "strouhal_number")),
+            ("shedding_phase", np.array(phase)),
+        ):
+            runs[name][acts] = values[acts]

@@ -15,6 +15,7 @@ from tunnel_sim.effects.base import Drawn, Effect
 from tunnel_sim.effects.parameters import parameter
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.vocabulary.between_runs import USUAL_SCATTER, WIDEST_SCATTER
+from tunnel_sim.vocabulary.record import Array
 
 
 def _spread(meaning: str, scale: float) -> Any:
@@ -68,8 +69,8 @@ class WindSpeedScatter(BetweenRuns):
 
     @classmethod
     def departure(
-        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
-    ) -> tuple[float, float]:
+        cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
+    ) -> tuple[Array | float, Array | float]:
         """Ka grows with V², and Ca with V."""
         del spring, damping
         return -2.0 * air_stiffness, -air_damping
@@ -99,8 +100,8 @@ class StiffnessScatter(BetweenRuns):
 
     @classmethod
     def departure(
-        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
-    ) -> tuple[float, float]:
+        cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
+    ) -> tuple[Array | float, Array | float]:
         """The spring's own."""
         del damping, air_stiffness, air_damping
         return spring, 0.0
@@ -128,8 +129,8 @@ class DampingScatter(BetweenRuns):
 
     @classmethod
     def departure(
-        cls, spring: float, damping: float, air_stiffness: float, air_damping: float
-    ) -> tuple[float, float]:
+        cls, spring: Array, damping: Array, air_stiffness: Array, air_damping: Array
+    ) -> tuple[Array | float, Array | float]:
         """The mechanical one's own."""
         del spring, air_stiffness, air_damping
         return 0.0, damping

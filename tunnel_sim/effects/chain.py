@@ -133,7 +133,12 @@ class EffectChain:
     @property
     def reads_plainly(self) -> bool:
         """Whether no effect changes the measured angle or the reading."""
-        return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in self.effects)
+        return reads_plainly(self.effects)
+
+
+def reads_plainly(effects: Sequence[Effect]) -> bool:
+    """Whether none of some effects changes the measured angle or the reading."""
+    return not any(_overrides(effect, "on_time", *_SEEN, "on_reading") for effect in effects)
 
 
 _SEEN = ("oscillation", "on_angle")

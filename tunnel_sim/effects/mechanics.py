@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, cos, exp, isclose, log, pi, sqrt
 
+import numpy as np
+
 from tunnel_sim.effects.base import SPRING_TOLERANCE, Drawn, Effect, Text
 from tunnel_sim.effects.parameters import Circumstances, Trial, WindOnRun, exponent, parameter
 from tunnel_sim.physics import steps
 from tunnel_sim.physics.expression import parse
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 
 _RINGING_STEP = 0.02  # relative: the half-power width of a rod's ringing, whose damping is 1 % of critical
 
@@ -259,6 +262,16 @@ class SpringMiscalibration(Effect):
             return run
         return dataclasses.replace(run, spring_stiffness=run.spring_stiffness * (1.0 + self.error))
 
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Correct the stiffness of the spring's runs."""
+        del drawn
+        spring, its = stated.spring_stiffness, cls.column(effects, "spring_stiffness")
+        concerned = np.abs(spring - its) <= SPRING_TOLERANCE * np.maximum(np.abs(spring), np.abs(its))
+        runs.spring_stiffness[concerned] *= 1.0 + cls.column(effects, "error")[concerned]
+
 
 @dataclass(frozen=True)
 class CoulombFriction(Effect):
@@ -311,6 +324,16 @@ class CoulombFriction(Effect):
         if self.is_null or self.presliding == 0.0:
             return sliding
         return steps.for_contact(sliding.with_parameters({"presliding": self.presliding}))
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Set the terms of the moment law."""
+        del stated, drawn
+        friction = cls.column(effects, "friction_moment")
+        runs["friction_moment"][:] = friction
+        runs["presliding"][:] = np.where(friction != 0.0, cls.column(effects, "presliding"), 0.0)
 
 
 @dataclass(frozen=True)

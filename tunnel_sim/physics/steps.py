@@ -14,12 +14,16 @@ divided by whole numbers, so that a sample interval remains a whole number of st
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from math import ceil, exp, inf, isfinite, log, pi, sqrt
+from math import ceil, inf, isfinite, log, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable, column_places
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import aerodynamic_damping, aerodynamic_stiffness
+from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
 #: Greatest relative error of the body's frequency due to integration; the damping ratio is then wrong by 9e-8.
@@ -58,57 +62,64 @@ def whole_steps(sample_rate: float) -> float:
     return 1.0 / (sample_rate * max(1, ceil(USUAL_RATE / sample_rate)))
 
 
-def fit_substeps(run: RunSettings, interval: float) -> int:
-    """How many steps the fits take from one block mean to the next.
+def fit_substeps(runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
+    """How many steps the fits take from one block mean to the next, shape (runs,).
 
     A fit may try a body that turns more than half a turn between block means. Such a body is not followed: the
     steps are too long for it, and its motion decays at once or grows without bound.
 
     Args:
-        interval: between block means, s.
+        interval: between block means, s, shape (runs,).
     """
-    body = sqrt(run.spring_stiffness / run.yaw_inertia)
-    turn = _FIT_KINKED_TURN if run.parameters.get("free_play") else _FIT_BODY_TURN
-    longest = min(_FIT_STEP, turn / min(max(body, 1e-9), _FIT_MOST_TURN / interval))
-    if run.rod_twist is not None:
-        rod = run.rod_twist.free_frequency(run.yaw_inertia)
-        longest = min(longest, max(ROD_TURN / rod, _FIT_SHORTEST))
-    return ceil(interval / longest)
+    body = np.sqrt(runs.spring_stiffness / runs["yaw_inertia"])
+    turn = np.where(runs["free_play"] != 0.0, _FIT_KINKED_TURN, _FIT_BODY_TURN)
+    longest = np.minimum(_FIT_STEP, turn / np.minimum(np.maximum(body, 1e-9), _FIT_MOST_TURN / interval))
+    for place, rod in enumerate(runs.rod_twist):
+        if rod is not None:
+            fastest = rod.free_frequency(float(runs["yaw_inertia"][place]))
+            longest[place] = min(longest[place], max(ROD_TURN / fastest, _FIT_SHORTEST))
+    return np.ceil(interval / longest).astype(np.int64)
 
 
-def fit_stride(rig: Rig, run: RunSettings, interval: float) -> int:
-    """How many block means one step of a fit covers; the motion between its ends is cubic.
+def fit_stride(rig: Rig, runs: SettingsTable, interval: Array) -> NDArray[np.int64]:
+    """How many block means one step of a fit covers, shape (runs,); the motion between its ends is cubic.
 
-    The rod is rigid. 1 where a moment has a kink, is sampled, or is not mostly linear.
+    The rods are rigid. 1 where a moment has a kink, is sampled, or is not mostly linear.
 
     Args:
-        interval: between block means, s.
+        interval: between block means, s, shape (runs,).
     """
-    if run.series or run.program or any(run.parameters.get(name) for name in _ROUGH):
-        return 1
-    turn = max(body_rate(rig, run) * interval, 1e-9)
-    return max(1, min(_FIT_MOST_STRIDE, int(_FIT_BODY_TURN / turn)))
+    turn = np.maximum(body_rates(rig, runs) * interval, 1e-9)
+    turn[~np.isfinite(turn)] = np.inf
+    stride = np.clip(np.floor(_FIT_BODY_TURN / turn), 1.0, _FIT_MOST_STRIDE).astype(np.int64)
+    sampled = [bool(s or p) for s, p in zip(runs.series, runs.program, strict=True)]
+    rough = np.any([runs[name] != 0.0 for name in _ROUGH], axis=0)
+    return np.where(rough | sampled, 1, stride)
 
 
-def compensated(law: Mapping[str, float], wind_speed: float, step: float) -> tuple[dict[str, float], float]:
-    """The moment law and the step with which the method's leading errors in a linear oscillation vanish.
+def compensated(law: Array, wind_speed: Array, step: Array) -> tuple[Array, Array]:
+    """The moment laws and the steps with which the method's leading errors in a linear oscillation vanish.
 
     Per step h the method turns a root λ by λh − (λh)⁵/120 + (λh)⁶/144. For an oscillation that decays slowly, at
     the rate σ, this is ωh (1 − (ωh)⁴/120): the step is made longer by that share. The decay is then
     σ (1 − (ωh)⁴/30) + ω (ωh)⁵/144, and the damper makes up for both. What is left is of the order (ωh)⁵.
 
     Args:
-        wind_speed: m/s.
-        step: h, s.
+        law: shape (runs, parameters), in the law's order.
+        wind_speed: m/s, shape (runs,).
+        step: h, s, shape (runs,).
     """
-    inertia = law["yaw_inertia"]
-    flow = {name: law[name] for name in ("air_density", "frontal_area", "reference_length")}
-    stiffness = law["spring_stiffness"] - aerodynamic_stiffness(law["cn_beta"], wind_speed=wind_speed, **flow)
-    damping = law["mechanical_damping"] - aerodynamic_damping(law["cn_r"], wind_speed=wind_speed, **flow)
-    rate = sqrt(max(0.0, stiffness) / inertia)
-    turn = min(rate * step, _FIT_BODY_TURN)  # a body too fast for the steps is not followed
-    more = damping * turn**4 / 30.0 - inertia * rate * turn**5 / 72.0
-    return {**law, "mechanical_damping": law["mechanical_damping"] + more}, step * (1.0 + turn**4 / 120.0)
+    at = column_places()
+    inertia, loss = law[:, at["yaw_inertia"]], law[:, at["mechanical_damping"]]
+    flow = {name: law[:, at[name]] for name in ("air_density", "frontal_area", "reference_length")}
+    flow["wind_speed"] = wind_speed
+    air = aerodynamic_stiffness(law[:, at["cn_beta"]], **flow)
+    damping = loss - aerodynamic_damping(law[:, at["cn_r"]], **flow)
+    rate = np.sqrt(np.maximum(0.0, law[:, at["spring_stiffness"]] - air) / inertia)
+    turn = np.minimum(rate * step, _FIT_BODY_TURN)  # a body too fast for the steps is not followed
+    found = law.copy()
+    found[:, at["mechanical_damping"]] += damping * turn**4 / 30.0 - inertia * rate * turn**5 / 72.0
+    return found, step * (1.0 + turn**4 / 120.0)
 
 
 def report_substeps(run: RunSettings, interval: float) -> int:
@@ -160,55 +171,79 @@ def check_stable(rig: Rig, run: RunSettings) -> None:
 
 
 def body_rate(rig: Rig, run: RunSettings) -> float:
-    """The fastest rate of the body on its spring, rad/s, with or without wind, at the slopes of the release."""
-    inertia, law = run.yaw_inertia, run.parameters
-    angle = abs(run.release_angle)
+    """As `body_rates`, of one run, rad/s."""
+    return float(body_rates(rig, SettingsTable.of([run]))[0])
+
+
+def body_rates(rig: Rig, runs: SettingsTable) -> Array:
+    """The fastest rate of every body on its spring, with or without wind, at the slopes of the release.
+
+    In rad/s, shape (runs,).
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # a fit may try a law that grows without bound
+        return _body_rates(rig, runs)
+
+
+def _body_rates(rig: Rig, runs: SettingsTable) -> Array:
+    inertia, angle = runs["yaw_inertia"], np.abs(runs["release_angle"])
     # stiffness of spring and gravity at the release
-    steeper = _slope(run, "stiffness_cubic", 3.0, angle, 0.2)
-    steeper += _slope(run, "stiffness_quadratic", 2.0, angle, 0.2)
-    spring = run.spring_stiffness * (1.0 + steeper) + abs(law.get("gravity_stiffness", 0.0))
-    swing = angle * sqrt(spring / inertia) + abs(run.release_rate)
-    damping = run.mechanical_damping + abs(law.get("loss_factor", 0.0)) * sqrt(run.spring_stiffness * inertia)
-    damping += _slope(run, "quadratic_damping", 2.0, swing, 2.0)
+    steeper = _slope(runs, "stiffness_cubic", 3.0, angle, 0.2)
+    steeper += _slope(runs, "stiffness_quadratic", 2.0, angle, 0.2)
+    spring = runs.spring_stiffness * (1.0 + steeper) + np.abs(runs["gravity_stiffness"])
+    swing = angle * np.sqrt(spring / inertia) + np.abs(runs["release_rate"])
+    damping = runs["mechanical_damping"] + np.abs(runs["loss_factor"]) * np.sqrt(
+        runs.spring_stiffness * inertia
+    )
+    damping += _slope(runs, "quadratic_damping", 2.0, swing, 2.0)
     still = _largest_root(spring, damping, inertia)
-    wind = run.series.get("wind_speed")
-    fastest = max(wind.values) if wind is not None else run.wind_speed
-    if fastest == 0.0:
-        return still
-    flow = rig.body.flow(run.air_density, fastest)
-    air = aerodynamic_stiffness(run.derivatives.cn_beta, **flow)
-    steeper = air * _slope(run, "moment_cubic", 3.0, angle, 0.2)
-    exponent = law.get("damping_quadratic_exponent", 0.0)
-    thicker = law.get("damping_quadratic", 0.0) * _power(angle, 2.0, exponent, 0.2)
-    loss = damping - aerodynamic_damping(run.derivatives.cn_r, **flow) * (1.0 + thicker)
+    given = [series.get("wind_speed") for series in runs.series]
+    fastest = np.array(
+        [max(one.values) if one else v for one, v in zip(given, runs.wind_speed.tolist(), strict=True)]
+    )
+    density, area, length = runs.air_density, rig.body.frontal_area, rig.body.length
+    air = aerodynamic_stiffness(
+        runs["cn_beta"],
+        air_density=density,
+        wind_speed=fastest,
+        frontal_area=area,
+        reference_length=length,
+    )
+    air_damping = aerodynamic_damping(
+        runs["cn_r"], air_density=density, wind_speed=fastest, frontal_area=area, reference_length=length
+    )
+    steeper = air * _slope(runs, "moment_cubic", 3.0, angle, 0.2)
+    thicker = runs["damping_quadratic"] * _power(angle, 2.0, runs["damping_quadratic_exponent"], 0.2)
+    loss = damping - air_damping * (1.0 + thicker)
     stiffness = (spring - air, spring - air - steeper, spring - air + steeper)
-    return max(still, *(_largest_root(one, loss, inertia) for one in stiffness))
+    windy = np.max([still, *(_largest_root(one, loss, inertia) for one in stiffness)], axis=0)
+    return np.asarray(np.where(fastest == 0.0, still, windy), np.float64)
 
 
-def _slope(run: RunSettings, name: str, textbook: float, x: float, reference: float) -> float:
-    """Magnitude of the slope at x of a power term."""
-    coefficient = abs(run.parameters.get(name, 0.0))
-    if coefficient == 0.0 or x == 0.0:
-        return 0.0
+def _slope(runs: SettingsTable, name: str, textbook: float, x: Array, reference: float) -> Array:
+    """Magnitude of the slope at x of a power term, shape (runs,)."""
+    coefficient = np.abs(runs[name])
     # the aerodynamic factor multiplies the angle itself, which adds one to the exponent
     beside = 1.0 if name == "moment_cubic" else 0.0
-    given = run.parameters.get(f"{name}_exponent", 0.0)
-    exponent = (given or textbook - beside) + beside
-    return coefficient * exponent * _power(x, textbook, exponent, reference) / x
+    given = runs[f"{name}_exponent"]
+    exponent = np.where(given != 0.0, given, textbook - beside) + beside
+    found = coefficient * exponent * _power(x, textbook, exponent, reference) / np.where(x > 0.0, x, 1.0)
+    return np.where((coefficient == 0.0) | (x == 0.0), 0.0, found)
 
 
-def _power(x: float, textbook: float, exponent: float, reference: float) -> float:
+def _power(x: Array, textbook: float, exponent: Array, reference: float) -> Array:
     """X to a power, scaled to agree with the textbook power at the reference; exponent 0: textbook power."""
-    if x == 0.0:
-        return 0.0
-    return exp(min(_LARGEST, textbook * log(reference) + (exponent or textbook) * log(x / reference)))
+    power = np.where(exponent != 0.0, exponent, textbook)
+    size = textbook * log(reference) + power * np.log(np.where(x > 0.0, x, reference) / reference)
+    return np.where(x > 0.0, np.exp(np.minimum(_LARGEST, size)), 0.0)
 
 
-def _largest_root(stiffness: float, damping: float, inertia: float) -> float:
+def _largest_root(stiffness: Array, damping: Array, inertia: Array) -> Array:
     """Magnitude of the larger root of I s² + C s + K, rad/s."""
-    half, square = abs(damping) / (2.0 * inertia), stiffness / inertia
+    half, square = np.abs(damping) / (2.0 * inertia), stiffness / inertia
     inside = half * half - square
-    return half + sqrt(inside) if inside > 0.0 else sqrt(square)
+    return np.where(
+        inside > 0.0, half + np.sqrt(np.maximum(inside, 0.0)), np.sqrt(np.where(inside > 0.0, 0.0, square))
+    )
 
 
 def _rod_rate(run: RunSettings) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi
+from typing import TypeAlias, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from numpy.typing import NDArray
 from tunnel_sim.vocabulary.between_runs import Repeatability, Scatter
 from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.record import Array
+
+#: A number of one run, or of several, shape (runs,).
+Number: TypeAlias = float | Array
 
 
 @dataclass(frozen=True)
@@ -31,10 +35,23 @@ class AeroDerivatives:
     cn_r: float
 
 
+@overload
 def aerodynamic_stiffness(
     cn_beta: float, *, air_density: float, wind_speed: float, frontal_area: float, reference_length: float
-) -> float:
-    """Ka = ½ρV²·A·l·Cnβ (paper, eq. 4), N m/rad.
+) -> float: ...
+@overload
+def aerodynamic_stiffness(
+    cn_beta: Number, *, air_density: Array, wind_speed: Array, frontal_area: Number, reference_length: Number
+) -> Array: ...
+def aerodynamic_stiffness(
+    cn_beta: Number,
+    *,
+    air_density: Number,
+    wind_speed: Number,
+    frontal_area: Number,
+    reference_length: Number,
+) -> Number:
+    """Ka = ½ρV²·A·l·Cnβ (paper, eq. 4), N m/rad, of one run or several, shape (runs,).
 
     Args:
         cn_beta: Cnβ, 1/rad.
@@ -46,10 +63,18 @@ def aerodynamic_stiffness(
     return 0.5 * air_density * wind_speed**2 * frontal_area * reference_length * cn_beta
 
 
+@overload
 def aerodynamic_damping(
     cn_r: float, *, air_density: float, wind_speed: float, frontal_area: float, reference_length: float
-) -> float:
-    """Ca = ½ρV·A·l²·Cnr (paper, eq. 5), N m s/rad.
+) -> float: ...
+@overload
+def aerodynamic_damping(
+    cn_r: Number, *, air_density: Array, wind_speed: Array, frontal_area: Number, reference_length: Number
+) -> Array: ...
+def aerodynamic_damping(
+    cn_r: Number, *, air_density: Number, wind_speed: Number, frontal_area: Number, reference_length: Number
+) -> Number:
+    """Ca = ½ρV·A·l²·Cnr (paper, eq. 5), N m s/rad, of one run or several, shape (runs,).
 
     Args:
         cn_r: Cnr, 1/rad.

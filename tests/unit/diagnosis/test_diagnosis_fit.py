@@ -17,7 +17,8 @@ from diagnosis.likelihood.least_squares import (
     scaled_residuals,
     sensitivities,
 )
-from diagnosis.likelihood.problem import Problem, condensed
+from diagnosis.likelihood.motions import condensed
+from diagnosis.likelihood.problem import Problem
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point

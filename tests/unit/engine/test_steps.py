@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings, Series
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.physics.steps import (
     BODY_TURN,
     LEAST_STEP,
@@ -39,6 +40,10 @@ PLAIN = RunSettings(
 def test_ordinary_rigs_keep_their_steps(spring: float, speed: float, law: dict[str, float]) -> None:
     run = replace(PLAIN, spring_stiffness=spring, wind_speed=speed, parameters=law)
     assert follow_fastest(RIG, run) is run
+
+
+def substeps(run: RunSettings, interval: float) -> int:
+    return int(fit_substeps(SettingsTable.of([run]), np.array([interval]))[0])
 
 
 @given(
@@ -124,13 +129,13 @@ def test_what_is_reported_takes_half_the_steps_of_a_fit_of_an_ordinary_body(
 ) -> None:
     slow = replace(PLAIN, spring_stiffness=16.12)
     for run in (slow, replace(slow, rod_twist=RodTwist(compliance, share))):
-        coarse, fine = fit_substeps(run, interval), report_substeps(run, interval)
+        coarse, fine = substeps(run, interval), report_substeps(run, interval)
         assert fine >= 2 * coarse - 1
         assert interval / fine <= 2e-3 * (1.0 + 1e-6)
 
 
 def test_fits_take_shorter_steps_for_a_faster_body() -> None:
-    found = [fit_substeps(replace(PLAIN, spring_stiffness=spring), 4e-3) for spring in (16.12, 67.98, 600.0)]
+    found = [substeps(replace(PLAIN, spring_stiffness=spring), 4e-3) for spring in (16.12, 67.98, 600.0)]
     assert found == [1, 1, 3]
 
 
@@ -139,7 +144,7 @@ def test_a_fit_does_not_follow_a_body_too_fast_for_any_record(interval: float) -
     """A trial inertia near zero once took 24,000 steps per block mean, a diagnosis minutes instead of seconds."""
     inertia = PLAIN.spring_stiffness / (np.pi / interval) ** 2  # half a turn per block mean: still followed
     slow, fast, least = (
-        fit_substeps(replace(PLAIN, yaw_inertia=inertia / factor), interval) for factor in (1.0, 100.0, 1e9)
+        substeps(replace(PLAIN, yaw_inertia=inertia / factor), interval) for factor in (1.0, 100.0, 1e9)
     )
     assert interval / slow * np.pi / interval <= 0.11 * (1.0 + 1e-12)
     assert fast == least <= 2 * slow
@@ -150,7 +155,7 @@ def test_a_fit_follows_the_rod_down_to_a_fifth_of_a_millisecond(compliance: floa
     run = replace(PLAIN, spring_stiffness=16.12, rod_twist=RodTwist(compliance, 0.3))
     rod = np.sqrt(1.0 / (compliance * 0.1014 * 0.3 * 0.7))
     assert np.ceil(4e-3 / max(0.5 / rod, 2e-4)) == steps
-    assert fit_substeps(run, 4e-3) == steps
+    assert substeps(run, 4e-3) == steps
 
 
 @given(st.floats(1e-6, 1e-1), st.floats(0.02, 0.98), st.floats(1.0, 100.0))

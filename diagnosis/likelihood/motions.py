@@ -1,0 +1,313 @@
+"""Motions of many runs at once, from the compiled integrator, and what the sensor reads of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.model.run_data import Data, RunData
+from tunnel_sim.effects import Effect, EffectChain
+from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.chain import reads_plainly
+from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.physics.forward import Ringing, forward_run, integrate, slow_motion
+from tunnel_sim.physics.moment_law import run_dtype
+from tunnel_sim.physics.run_settings import Motion, RunSettings, released_by_spring_end
+from tunnel_sim.physics.settings_table import SettingsTable, column_places
+from tunnel_sim.physics.steps import compensated, fit_stride, fit_substeps
+from tunnel_sim.vocabulary.plan import AeroDerivatives
+from tunnel_sim.vocabulary.record import Array
+from tunnel_sim.vocabulary.rig import Rig
+
+_THREADS = 2
+_TOGETHER = 16  # motions in a part of the work, a multiple of those that the integrator takes side by side
+_SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
+_POOL = ThreadPoolExecutor(_THREADS)
+#: Parameters of the law that do nothing without wind, and fields of a run that point to samples.
+_AIR = (
+    "air_density", "cn_beta", "cn_r", "moment_cubic", "damping_quadratic", "aero_lag", "flow_angle",
+    "shedding_amplitude",
+)  # fmt: skip
+_POINTERS = ("wind", "forcing", "program", "moment", "moment_time")
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """Runs to be predicted; the same run may be among them with several values of the parameters.
+
+    Args:
+        data: of the campaign.
+        runs: shape (n,), as all below.
+        stated: their physics without any effect.
+        physics: with the effects.
+        effects: that act in each run.
+        drawn: the random part of each of these effects.
+        zero: of the sensor, in the unit of the reading.
+        rod_followed: as in `Problem`.
+    """
+
+    data: Data
+    runs: Sequence[RunData]
+    stated: SettingsTable
+    physics: SettingsTable
+    effects: Sequence[tuple[Effect, ...]]
+    drawn: Sequence[tuple[Drawn, ...]]
+    zero: Array
+    rod_followed: bool
+
+    def chain(self, place: int) -> EffectChain:
+        """The effects of one of the runs."""
+        return EffectChain(self.stated.row(place), self.effects[place], self.drawn[place])
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Runs as the compiled integrator takes them.
+
+    Args:
+        law: shape (n, parameters), in the law's order.
+        rows: of `run_dtype`, shape (n,).
+        kept: arrays that the rows point to, beside those in ``winds``, by run.
+        winds: wind speeds that the rows point to, m/s, shape (n,).
+        blocks: block means that each motion lasts for, shape (n,).
+        ringing: of a rod, which is to be added, by run.
+    """
+
+    law: Array
+    rows: NDArray[np.void]
+    kept: Sequence[Sequence[Array]]
+    winds: Array
+    blocks: NDArray[np.int64]
+    ringing: Sequence[Ringing | None]
+
+    @classmethod
+    def of(cls, asked: Asked) -> Motions:
+        """The motions of some runs."""
+        physics, runs, rig, count = (
+            asked.physics.copy(),
+            asked.runs,
+            campaign_rig(asked.data),
+            len(asked.runs),
+        )
+        driven = np.array([drive is not None for drive in physics.drive])
+        slow = {
+            place: found
+            for place, twist in enumerate(physics.rod_twist)
+            if twist is not None
+            and (found := _apart(physics, place, asked, rig, whole=asked.rod_followed or bool(driven[place])))
+        }
+        rows, winds = np.zeros(count, run_dtype()), physics.wind_speed.copy()
+        rows["angle"] = rows["lagged"] = physics["release_angle"]
+        rows["rate"], rows["wind_count"] = physics["release_rate"], 1.0
+        rows["wind"] = winds.ctypes.data + winds.itemsize * np.arange(count)
+        kept: list[Sequence[Array]] = [()] * count
+        objects = zip(physics.series, physics.rod_twist, physics.program, physics.drive, strict=True)
+        for place, given in enumerate(objects):
+            if any(given):
+                row, kept[place] = forward_run(physics.row(place))
+                rows[place] = row[0]
+        for place, (lead, stiffness, body, _) in slow.items():
+            rows["lead"][place], rows["rod_stiffness"][place], rows["lagged"][place] = lead, stiffness, body
+        interval = np.array([run.interval for run in runs])
+        size = np.array([run.reading.size for run in runs])
+        length = np.array([run.duration for run in runs])
+        blocks = size + np.ceil(np.maximum(0.0, physics["duration"] - length) / interval).astype(np.int64)
+        substeps = fit_substeps(physics, interval)
+        # a derivative of the angle would show where steps are joined
+        derived = np.array([run.derivative > 0 for run in runs])
+        flexible = np.array([twist is not None for twist in physics.rod_twist])
+        rough = (substeps > 1) | flexible | derived | driven
+        stride = np.where(rough, 1, fit_stride(rig, physics, interval))
+        at, law, step = column_places(), physics.law.copy(), stride * interval / substeps
+        law[:, at["frontal_area"]], law[:, at["width"]] = rig.body.frontal_area, rig.body.width
+        law[:, at["reference_length"]] = rig.body.length
+        speed = np.array([run.wind_speed for run in runs])
+        better, longer = compensated(law, speed, step)
+        # a longer step would shift the motion against its input
+        law, step = np.where(driven[:, None], law, better), np.where(driven, step, longer)
+        still = (physics.wind_speed == 0.0) & np.array([not series for series in physics.series])
+        law[np.ix_(still, [at[name] for name in _AIR])] = 0.0
+        rows["step"], rows["steps"], rows["stride"] = step / stride, substeps, stride
+        ringing = [slow[place][3] if place in slow else None for place in range(count)]
+        return cls(law, rows, kept, winds, blocks, ringing)
+
+    def alike(self) -> list[list[int]]:
+        """Places of the runs of equal motion: of the same law, release and samples."""
+        numbers = self.rows.copy()
+        for name in _POINTERS:
+            numbers[name] = 0
+        parts = [self.law, self.winds[:, None], self.blocks[:, None]]
+        parts = [np.ascontiguousarray(part).view(np.uint8) for part in parts]
+        rows = np.concatenate([*parts, numbers.view(np.uint8).reshape(len(numbers), -1)], axis=1)
+        found: dict[object, list[int]] = {}
+        for place, (row, kept) in enumerate(zip(rows, self.kept, strict=True)):
+            found.setdefault((row.tobytes(), *(array.tobytes() for array in kept)), []).append(place)
+        return list(found.values())
+
+    def integrated(self, places: Sequence[int]) -> tuple[Array, Array]:
+        """Angle and rate at the blocks' ends of runs of equal length and steps, without a rod's ringing.
+
+        In rad and rad/s, shape (places, blocks + 1); infinite where a motion grows without bound.
+        """
+        samples = int(self.blocks[places[0]]) + 1
+        angle, rate, status = integrate(self.law[places], self.rows[places], samples)
+        first = 0
+        while status:  # one of them grew, and the later ones are not done
+            angle[first + status - 1], rate[first + status - 1] = np.inf, np.inf
+            first += status
+            if first == len(places):
+                break
+            some = places[first:]
+            angle[first:], rate[first:], status = integrate(self.law[some], self.rows[some], samples)
+        return angle, rate
+
+
+def readings(asked: Asked) -> list[Array]:
+    """Block means of the reading, by run, shape (blocks,) each; infinite where the motion grows without bound."""
+    motions = Motions.of(asked)
+    equal: dict[tuple[float, ...], list[list[int]]] = {}
+    for places in motions.alike():
+        row = motions.rows[places[0]]
+        key = (float(motions.blocks[places[0]]), float(row["steps"]), float(row["stride"]))
+        equal.setdefault(key, []).append(places)
+    parts = [
+        group[first : first + _TOGETHER]
+        for group in equal.values()
+        for first in range(0, len(group), _TOGETHER)
+    ]
+    found: list[Array] = [np.zeros(0)] * len(asked.runs)
+
+    def read(part: list[list[int]]) -> None:
+        angle, rate = motions.integrated([places[0] for places in part])
+        members = [(number, place) for number, places in enumerate(part) for place in places]
+        values = _read(asked, motions, members, angle, rate)
+        for (_, place), one in zip(members, values, strict=True):
+            found[place] = one
+
+    list(_POOL.map(read, parts) if len(parts) > 1 else map(read, parts))
+    return found
+
+
+def _read(
+    asked: Asked, motions: Motions, members: list[tuple[int, int]], angle: Array, rate: Array
+) -> list[Array]:
+    """Block means of the reading of runs whose motions were integrated together.
+
+    Args:
+        members: of each run its motion's place and its own.
+        angle: at the blocks' ends, rad, shape (motions, blocks + 1).
+        rate: there, rad/s, of that shape.
+    """
+    places = [place for _, place in members]
+    if len(members) != len(angle):
+        of = [number for number, _ in members]
+        angle, rate = angle[of], rate[of]
+    runs = [asked.runs[place] for place in places]
+    for number, (place, run) in enumerate(zip(places, runs, strict=True)):
+        ringing = motions.ringing[place]
+        if ringing is not None:
+            angle[number], rate[number] = ringing.added(angle[number], rate[number], run.interval)
+    if reads_plainly(asked.effects[places[0]]):
+        return list(_means(runs, angle, rate) + asked.zero[places, None])
+    found = []
+    for number, (place, run) in enumerate(zip(places, runs, strict=True)):
+        chain, zero = asked.chain(place), float(asked.zero[place])
+        if not np.isfinite(angle[number, 0]):  # it grew without bound
+            found.append(np.full(run.reading.size, np.inf))
+        elif chain.skips:
+            ends = np.arange(angle.shape[1], dtype=np.float64) * run.interval
+            found.append(sample_means(chain, Motion(ends, angle[number], rate[number]), run, zero))
+        else:
+            mean = _means([run], angle[number : number + 1], rate[number : number + 1])[0]
+            found.append(chain.reading(chain.angle(mean, run.times, run.derivative) + zero))
+    return found
+
+
+def _means(runs: Sequence[RunData], angle: Array, rate: Array) -> Array:
+    """Block means of the angle, or its derivative that is read, from the blocks' ends, shape (runs, blocks)."""
+    blocks = angle.shape[1] - 1
+    if all(run.samples is None for run in runs):
+        weights = np.stack([run.weights for run in runs])[:, :, None]
+    else:
+        weights = np.stack([np.broadcast_to(run.weights.reshape(4, -1), (4, blocks)) for run in runs])
+    interval = np.array([run.interval for run in runs])[:, None]
+    with np.errstate(invalid="ignore"):  # a motion that grew without bound
+        found: Array = (
+            weights[:, 0] * angle[:, :-1]
+            + weights[:, 1] * angle[:, 1:]
+            + interval * (weights[:, 2] * rate[:, :-1] + weights[:, 3] * rate[:, 1:])
+        )
+    found[~np.isfinite(angle[:, 0])] = np.inf
+    return found
+
+
+def _apart(
+    physics: SettingsTable, place: int, asked: Asked, rig: Rig, *, whole: bool
+) -> tuple[float, float, float, Ringing] | None:
+    """Put in place of a run with a flexible rod its slow motion.
+
+    Args:
+        whole: whether the rod is followed, unless it is too stiff to ring.
+
+    Returns:
+        The body's lead, the rod's stiffness (N m/rad), the body's release angle (rad) and the ringing that is to be
+        added, where it was set apart.
+    """
+    run = physics.row(place)
+    run = released_by_spring_end(condensed(run, asked.data) if whole else run)
+    slow = None if whole else slow_motion(run, rig)
+    physics.put(place, run if slow is None else slow.run)
+    return None if slow is None else (slow.lead, slow.rod_stiffness, slow.body_release, slow.ringing)
+
+
+def blocks_beyond(physics: RunSettings, run: RunData) -> int:
+    """By how many blocks a motion must outlast the record: 0 unless an effect reads it after the end."""
+    return int(np.ceil(max(0.0, physics.duration - run.duration) / run.interval))
+
+
+def sample_means(chain: EffectChain, motion: Motion, run: RunData, zero: float) -> Array:
+    """Block means of the reading, rad, sample by sample.
+
+    Args:
+        motion: at the blocks' ends.
+        zero: of the sensor, rad.
+    """
+    reading = chain.reading(chain.seen(motion, run.sample_times, run.derivative) + zero)
+    return run.means(reading)
+
+
+def condensed(physics: RunSettings, data: Data) -> RunSettings:
+    """Replace a rod that is too stiff to ring visibly by its first-order effect on the slow motion.
+
+    With compliance c, the body leads the sensor's end by φ = a θ, a = c (s Ka + (1 − s) Kr): the inertia at the
+    sensor's end grows by the share (1 − s) a, and the air sees (1 + a) θ. What is dropped is of order (c Kr)².
+    """
+    twist = physics.rod_twist
+    if twist is None or twist.compliance > _SOFT_ROD:
+        return physics
+    share = twist.inertia_share
+    air = data.air_moment(physics) * physics.derivatives.cn_beta
+    lead = twist.compliance * (share * air + (1.0 - share) * physics.spring_stiffness)
+    air_seen = AeroDerivatives(
+        physics.derivatives.cn_beta * (1.0 + lead), physics.derivatives.cn_r * (1.0 + lead)
+    )
+    inertia = physics.yaw_inertia * (1.0 + (1.0 - share) * lead)
+    return dataclasses.replace(physics, rod_twist=None, derivatives=air_seen, yaw_inertia=inertia)
+
+
+def campaign_rig(data: Data) -> Rig:
+    """A rig of the campaign's own reference sizes."""
+    return _rig(data.frontal_area, data.reference_length, data.width)
+
+
+@lru_cache(maxsize=8)
+def _rig(area: float, length: float, width: float) -> Rig:
+    rig = load_rig()
+    body = dataclasses.replace(rig.body, frontal_area=area, length=length, width=width)
+    return dataclasses.replace(rig, body=body)
