@@ -8,6 +8,14 @@
 
 enum { POWERS = 1, GRAVITY = 2, SHEDDING = 4, LAG = 8 };
 
+// Compiled for wide registers too, among which the loader chooses: no operation is fused, so the bits are the same.
+#if VWT_WIDE
+#define CLONED __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define CLONED
+#endif
+#define INLINE static inline __attribute__((always_inline))  // into every clone
+
 // A number by lane, with the vector extension of GCC and Clang, and what a comparison of two gives: all bits or none.
 typedef double Lane __attribute__((vector_size(8 * VWT_LANES)));
 typedef long long Mask __attribute__((vector_size(8 * VWT_LANES)));
@@ -16,6 +24,7 @@ typedef long long Mask __attribute__((vector_size(8 * VWT_LANES)));
 typedef struct {
   int features;  // of any lane
   int rubs;      // whether any lane has Coulomb friction
+  int count;     // of the lanes that are runs; the others repeat the first one's start
   const vwt_parameters* p[VWT_LANES];
   Lane step, whole_step, half_step, body, inertia, spring, damping, rod, friction;
   Lane air_stiffness, air_damping, moment_cubic, damping_quadratic, flow_angle;
@@ -96,11 +105,19 @@ static void set_lane(Coefficients* c, int k, const vwt_parameters* p, const vwt_
   }
 }
 
-static inline Mask sign(void) { return (Mask)(-(Lane){0}); }  // its bit alone
-static inline Lane size_of(Lane x) { return (Lane)((Mask)x & ~sign()); }
-static inline Lane with_sign(Lane size, Lane x) { return (Lane)((Mask)size | ((Mask)x & sign())); }
-static inline Lane choose(Mask where, Lane one, Lane other) {
+INLINE Mask sign(void) { return (Mask)(-(Lane){0}); }  // its bit alone
+INLINE Lane size_of(Lane x) { return (Lane)((Mask)x & ~sign()); }
+INLINE Lane with_sign(Lane size, Lane x) { return (Lane)((Mask)size | ((Mask)x & sign())); }
+INLINE Lane choose(Mask where, Lane one, Lane other) {
   return (Lane)((where & (Mask)one) | (~where & (Mask)other));
+}
+
+INLINE long long any(Mask where) {
+  long long out = 0;
+  for (int k = 0; k < VWT_LANES; k++) {
+    out |= where[k];
+  }
+  return out;
 }
 
 // Powers of angle and rate, none negative.
@@ -108,7 +125,7 @@ typedef struct {
   Lane steepening, thickening, rate, cube, square;
 } Powers;
 
-static inline void set_powers(const Coefficients* c, Lane body, Lane angle, Lane rate, int free, Powers* out) {
+INLINE void set_powers(const Coefficients* c, Lane body, Lane angle, Lane rate, int free, Powers* out) {
   if (!free) {
     out->steepening = out->thickening = body * body;
     out->rate = rate * rate;
@@ -127,7 +144,7 @@ static inline void set_powers(const Coefficients* c, Lane body, Lane angle, Lane
 }
 
 // Angular acceleration at a motion; `shed` and `lagged` are read only with the features they belong to.
-static inline Lane acceleration(const Coefficients* c, Lane slip, int features, Lane angle, Lane rate, Lane shed,
+INLINE Lane acceleration(const Coefficients* c, Lane slip, int features, Lane angle, Lane rate, Lane shed,
                                 Lane lagged) {
   const Lane body = c->body * angle;
   Powers powers;
@@ -159,7 +176,7 @@ static inline Lane acceleration(const Coefficients* c, Lane slip, int features, 
   return (moment - slip * c->friction) / c->inertia;
 }
 
-static inline Lane shed_at(const Coefficients* c, Lane time) {
+INLINE Lane shed_at(const Coefficients* c, Lane time) {
   Lane out = {0};
   for (int k = 0; k < VWT_LANES; k++) {
     if (c->shedding[k] != 0) {
@@ -169,7 +186,7 @@ static inline Lane shed_at(const Coefficients* c, Lane time) {
   return out;
 }
 
-static inline Lane lagged_at(const Coefficients* c, const State* s, const double weights[][4], Lane duration,
+INLINE Lane lagged_at(const Coefficients* c, const State* s, const double weights[][4], Lane duration,
                              Lane angle, Lane rate) {
   const Lane angle0 = c->body * s->angle, rate0 = c->body * s->rate, angle1 = c->body * angle, rate1 = c->body * rate;
   Lane out = {0};
@@ -182,7 +199,7 @@ static inline Lane lagged_at(const Coefficients* c, const State* s, const double
 }
 
 // The motion after a step.
-static inline void runge_kutta(const Coefficients* c, const State* s, int features, Lane* angle, Lane* rate) {
+INLINE void runge_kutta(const Coefficients* c, const State* s, int features, Lane* angle, Lane* rate) {
   const Lane h = c->whole_step, half = c->half_step, none = {0};
   const int sheds = features & SHEDDING, lags = features & LAG;
   Lane shed = sheds ? shed_at(c, s->start) : none;
@@ -220,14 +237,21 @@ static void step_alone(const Coefficients* c, State* s, int k, Step* alone) {
   s->rests[k] = !changed && c->shedding[k] == 0;
 }
 
-static inline void step(const Coefficients* c, State* s, int features, Step* alone) {
+INLINE void step(const Coefficients* c, State* s, int features, Step* alone) {
   const State before = *s;
   runge_kutta(c, &before, features, &s->angle, &s->rate);
   if (features & LAG) {
     s->lagged = lagged_at(c, &before, c->whole, c->whole_step, s->angle, s->rate);
   }
-  for (int k = 0; c->rubs && k < VWT_LANES; k++) {
-    if (c->friction[k] > 0 && !(before.rate[k] != 0 && s->rate[k] * before.slip[k] > 0)) {
+  if (!c->rubs) {
+    return;
+  }
+  const Mask slides = (before.rate != 0) & (s->rate * before.slip > 0), turns = (c->friction > 0) & ~slides;
+  if (!any(turns)) {
+    return;
+  }
+  for (int k = 0; k < c->count; k++) {
+    if (turns[k]) {
       s->angle[k] = before.angle[k];
       s->rate[k] = before.rate[k];
       s->lagged[k] = before.lagged[k];
@@ -238,7 +262,25 @@ static inline void step(const Coefficients* c, State* s, int features, Step* alo
   }
 }
 
-static inline int integrate(const Coefficients* c, State* s, int features, int count, Step* alone,
+// Samples within a step, as vwt_fill.
+INLINE void fill(const Coefficients* c, const State* from, const State* to, int stride, int at, int samples,
+                 double* const* angle, double* const* rate) {
+  const Lane h = c->whole_step, change = to->angle - from->angle;
+  const Lane c1 = h * from->rate;
+  const Lane c2 = 3 * change - h * (2 * from->rate + to->rate);
+  const Lane c3 = h * (from->rate + to->rate) - 2 * change;
+  for (int j = 1; j < stride && at + j < samples; j++) {
+    const double u = j / (double)stride;
+    const Lane angles = from->angle + u * (c1 + u * (c2 + u * c3));
+    const Lane rates = (c1 + u * (2 * c2 + u * 3 * c3)) / h;
+    for (int k = 0; k < c->count; k++) {
+      angle[k][at + j] = angles[k];
+      rate[k][at + j] = rates[k];
+    }
+  }
+}
+
+INLINE int integrate(const Coefficients* c, State* s, int features, int count, Step* alone,
                             const vwt_run* like, double* const* angle, double* const* rate) {
   const int samples = (int)like->samples, steps = (int)like->steps;
   const int stride = like->stride > 1 && steps == 1 ? (int)like->stride : 1;
@@ -253,11 +295,12 @@ static inline int integrate(const Coefficients* c, State* s, int features, int c
       step(c, s, features, alone);
       s->start = (i * (double)steps + stride * (j + 1)) * c->step;  // no drift of the clock
     }
-    for (int k = 0; k < count; k++) {
-      const Motion from = {before.angle[k], before.rate[k], 0, 0}, to = {s->angle[k], s->rate[k], 0, 0};
-      vwt_fill(&from, &to, c->whole_step[k], stride, i, samples, angle[k], rate[k]);
-      if (!(fabs(s->angle[k]) < 1e6) && k < failed) {
-        failed = k;
+    if (stride > 1) {
+      fill(c, &before, s, stride, i, samples, angle, rate);
+    }
+    if (any(~(size_of(s->angle) < 1e6))) {
+      for (int k = count - 1; k >= 0; k--) {
+        failed = !(fabs(s->angle[k]) < 1e6) && k < failed ? k : failed;
       }
     }
     if (failed == 0) {
@@ -267,9 +310,9 @@ static inline int integrate(const Coefficients* c, State* s, int features, int c
   return failed < VWT_LANES ? 1 + failed : 0;
 }
 
-int vwt_integrate_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs, double* const* angle,
-                        double* const* rate) {
-  Coefficients c = {.features = 0};
+CLONED int vwt_integrate_lanes(int count, const vwt_parameters* parameters, const vwt_run* runs,
+                               double* const* angle, double* const* rate) {
+  Coefficients c = {.count = count};
   State s = {.rests = {0}};
   LagWeights weights[VWT_LANES] = {{{0}, {{0}}, 0}};
   Step alone[VWT_LANES];

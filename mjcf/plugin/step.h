@@ -42,7 +42,13 @@ void vwt_fill(const Motion* from, const Motion* to, double h, int stride, int at
 
 // Runs that `vwt_forward` may integrate side by side: constant wind, rigid rod, no imposed moment, no drive, no
 // presliding.
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__)
+#define VWT_WIDE 1  // a loader that chooses code by processor; a sanitizer is not ready when it does
+enum { VWT_LANES = 8 };
+#else
+#define VWT_WIDE 0
 enum { VWT_LANES = 4 };
+#endif
 int vwt_is_plain(const vwt_parameters* p, const vwt_run* run);
 int vwt_alike(const vwt_run* one, const vwt_run* other);
 
