@@ -22,6 +22,7 @@ from diagnosis.facts.closure import PATCHED, Confirmation, NoiseSummary, Waterfa
 from diagnosis.facts.found import Fact, Nowhere, PlaceFound
 from diagnosis.facts.patch import PatchedModel
 from diagnosis.facts.remainder import Remainder
+from diagnosis.likelihood.compression import in_shorter_blocks
 from diagnosis.result import Coefficients, Diagnosis, GapSummary, Where
 from diagnosis.search.study import Answer, Study
 from diagnosis.search.weigh import UNKNOWN, main_effect
@@ -40,7 +41,10 @@ def localise(study: Study) -> tuple[Where, Maps, PlaceFound | Nowhere]:
     place, chosen = study.gap.place or study.prepared.place(), study.settings.where
     found = place.survey
     answer = None if study.chosen is study.nominal else study.chosen
-    maps = found.maps if answer is None else with_answer(found, study.campaign, study.nominal, answer)
+    maps = found.maps
+    if answer is not None:
+        both = in_shorter_blocks(study.nominal), in_shorter_blocks(answer)
+        maps = with_answer(found, study.campaign, *both)
     if not study.causes:
         return Where(None, None), maps, nowhere(found, within_step=study.gap.test.within_step)
     compared = list(study.read_off) if study.named else []  # what has to agree with the place

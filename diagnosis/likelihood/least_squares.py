@@ -208,6 +208,19 @@ class Fit:
         return Products.of(self.jacobian, self.problem.parameters.precision)
 
     @cached_property
+    def linear(self) -> Array:
+        """Of every run inertia, damping and stiffness, air and gravity included, shape (runs, 3).
+
+        In kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
+        """
+        return self.problem.linear(self.point)
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What other rooms derive from the fit once."""
+        return {}
+
+    @cached_property
     def columns(self) -> RunColumns:
         """The columns of a fit with chance differences between the runs."""
         return RunColumns.of(self.problem, self.point, self.residuals, self.jacobian)

@@ -14,6 +14,7 @@ from diagnosis.model.parameters import Parameter, ParameterSet, Point
 from diagnosis.model.run_data import Data, RunData
 from tunnel_sim.effects import Effect, EffectChain
 from tunnel_sim.effects.base import Drawn
+from tunnel_sim.effects.chain import reads_plainly
 from tunnel_sim.physics.run_settings import RunSettings
 from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.record import Array
@@ -146,13 +147,16 @@ class Problem:
             for r in np.flatnonzero(np.all(np.isfinite(point.release), axis=1))
         ]
         if places:
-            asked = self.asked(points, places)
-            for (i, r), values in zip(places, readings(asked), strict=True):
-                found[i][r] = values
+            for (i, r), values in zip(places, readings(self.asked(points, places)), strict=True):
+                size = found[i][r].size
+                found[i][r] = values if values.size == size else values.reshape(size, -1).mean(axis=1)
         return found
 
     def asked(self, points: Sequence[Point], places: Sequence[tuple[int, int]]) -> Asked:
         """The runs to be predicted, with their physics.
+
+        They are in the shorter blocks that theirs were made of where a reading is not that of the angle, or the rod
+        rings.
 
         Args:
             places: of the points and the runs.
@@ -160,9 +164,7 @@ class Problem:
         runs = [self.data.runs[r] for _, r in places]
         common = np.stack([points[i].common for i, _ in places])
         own = np.stack([points[i].release[r] for i, r in places])
-        values = {name: np.full(len(runs), value) for name, value in self.data.model.held.items()}
-        values |= dict(zip(self.names, common.T, strict=True))
-        values |= dict(zip(self.parameters.own_names, own.T, strict=False))
+        values = self._columns(common, own)
         stated = self.data.model.settings(values, runs)
         at = {i: self.effects_at(points[i].common) for i, _ in places}
         effects, drawn = [at[i] for i, _ in places], [self._drawn(row) for row in own]
@@ -181,8 +183,33 @@ class Problem:
             ):  # a spring whose root moves, as in `EffectChain.physics`
                 scale = float(physics.spring_stiffness[place])
                 physics.drive[place] = replace(drive, scale=scale)
+        if not reads_plainly(effects[0]) or any(physics.rod_twist):
+            runs = [run.fine for run in runs]
         zero = values.get("zero", np.zeros(len(runs)))
         return Asked(self.data, runs, stated, physics, effects, drawn, zero, self.rod_followed)
+
+    def _columns(self, common: Array, own: Array) -> dict[str, Array]:
+        """Values of all parameters in several runs by name, those held among them, shape (runs,) each.
+
+        Args:
+            common: shape (runs, common).
+            own: shape (runs, own).
+        """
+        values = {name: np.full(len(own), value) for name, value in self.data.model.held.items()}
+        values |= dict(zip(self.names, common.T, strict=True))
+        return values | dict(zip(self.parameters.own_names, own.T, strict=False))
+
+    def linear(self, point: Point) -> Array:
+        """Of every run inertia, damping and stiffness, as in `Fit.linear`, shape (runs, 3)."""
+        runs = self.data.runs
+        values = self._columns(np.tile(point.common, (len(runs), 1)), point.release)
+        stated, pressure = self.data.model.settings(values, runs), [self.data.air_moment(run) for run in runs]
+        speed = np.array([run.wind_speed if run.wind_on else np.inf for run in runs])
+        stiffness = stated.spring_stiffness - pressure * stated["cn_beta"]
+        stiffness += sum(effect.stiffness_at_rest for effect in self.effects_at(point.common))
+        rate = np.array(pressure) * self.data.reference_length / speed
+        damping = stated["mechanical_damping"] - rate * stated["cn_r"]
+        return np.stack([stated["yaw_inertia"], damping, stiffness], axis=1)
 
     def _drawn(self, own: Array) -> tuple[Drawn, ...]:
         """What the effects of one run drew; argument as in `chain`."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -165,20 +166,15 @@ def linear_coefficients(fit: Fit, run_index: int) -> tuple[float, float, float]:
 
     In kg m², N m s/rad and N m/rad; per unit inertia in normalised form.
     """
-    problem = fit.problem
-    run = problem.data.runs[run_index]
-    stated = problem.stated(fit.point.common, fit.point.release[run_index], run)
-    pressure = problem.data.air_moment(run)
-    stiffness = stated.spring_stiffness - pressure * stated.derivatives.cn_beta
-    stiffness += sum(effect.stiffness_at_rest for effect in problem.effects_at(fit.point.common))
-    rate = pressure * problem.data.reference_length / run.wind_speed if run.wind_on else 0.0
-    return stated.yaw_inertia, stated.mechanical_damping - rate * stated.derivatives.cn_r, stiffness
+    inertia, damping, stiffness = fit.linear[run_index].tolist()
+    return inertia, damping, stiffness
 
 
 CHANNELS = ("damping", "frequency", "damping of runs", "frequency of runs", "zero", "harmonics")
 """In this order everywhere."""
 
 _LEAST = 4  # samples in a cycle
+_SINGULAR = 1e-14  # relative: columns that are the same but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,31 +206,88 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
     Args:
         residuals: scaled, by run, where they are not those of the fit, each of shape (n,).
     """
-    chi2, count, powers = [], [], []
     given = fit.residuals if residuals is None else residuals
-    for index, (run, left) in enumerate(zip(fit.problem.data.runs, given, strict=True)):
+    chi2 = [run.channels(left) for run, left in zip(_cycles(fit), given, strict=True)]
+    count, powers = [run.count for run in _cycles(fit)], [run.power for run in _cycles(fit)]
+    return ChannelMisfit(
+        np.sum(chi2, axis=0, dtype=np.float64), np.sum(count, axis=0, dtype=np.float64), float(np.sum(powers))
+    )
+
+
+def _cycles(fit: Fit) -> list[_Cycles]:
+    """What the channels of every run's residuals are counted in; it depends on the fit alone."""
+    known: list[_Cycles] = fit.kept.setdefault("cycles", [])
+    if not known:
+        known += [_Cycles.of(fit, index) for index in range(len(fit.problem.data.runs))]
+    return known
+
+
+@dataclass(frozen=True, eq=False)
+class _Cycles:
+    """The cycles of a run, and the motion in them.
+
+    Args:
+        starts: of the cycles, in blocks, shape (cycles,).
+        sizes: of the cycles, in blocks, shape (cycles,).
+        along: the motion about its mean in every cycle, in noise standard deviations, shape (n,).
+        slope: its derivative, without what is along the motion, shape (n,).
+        along_power: sum of the squares of ``along`` in every cycle, shape (cycles,).
+        slope_power: sum of the squares of ``slope`` in every cycle, shape (cycles,).
+        power: sum of squares of the readings about their means in every cycle.
+    """
+
+    starts: np.ndarray
+    sizes: np.ndarray
+    along: Array
+    slope: Array
+    along_power: Array
+    slope_power: Array
+    power: float
+
+    @classmethod
+    def of(cls, fit: Fit, index: int) -> _Cycles:
+        """Those of a run in a fit."""
+        run = fit.problem.data.runs[index]
         reading = run.scaled(run.reading - fit.zero(index))
         motion = reading - fit.residuals[index]
         cycle = max(_LEAST, round(1.0 / (resonance(fit, index) * run.interval)))
-        cycles = max(1, left.size // cycle)
-        starts = np.arange(cycles) * cycle
-        sizes = np.diff([*starts, left.size])
+        starts = np.arange(max(1, motion.size // cycle)) * cycle
+        sizes = np.diff([*starts, motion.size])
         along = _centred(motion, starts, sizes)
         power = np.maximum(np.add.reduceat(along**2, starts), 1e-300)
         slope = _centred(np.gradient(motion), starts, sizes)
         slope -= along * np.repeat(np.add.reduceat(along * slope, starts) / power, sizes)
-        rate_power = np.maximum(np.add.reduceat(slope**2, starts), 1e-300)
-        amplitude, amplitude_line = _curve_and_line(np.add.reduceat(along * left, starts) / power, power)
-        phase, phase_line = _curve_and_line(np.add.reduceat(slope * left, starts) / rate_power, rate_power)
-        zero = float(np.sum(np.add.reduceat(left, starts) ** 2 / sizes))
+        slope_power = np.maximum(np.add.reduceat(slope**2, starts), 1e-300)
+        of_reading = float(np.sum(_centred(reading, starts, sizes) ** 2))
+        return cls(starts, sizes, along, slope, power, slope_power, of_reading)
+
+    @cached_property
+    def count(self) -> list[int]:
+        """Of independent values by channel."""
+        cycles, lines = self.starts.size, min(self.starts.size, 2)
+        return [cycles - lines, cycles - lines, lines, lines, cycles, self.along.size - 3 * cycles]
+
+    @cached_property
+    def _lines(self) -> tuple[Array, Array]:
+        """Bases of the straight lines over the cycles, weighted by ``along_power`` and ``slope_power``."""
+        return _line_basis(self.along_power), _line_basis(self.slope_power)
+
+    def channels(self, left: Array) -> list[float]:
+        """χ² by channel.
+
+        Args:
+            left: residuals, in noise standard deviations, shape (n,).
+        """
+        of_along, of_slope = self._lines
+        amplitude, amplitude_line = _curve_and_line(
+            np.add.reduceat(self.along * left, self.starts) / np.sqrt(self.along_power), of_along
+        )
+        phase, phase_line = _curve_and_line(
+            np.add.reduceat(self.slope * left, self.starts) / np.sqrt(self.slope_power), of_slope
+        )
+        zero = float(np.sum(np.add.reduceat(left, self.starts) ** 2 / self.sizes))
         known = amplitude + phase + amplitude_line + phase_line + zero
-        chi2.append([amplitude, phase, amplitude_line, phase_line, zero, float(left @ left) - known])
-        lines = min(cycles, 2)
-        count.append([cycles - lines, cycles - lines, lines, lines, cycles, left.size - 3 * cycles])
-        powers.append(float(np.sum(_centred(reading, starts, sizes) ** 2)))
-    return ChannelMisfit(
-        np.sum(chi2, axis=0, dtype=np.float64), np.sum(count, axis=0, dtype=np.float64), float(np.sum(powers))
-    )
+        return [amplitude, phase, amplitude_line, phase_line, zero, float(left @ left) - known]
 
 
 def _centred(values: Array, starts: np.ndarray, sizes: np.ndarray) -> Array:
@@ -242,9 +295,16 @@ def _centred(values: Array, starts: np.ndarray, sizes: np.ndarray) -> Array:
     return np.asarray(values - np.repeat(np.add.reduceat(values, starts) / sizes, sizes), np.float64)
 
 
-def _curve_and_line(values: Array, weights: Array) -> tuple[float, float]:
-    """χ² of values about their straight line over the cycles, and of that line."""
+def _line_basis(weights: Array) -> Array:
+    """Orthonormal columns that span weighted straight lines over the cycles, shape (cycles, 2 or fewer)."""
     root = np.sqrt(weights)
-    columns = np.column_stack([root, root * np.arange(values.size)])
-    line = columns @ np.linalg.lstsq(columns, root * values, rcond=None)[0]
-    return float(np.sum((root * values - line) ** 2)), float(line @ line)
+    columns = np.column_stack([root, root * np.arange(weights.size)])
+    basis, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(basis[:, size > _SINGULAR * size[0]], np.float64)
+
+
+def _curve_and_line(values: Array, basis: Array) -> tuple[float, float]:
+    """χ² of weighted values about their straight line over the cycles, and of that line."""
+    line = basis.T @ values
+    curve = values - basis @ line
+    return float(curve @ curve), float(line @ line)

@@ -114,6 +114,8 @@ class RunData:
         drive: the moment of a driven run, its times since the start of the record; None of a free decay.
         gain_free: whether the common gain multiplies that moment.
         stretch_of: id of the run that this is a stretch of; None of a whole run.
+        merges: how many shorter blocks each block was made of.
+        shorter: the means of these, rad, shape (merges · n,); None where ``merges`` is 1.
     """
 
     id: str
@@ -131,6 +133,40 @@ class RunData:
     drive: DriveMoment | None = None
     gain_free: bool = False
     stretch_of: str | None = None
+    merges: int = 1
+    shorter: Array | None = field(default=None, repr=False)
+
+    def merged(self, count: int) -> RunData:
+        """The run in blocks that are each so many of its own, without what is left at its end.
+
+        Its samples are evenly spaced, and its noise is white.
+        """
+        size = self.reading.size // count
+        shorter = self.reading[: size * count]
+        return dataclasses.replace(
+            self,
+            reading=shorter.reshape(size, count).mean(axis=1),
+            block=count * self.block,
+            interval=count * self.interval,
+            noise=dataclasses.replace(self.noise, variance=self.noise.variance / count),
+            merges=count,
+            shorter=shorter,
+        )
+
+    @cached_property
+    def fine(self) -> RunData:
+        """The run in the shorter blocks that its own were made of; itself where they were not."""
+        if self.shorter is None:
+            return self
+        return dataclasses.replace(
+            self,
+            reading=self.shorter,
+            block=self.block // self.merges,
+            interval=self.interval / self.merges,
+            noise=dataclasses.replace(self.noise, variance=self.noise.variance * self.merges),
+            merges=1,
+            shorter=None,
+        )
 
     @property
     def conditions(self) -> tuple[object, ...]:
@@ -272,6 +308,7 @@ class RunData:
             start=self.start + first * self.interval,
             samples=None if self.samples is None else self.samples.part(first, last, self.interval),
             noise=self.noise.part(first, last),
+            shorter=None if self.shorter is None else self.shorter[first * self.merges : last * self.merges],
         )
 
     @property

@@ -58,6 +58,8 @@ def investigate(
     def study(model: NominalModel) -> Study:
         clock = Clock(progress)
         prepared, test, disturbed = prepared_undisturbed(campaign, model, kinds, clock, settings)
+        with clock.step("nominal fit"):
+            prepared = prepared.in_wider_blocks()
         if not test.detected:
             return Study(prepared, Gap(test), disturbed=disturbed, seconds=clock.seconds)
         with clock.step("where"):

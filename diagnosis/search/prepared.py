@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.diagnosable import refuse_indefinite
+from diagnosis.likelihood.compression import compressed
 from diagnosis.likelihood.least_squares import Fit, FitError, fit, scaled_residuals
 from diagnosis.likelihood.mains_lines import fastest, mains_interval
 from diagnosis.likelihood.problem import Problem
@@ -63,6 +64,7 @@ class Prepared:
         cut: whether the start of every run and what follows its motion were left out, because the nominal model
             misses the motion grossly.
         rested: runs that end with a long rest, which the fits leave out.
+        tested: the same fit in the blocks in which noise and gap were tested, where those of ``nominal`` are wider.
     """
 
     campaign: Campaign
@@ -76,6 +78,7 @@ class Prepared:
     nominal: Fit
     cut: bool = False
     rested: tuple[str, ...] = ()
+    tested: Fit | None = None
 
     @property
     def read_off(self) -> tuple[str, ...]:
@@ -127,12 +130,19 @@ class Prepared:
         size = 0.0 if self.hum is None else share * self.hum.excess * base.count
         return np.array([size * (name == "harmonics") for name in CHANNELS])
 
+    def in_wider_blocks(self) -> Prepared:
+        """The same with the runs in blocks for fits, where a hum is not left in them."""
+        if self.hum is not None:
+            return self
+        return replace(self, nominal=compressed(self.nominal), tested=self.nominal)
+
     def place(self) -> Place:
         """Where the gap is, from the residuals of the nominal model alone."""
         stated = self.noise.stated_variance if self.coarse else None
-        level = float(np.mean([run.noise.variance * run.block for run in self.nominal.problem.data.runs]))
+        nominal = self.tested or self.nominal
+        level = float(np.mean([run.noise.variance * run.block for run in nominal.problem.data.runs]))
         ratio = level / stated if stated else 1.0
-        return locate(self.campaign, self.nominal, hum_removed=self.hum is not None, noise_ratio=ratio)
+        return locate(self.campaign, nominal, hum_removed=self.hum is not None, noise_ratio=ratio)
 
 
 def prepared_and_tested(

@@ -35,6 +35,25 @@ class SelectionSettings:
         "convention",
         unit="std of a block mean",
     )
+    blocks_in_cycle: int = setting(
+        24,
+        "Fewest block means in a cycle of the motion to which causes are fitted.",
+        "physics",
+        "They keep all but 0.6 % of the information at the frequency of the motion.",
+        unit="blocks",
+    )
+    block_loss: float = setting(
+        0.01,
+        "Share of the gap that wider blocks may hide.",
+        "judgement",
+        "Causes are told apart by much larger shares.",
+    )
+    fast_rate: float = setting(
+        0.001,
+        "Rate at which noise alone counts as a motion that is too fast for wider blocks.",
+        "convention",
+        ONE_IN_1000,
+    )
     disturbed_rate: float = setting(
         0.001,
         "Rate at which a campaign without a disturbance has a run that is said to be disturbed.",
