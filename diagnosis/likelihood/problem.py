@@ -125,7 +125,7 @@ class Problem:
             own: the run's own parameters, a row of ``Point.release``, shape (own,).
             effects: from `effects_at`, where they are known already.
         """
-        drawn = self._drawn(own)
+        drawn = self._drawn(own[None])[0]
         known = self.effects_at(common) if effects is None else effects
         stated = self.stated(common, own, run)
         if not self.scatter:
@@ -166,8 +166,8 @@ class Problem:
         own = np.stack([points[i].release[r] for i, r in places])
         values = self._columns(common, own)
         stated = self.data.model.settings(values, runs)
-        at = {i: self.effects_at(points[i].common) for i, _ in places}
-        effects, drawn = [at[i] for i, _ in places], [self._drawn(row) for row in own]
+        at = {i: self.effects_at(points[i].common) for i in dict.fromkeys(i for i, _ in places)}
+        effects, drawn = [at[i] for i, _ in places], self._drawn(own)
         kinds: tuple[type[Effect], ...] = self.effects
         if self.scatter:
             changed = departure(self.scatter, own[:, self.parameters.places(self.scatter)], stated, self.data)
@@ -211,10 +211,17 @@ class Problem:
         damping = stated["mechanical_damping"] - rate * stated["cn_r"]
         return np.stack([stated["yaw_inertia"], damping, stiffness], axis=1)
 
-    def _drawn(self, own: Array) -> tuple[Drawn, ...]:
-        """What the effects of one run drew; argument as in `chain`."""
-        phases = {name: own[place] for name, place in self.parameters.own_places.items()}
-        return tuple(
-            phases.get(kind.name) if kind.skips or kind.name not in phases else float(phases[kind.name][0])
-            for kind in self.effects
-        )
+    def _drawn(self, own: Array) -> list[tuple[Drawn, ...]]:
+        """What the effects of several runs drew, by run.
+
+        Args:
+            own: the runs' own parameters, rows of ``Point.release``, shape (runs, own).
+        """
+        columns: list[list[Drawn]] = []
+        for kind in self.effects:
+            place = self.parameters.own_places.get(kind.name)
+            if kind.skips:
+                columns.append([None] * len(own) if place is None else list(own[:, place]))
+            else:
+                columns.append([None] * len(own) if place is None else own[:, place.start].tolist())
+        return list(zip(*columns, strict=True)) if columns else [()] * len(own)

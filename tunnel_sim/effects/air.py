@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, pi, sqrt
 
@@ -199,12 +199,30 @@ class WindSpeedOffset(Effect):
         if stated.wind_speed <= 0.0 or self.is_null:
             return run
         grown = self.offset * (stated.wind_speed / REFERENCE_SPEED) ** self.exponent
-        series = dict(run.series)
-        if "wind_speed" in series:  # set by another effect, such as a drift
-            given = series["wind_speed"]
-            values = tuple(max(0.0, value + grown) for value in given.values)
-            series["wind_speed"] = Series(values, given.interval)
+        series = _faster(run.series, grown)
         return dataclasses.replace(run, wind_speed=max(0.0, run.wind_speed + grown), series=series)
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Use the true speeds."""
+        del drawn
+        acts = stated.wind_speed > 0.0
+        share = np.where(acts, stated.wind_speed, REFERENCE_SPEED) / REFERENCE_SPEED
+        grown = cls.column(effects, "offset") * share ** cls.column(effects, "exponent")
+        runs.wind_speed[acts] = np.maximum(0.0, runs.wind_speed + grown)[acts]
+        for place in np.flatnonzero(acts & (grown != 0.0)).tolist():
+            runs.series[place] = _faster(runs.series[place], float(grown[place]))
+
+
+def _faster(series: Mapping[str, Series], grown: float) -> Mapping[str, Series]:
+    """Series of inputs with a greater wind speed, where another effect such as a drift has set it, m/s."""
+    given = series.get("wind_speed")
+    if given is None:
+        return series
+    values = tuple(max(0.0, value + grown) for value in given.values)
+    return {**series, "wind_speed": Series(values, given.interval)}
 
 
 _SAMPLES = 201  # of an exponential drift, linear in between: within 1e-4 of the drift up to k = 5

@@ -415,6 +415,16 @@ class StructuralDamping(Effect):
         constants = {"size": size, "lead": lead, "length": stated.duration}
         return run.with_moment(_AFTER_EFFECT.program(constants, {"t": "time"}))
 
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Add the loss, and the after-effect run by run."""
+        runs["loss_factor"][:] = cls.column(effects, "loss_factor")
+        for place in np.flatnonzero(cls.column(effects, "after_effect")).tolist():
+            run, one = effects[place].on_run, (runs.row(place), stated.row(place), drawn[place])
+            runs.put(place, run(*one))
+
     @property
     def depends_on_release(self) -> bool:
         """Whether there is an after-effect."""

@@ -13,6 +13,7 @@ from tunnel_sim.effects.evidence import Residuals, Sought
 from tunnel_sim.effects.parameters import EQUATION, Circumstances, Trial, exponent, parameter, ramp, settling
 from tunnel_sim.physics.forward import backlash
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.physics.settings_table import SettingsTable
 from tunnel_sim.vocabulary.plan import SensorModel
 from tunnel_sim.vocabulary.record import Array
 
@@ -270,6 +271,18 @@ class DroppedSamples(Effect):
         stamps = run.drive.time_s + stated.drive.delay  # since the run's start
         later = self.on_time(stamps, stated, drawn) - stamps
         return replace(run, drive=replace(run.drive, time_s=run.drive.time_s + later))
+
+    @classmethod
+    def on_rows(
+        cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
+    ) -> None:
+        """Let the motions go on for as long as they are read; driven ones run by run."""
+        driven = np.array([drive is not None for drive in runs.drive])
+        lost = cls.column(effects, "lost_time")
+        runs["duration"][:] += np.where((lost != 0.0) & ~driven, lost + _MARGIN, 0.0)
+        for place in np.flatnonzero(driven).tolist():
+            run, one = effects[place].on_run, (runs.row(place), stated.row(place), drawn[place])
+            runs.put(place, run(*one))
 
     def on_time(self, time_s: Array, stated: RunSettings, drawn: Drawn) -> Array:
         """The true time runs ahead of the stamps from every instant on."""

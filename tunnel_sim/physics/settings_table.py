@@ -18,6 +18,7 @@ _FIELDS = (
     "air_density", "spring_stiffness", "mechanical_damping", "yaw_inertia", *_BESIDE,
 )  # fmt: skip
 _DERIVATIVES = ("cn_beta", "cn_r")
+_USUAL = {"timestep": RunSettings.timestep}
 _SIZES = ("frontal_area", "reference_length", "width")
 
 
@@ -113,19 +114,20 @@ class SettingsTable:
             self.numbers[rows, _further()[name]] = value
 
     def row(self, place: int) -> RunSettings:
-        """The settings of one run."""
-        numbers, places = self.numbers[place].tolist(), column_places()
-        law = {name: numbers[at] for name, at in _further().items() if numbers[at] != 0.0}
-        fields = {name: numbers[places[name]] for name in _FIELDS}
-        return RunSettings(
+        """The settings of one run, whose numbers are not checked again; its step is the usual one."""
+        numbers, places, further = self.numbers[place].tolist(), column_places(), _further()
+        found = object.__new__(RunSettings)
+        found.__dict__.update(
+            _USUAL,
+            **{name: numbers[places[name]] for name in _FIELDS},
             derivatives=AeroDerivatives(*(numbers[places[name]] for name in _DERIVATIVES)),
-            parameters=law,
+            parameters={name: numbers[at] for name, at in further.items() if numbers[at] != 0.0},
             series=self.series[place],
             rod_twist=self.rod_twist[place],
             program=self.program[place],
             drive=self.drive[place],
-            **fields,
         )
+        return found
 
     def put(self, place: int, run: RunSettings) -> None:
         """Replace the settings of one run."""
