@@ -25,10 +25,8 @@ from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Rig
 
-_THREADS = 2
 _TOGETHER = 16  # motions in a part of the work, a multiple of those that the integrator takes side by side
 _SOFT_ROD = 2e-5  # rad/(N m): the ringing of a stiffer rod at the release is below the noise
-_POOL = ThreadPoolExecutor(_THREADS)
 #: Parameters of the law that do nothing without wind, and fields of a run that point to samples.
 _AIR = (
     "air_density", "cn_beta", "cn_r", "moment_cubic", "damping_quadratic", "aero_lag", "flow_angle",
@@ -190,8 +188,14 @@ def readings(asked: Asked) -> list[Array]:
         for (_, place), one in zip(members, values, strict=True):
             found[place] = one
 
-    list(_POOL.map(read, parts) if len(parts) > 1 else map(read, parts))
+    threads = asked.data.settings.work.threads if len(parts) > 1 else 1
+    list(_pool(threads).map(read, parts) if threads > 1 else map(read, parts))
     return found
+
+
+@lru_cache(maxsize=4)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads)
 
 
 def _read(

@@ -14,6 +14,7 @@ from diagnosis.settings.answer import AnswerSettings, WhereSettings
 from diagnosis.settings.found import GapSettings, NoiseSettings, ReadOffSettings, SelectionSettings
 from diagnosis.settings.search import RandomMomentSettings, ScatterSettings, SearchSettings, WeighingSettings
 from diagnosis.settings.words import RemainderSettings, WordsSettings
+from diagnosis.settings.work import WorkSettings
 from tunnel_sim.vocabulary.errors import TunnelError
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "WeighingSettings",
     "WhereSettings",
     "WordsSettings",
+    "WorkSettings",
     "settings_of",
 ]
 
@@ -50,6 +52,7 @@ class Settings:
     answer: AnswerSettings = field(default_factory=AnswerSettings)
     remainder: RemainderSettings = field(default_factory=RemainderSettings)
     words: WordsSettings = field(default_factory=WordsSettings)
+    work: WorkSettings = field(default_factory=WorkSettings)
 
     def changed(self, values: Mapping[str, float]) -> Settings:
         """A copy with other values.
