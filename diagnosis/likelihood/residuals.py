@@ -187,12 +187,14 @@ class ChannelMisfit:
         motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
         scatter_cost: −2 ln of the evidence of chance differences between runs that it takes, dimensionless; 0 where
             they repeat.
+        repeats: whether the runs of the fit repeat exactly.
     """
 
     chi2: Array
     count: Array
     motion: float
     scatter_cost: float = 0.0
+    repeats: bool = True
 
     @property
     def excess(self) -> Array:
@@ -210,7 +212,10 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
     chi2 = [run.channels(left) for run, left in zip(_cycles(fit), given, strict=True)]
     count, powers = [run.count for run in _cycles(fit)], [run.power for run in _cycles(fit)]
     return ChannelMisfit(
-        np.sum(chi2, axis=0, dtype=np.float64), np.sum(count, axis=0, dtype=np.float64), float(np.sum(powers))
+        np.sum(chi2, axis=0, dtype=np.float64),
+        np.sum(count, axis=0, dtype=np.float64),
+        float(np.sum(powers)),
+        repeats=not fit.problem.scatter,
     )
 
 

@@ -26,7 +26,9 @@ class Chance:
     """One chance difference between runs: of the wind speed, the spring or the damping.
 
     A deviation changes the linear stiffness and damping of its run, by what the nominal model gives them. An effect
-    that depends on the speed or the spring does not see it: a deviation is to follow no error of its form.
+    that depends on the speed or the spring does not see it: a deviation is to follow no error of its form. The
+    exception is vortex shedding. It keeps time with the true speed; at the stated speed its phase is lost within
+    some cycles.
 
     Args:
         kind: the effect of the vocabulary that it is.
@@ -75,15 +77,21 @@ class Chance:
         return np.stack([np.broadcast_to(change, speed.shape) for change in changes], axis=1)
 
 
+_FOLLOWS_SPEED = "strouhal_number"
+
+
 class RunDeparture(Effect):
     """What a run's own deviations change of its motion; no effect of the vocabulary, and the last of a chain."""
 
     name = "run_departure"
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Add stiffness and damping, ``drawn`` in this order."""
+        """Add stiffness and damping, and change the wind's speed by a share; ``drawn`` in this order."""
         del stated
-        stiffness, damping = self.drawn_numbers(drawn)
+        stiffness, damping, faster = self.drawn_numbers(drawn)
+        followed = run.parameters.get(_FOLLOWS_SPEED, 0.0)
+        if followed and faster:
+            run = run.with_parameters({_FOLLOWS_SPEED: (1.0 + float(faster)) * followed})
         return replace(
             run,
             spring_stiffness=max(run.spring_stiffness + float(stiffness), 0.0),
@@ -94,11 +102,12 @@ class RunDeparture(Effect):
     def on_rows(
         cls, runs: SettingsTable, stated: SettingsTable, effects: Sequence[Effect], drawn: Sequence[Drawn]
     ) -> None:
-        """Add stiffness and damping."""
+        """Add stiffness and damping, and change the wind's speed by a share."""
         del stated
         added = np.stack([effect.drawn_numbers(d) for effect, d in zip(effects, drawn, strict=True)])
         runs.spring_stiffness[:] = np.maximum(runs.spring_stiffness + added[:, 0], 0.0)
         runs["mechanical_damping"][:] += added[:, 1]
+        runs[_FOLLOWS_SPEED][:] *= 1.0 + added[:, 2]
 
 
 #: The chance differences of a fit.
@@ -106,11 +115,17 @@ Scatter = tuple[Chance, ...]
 
 
 def departure(scatter: Sequence[Chance], deviations: Array, stated: SettingsTable, data: Data) -> Array:
-    """What the deviations of runs change of stiffness (N m/rad) and damping (N m s/rad), shape (runs, 2).
+    """What the deviations of runs change.
 
     Args:
         deviations: relative, by run one for each chance difference, shape (runs, differences).
         stated: the nominal physics of the runs.
+
+    Returns:
+        Changes of the stiffness, N m/rad, and of the damping, N m s/rad, and that of the wind speed as a share,
+        shape (runs, 3).
     """
     changes = np.stack([one.change(stated, data) for one in scatter])
-    return np.asarray(np.einsum("drk,rd->rk", changes, deviations), np.float64)
+    linear = np.einsum("drk,rd->rk", changes, deviations)
+    of_speed = [one.kind.scatters == "wind_speed" for one in scatter]
+    return np.column_stack([linear, deviations[:, of_speed].sum(axis=1)])
