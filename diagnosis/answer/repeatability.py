@@ -10,8 +10,9 @@ from scipy.special import fdtrc, stdtr
 
 from diagnosis.facts.repeatability import Repeatability, RunRepeat, Spread, Trend
 from diagnosis.likelihood.between_runs import RunColumns, width_prior
-from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals
 from diagnosis.likelihood.residuals import linear_coefficients
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Scatter
 from diagnosis.search.scatter import drifts, may_scatter, usual, with_deviations, without_deviations
 from identification.campaign.between_runs import (

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from diagnosis.likelihood.between_runs import Between, RunColumns, width_prior
-from diagnosis.likelihood.least_squares import Fit, scaled_residuals, sensitivities, try_fit
+from diagnosis.likelihood.least_squares import Fit, scaled_residuals, try_fit
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.model.chance import Chance, Scatter
 from diagnosis.model.parameters import Point
 from diagnosis.model.run_data import Data

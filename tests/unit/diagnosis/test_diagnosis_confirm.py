@@ -10,9 +10,10 @@ from diagnosis.answer.held_out import predict_held_out
 from diagnosis.answer.judgements import cautions
 from diagnosis.answer.reported import Comparison, compare, confirm, report_fits
 from diagnosis.facts.found import Fact
-from diagnosis.likelihood.least_squares import Fit, fit, sensitivities
+from diagnosis.likelihood.least_squares import Fit, fit
 from diagnosis.likelihood.partial import refit_releases
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from diagnosis.model.rig import Rig

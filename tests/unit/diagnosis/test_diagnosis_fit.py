@@ -15,10 +15,10 @@ from diagnosis.likelihood.least_squares import (
     normal_equations,
     project_release,
     scaled_residuals,
-    sensitivities,
 )
 from diagnosis.likelihood.motions import condensed
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import nominal_start
 from diagnosis.model.blocks import prepare
 from diagnosis.model.parameters import Point

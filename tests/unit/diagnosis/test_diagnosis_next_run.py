@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.answer.next_run import planned_run, separating_run, separation
-from diagnosis.likelihood.least_squares import fit, normal_equations, sensitivities
+from diagnosis.likelihood.least_squares import fit, normal_equations
 from diagnosis.likelihood.problem import Problem
+from diagnosis.likelihood.sensitivities import sensitivities
 from diagnosis.likelihood.starting_points import starting_points
 from diagnosis.model.parameters import Point
 from tests.unit.gap_campaigns import campaign, nominal
