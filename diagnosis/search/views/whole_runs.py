@@ -17,6 +17,7 @@ from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
+from diagnosis.search.reach import left_by_all
 from diagnosis.search.scatter import (
     evident,
     likelier,
@@ -98,11 +99,13 @@ class WholeRuns(View):
         if self.unscattered is not None or self.first is not None:
             return self.with_moments(super().sets(clock), clock)
         explained: list[Hypothesis] = []
+        beyond: list[float] = []
 
         def enough(level: Sequence[Hypothesis]) -> bool:
             tried = (self._beside(one) for one in level)
             explained.extend(one for one in tried if one is not None and self._explains(one))
-            return bool(explained)
+            beyond.extend(() if explained else self._beyond_reach(level))
+            return bool(explained or beyond)
 
         with clock.step("effects"):
             grown = grow(self, clock.progress, enough)
@@ -113,11 +116,23 @@ class WholeRuns(View):
         if explained:
             scale = Scale.of(explained, self._scattering_gap, self.base.settings.weighing)
             return self._beside_scatter(likely, max(explained, key=scale.weight), clock)
-        plain = self.with_moments(Sets(self, tuple(grown)), clock)
+        found = Sets(self, tuple(grown), left_by_all=beyond[0] if beyond else None)
+        plain = self.with_moments(found, clock)
         if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
             return plain
         beside = self._beside_scatter(likely, None, clock)
         return plain if beside.weighed[0].effects == UNKNOWN else beside
+
+    def _beyond_reach(self, level: Sequence[Hypothesis]) -> list[float]:
+        """The least share of the gap that all effects together leave, where no larger set could be the cause.
+
+        It is asked for where the sets of a level leave most of the gap; else empty.
+        """
+        chosen, gap = self.base.settings.search, self.base.total - self.base.count
+        if any(not one.effects or one.fit.total - one.fit.count < chosen.reach_from * gap for one in level):
+            return []
+        left = left_by_all(self.base, self.able, self.prepared.kinds)
+        return [left] if left > chosen.out_of_reach else []
 
     def _beside(self, one: Hypothesis) -> Hypothesis | None:
         """A set beside chance differences between the runs, its forms free where the runs need that.
