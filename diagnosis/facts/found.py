@@ -176,6 +176,7 @@ class Found:
         nearly: what nearly explains an unexplained gap; None where nothing does.
         immaterial: by coefficient, the share by which the causes change it, where they change none materially.
         choices: springs of which one may be off, the likeliest first.
+        hold: a delay of the input that another hold between samples explains as well; None: none.
         rivals: what is outside the vocabulary and would explain a gap whose cause is not known.
         second_modes: by run, where the gap is not explained.
         limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
@@ -190,6 +191,7 @@ class Found:
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()
+    hold: Fact | None = None
     rivals: tuple[Fact, ...] = ()
     second_modes: tuple[TwoModes, ...] = ()
     limit_cycles: tuple[Remark, ...] = ()
