@@ -25,3 +25,15 @@ def models_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
     joint_model.prepare()
     monkeypatch.setattr(joint_model, "in_limited_process", lambda work, given, **_: work(given))
+
+
+@pytest.fixture
+def causes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Diagnose without the formula of what remains: of a gap that is not explained it takes most of the time.
+
+    It changes neither causes nor coefficients, and has tests of its own (``test_closable.py``).
+    """
+    from diagnosis import _diagnose
+
+    for search in ("closable", "closable_driven"):
+        monkeypatch.setattr(_diagnose, search, lambda *_, **__: None)

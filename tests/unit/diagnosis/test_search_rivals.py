@@ -22,6 +22,8 @@ from tunnel_reference.draw import Mixture, draw_campaign
 from tunnel_reference.make import as_campaign, simulate_set
 from tunnel_sim.effects import effect_class, known_effects
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 ERRORS = (0.01, 0.0, -0.015)
 KINDS = [effect_class(name) for name in ("gravity_stiffness", "rod_flexibility", "spring_miscalibration")]
 
@@ -32,7 +34,7 @@ def two_off():
     drawn = draw_campaign(np.random.default_rng(1), kind="none", mixture=Mixture(variety=0.0))
     stated = drawn.conditions.spring_stiffness
     scale = 1.0 + np.array(ERRORS)[np.unique(stated, return_inverse=True)[1]]
-    moved = replace(drawn, conditions=replace(drawn.conditions, stiffness_scale=scale))
+    moved = replace(drawn, conditions=replace(drawn.conditions, duration=8.0, stiffness_scale=scale))
     return as_campaign(simulate_set([moved])[0], "two-springs")
 
 

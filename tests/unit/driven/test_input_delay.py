@@ -21,6 +21,8 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import EffectSetting
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
 DELAY = the_effect(driven=True)

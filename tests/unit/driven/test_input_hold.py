@@ -23,6 +23,8 @@ from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorP
 from tunnel_sim.vocabulary.drive import Drive, Hold
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 RATE, INERTIA, DAMPING, SPRING, NOISE = 200.0, 0.1, 0.05, 16.0, 3e-4
 HALF = 0.5 / RATE
 FEW = vocabulary([DELAY.name, "quadratic_damping", "cubic_stiffness"])
