@@ -1,4 +1,4 @@
-"""One thread of linear algebra in each process: the suite runs a process on every core."""
+"""One thread of linear algebra in each process, and as many processes as keep every core at work."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  #
 # Set before NumPy loads, and handed on to the workers and to every command that a test starts.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than there are processors: tests of pages and of commands wait for other processes."""
+    return (os.cpu_count() or 1) + 1
+
 
 # A loaded machine may take a second over one example.
 settings.register_profile("without deadline", deadline=None)

@@ -155,9 +155,9 @@ def refuse_long(duration: float, rate: float, name: str, where: str) -> None:
         rate: Hz.
     """
     if not duration * rate <= limits.RUN_SAMPLES:
-        what = f"{name} = {duration:g} s at {rate:g} Hz is {duration * rate:.3g} samples"
+        what = f"{name} = {duration:g} s at {rate:g} Hz is longer than a record can be"
         longest = limits.RUN_SAMPLES / rate
-        remedy = f"give at most {longest:g} s: a record has up to {limits.RUN_SAMPLES:,} samples"
+        remedy = f"give at most {longest:g} s: the samples of a record are {limits.RUN_SAMPLES:,} at most"
         raise EnvError(what, where=where, remedy=remedy)
 
 

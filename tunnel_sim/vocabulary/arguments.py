@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError, counted, did_you_mean
 
 
 class EnvError(TunnelError, ValueError):
@@ -75,13 +75,13 @@ def checked_numbers(
     Raises:
         EnvError: when it is not a list, or a number of it is refused.
     """
-    example = "one number or more" if length is None else f"{length} numbers"
+    example = "one number or more" if length is None else counted(length, "number")
     remedy = f"give {example} in a list or tuple{kind.unit and f', in {kind.unit}'}"
     if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray) or np.ndim(values) == 0:
         raise EnvError(f"{name} = {values!r} is not a list of numbers", where=where, remedy=remedy)
     found = tuple(kind.checked(value, f"{name}[{place}]", where) for place, value in enumerate(list(values)))
     if length is not None and len(found) != length:
-        what = f"{name} = {values!r} has {len(found)} numbers, not {length}"
+        what = f"{name} = {values!r} has {counted(len(found), 'number')}, not {length}"
         raise EnvError(what, where=where, remedy=remedy)
     if length is None and (not found or len(set(found)) != len(found)):
         raise EnvError(f"{name} = {values!r} is empty or holds a value twice", where=where, remedy=remedy)
