@@ -47,7 +47,7 @@ def other_hold(study: Study) -> Fact | None:
         return None
     # without a delay the fit has one number less, by which it leaves more even where it is right
     chance = chdtri(1.0, study.settings.words.hold_rate) * (1.0 + max(fit.excess, 0.0))
-    if fitted.total - fit.total > chance:
+    if fitted.unlikelihood - fit.unlikelihood > chance:
         return None
     delay, half = (
         f"{DELAY.name}.{DELAY.parameters()[0].name}",
@@ -61,6 +61,6 @@ def other_hold(study: Study) -> Fact | None:
             "half_sample_s": own(half, "s"),
             "taken": "zero" if held else "linear",
             "stated": all(run.drive is None or run.drive.hold is not None for run in study.campaign.runs),
-            "better": bool(fit.total - fitted.total > chance),
+            "better": bool(fit.unlikelihood - fitted.unlikelihood > chance),
         },
     )

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import copy
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -352,10 +353,16 @@ def without_causes(given: Any) -> None:
     given["candidates"][0]["effect"] = "none"
 
 
+@cache
+def summary(change: Callable[[Any], None]) -> str:
+    """The summary of the document with a change, which takes some seconds to draw."""
+    change(given := document())
+    return render_report(given, campaign(), summary=True)
+
+
 @pytest.mark.parametrize("change", [lambda _: None, crowded, without_causes])
 def test_the_summary_is_one_printed_page_well_filled(browser: Any, tmp_path: Path, change: Any) -> None:
-    change(given := document())
-    (tmp_path / "summary.html").write_text(render_report(given, campaign(), summary=True), encoding="utf-8")
+    (tmp_path / "summary.html").write_text(summary(change), encoding="utf-8")
     page = browser.new_page()
     page.goto((tmp_path / "summary.html").as_uri())
     margins = dict.fromkeys(("top", "bottom", "left", "right"), "12mm")
@@ -374,9 +381,11 @@ def test_the_summary_is_one_printed_page_well_filled(browser: Any, tmp_path: Pat
 
 
 @pytest.mark.usefixtures("browser")
-def test_the_summary_is_written_as_a_file_of_one_page(tmp_path: Path) -> None:
-    crowded(given := document())
-    path = write_summary(given, campaign(), tmp_path / "summary.pdf")
+def test_the_summary_is_written_as_a_file_of_one_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tunnel_lab.report.page.render_report", lambda *_, **__: summary(crowded))
+    path = write_summary(document(), campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1
 
