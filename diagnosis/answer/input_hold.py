@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.facts.found import Fact
+from diagnosis.facts.found import OtherHold
 from diagnosis.likelihood.least_squares import try_fit
 from diagnosis.model.parameters import Point
 from diagnosis.search.study import Study
@@ -20,13 +20,8 @@ from tunnel_sim.effects.registry import the_effect
 DELAY = the_effect(driven=True)
 
 
-def other_hold(study: Study) -> Fact | None:
-    """The delay of an answer that another hold explains as well; None where there is none.
-
-    Returns:
-        The delay and half a sample in s, the hold that was taken, whether the campaign states it, and whether the
-        other hold explains the records better than chance alone would.
-    """
+def other_hold(study: Study) -> OtherHold | None:
+    """The delay of an answer that another hold explains as well; None where there is none."""
     from scipy.special import chdtri  # only here: slow to load
 
     fit, problem = study.chosen, study.chosen.problem
@@ -54,13 +49,10 @@ def other_hold(study: Study) -> Fact | None:
         0.5 * study.campaign.runs[0].record.sample_interval,
     )
     own = study.similarity.own
-    return Fact(
-        "other hold",
-        {
-            "delay_s": own(fit.value(delay), "s"),
-            "half_sample_s": own(half, "s"),
-            "taken": "zero" if held else "linear",
-            "stated": all(run.drive is None or run.drive.hold is not None for run in study.campaign.runs),
-            "better": bool(fit.unlikelihood - fitted.unlikelihood > chance),
-        },
+    return OtherHold(
+        delay_s=own(fit.value(delay), "s"),
+        half_sample_s=own(half, "s"),
+        taken="zero" if held else "linear",
+        stated=all(run.drive is None or run.drive.hold is not None for run in study.campaign.runs),
+        better=bool(fit.unlikelihood - fitted.unlikelihood > chance),
     )
