@@ -17,7 +17,7 @@ from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
 from tests.reference.free_decays import TWELVE, campaign
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.experiments import breakdown, score_trials
+from tunnel_lab.experiments import breakdown, runner, score_trials
 from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score_grid import load_grid
 from tunnel_lab.experiments.sweep import run_sweep
@@ -214,14 +214,16 @@ def test_a_wrong_return_fails_a_sweep(folder: Path) -> None:
     assert "is nan ±" in rows["message"][0]
 
 
-def test_a_process_that_dies_is_one_line(folder: Path) -> None:
+@pytest.mark.usefixtures("folder")
+def test_a_process_that_dies_is_one_line(tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
     """A process that an estimator ends is not a traceback, and its work is tried again."""
-    done = in_a_process("score", "grid.toml", "--jobs", "1", "-e", "own_method:Dies", cwd=folder)
-    assert (done.returncode, done.stdout) == (2, "")
-    *lost, last = done.stderr.splitlines()
-    assert set(lost) == {"tunnel: a worker process was lost; its tasks are repeated"}
+    monkeypatch.setattr(runner, "PATIENCE", 2)  # of the three times
+    status, out, err = tunnel("score", "grid.toml", "--jobs", "1", "-e", "own_method:Dies")
+    lost, last = err.splitlines()
+    assert (status, out) == (2, "")
+    assert lost == "tunnel: a worker process was lost; its tasks are repeated"
     assert last.startswith(
-        "tunnel: worker processes died 3 times without finishing a task; give fewer --jobs"
+        "tunnel: worker processes died 2 times without finishing a task; give fewer --jobs"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ SPRING, DAMPER = 5e-4, 1e-2  # one standard deviation between runs, relative
 STIFFNESS, DAMPED = "stiffness_scatter", "damping_scatter"
 
 
+@cache
 def campaign(
     *,
     scatter: float = 1.0,

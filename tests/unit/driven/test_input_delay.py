@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
 from diagnosis.model.rig import Rig
+from diagnosis.words.verdict import headline
 from tests.marks import slow
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.engine.virtual_campaign import plan_effects
@@ -74,6 +75,8 @@ def test_it_is_named_with_its_value(delay: float, kinds: Sequence[type[Effect]])
     assert abs(own.value - delay) < 3.0 * own.std < 1e-4
     assert found.gap.closed > 0.99
     assert found.sizes == ()  # it has none in a free decay
+    assert found.found.hold is None  # no hold is wrong by two samples
+    assert headline(found.to_json_dict())[0] == "input delay"
 
 
 @SLOW

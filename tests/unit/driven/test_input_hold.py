@@ -79,13 +79,6 @@ def test_a_smooth_input_that_is_stated_as_held_seems_early() -> None:
     )
 
 
-def test_another_delay_has_one_reading() -> None:
-    answer = diagnose(campaign(0.004), kinds=FEW)
-    assert answer.causes == (DELAY.name,)
-    assert answer.found.hold is None
-    assert headline(answer.to_json_dict())[0] == "input delay"
-
-
 def test_identify_says_that_linear_is_assumed() -> None:
     (remark,) = identify(held(None)).remarks
     assert "drive_hold is not stated" in remark.what
