@@ -39,7 +39,8 @@ def two_off():
 
 
 def test_two_springs_off_are_unknown_and_said_in_words(two_off):
-    found = diagnose(two_off, kinds=KINDS)
+    kept = {(run.spring_stiffness, run.wind_on): run for run in two_off.runs}  # enough to tell the springs
+    found = diagnose(replace(two_off, runs=tuple(kept.values())), kinds=KINDS)
     assert tuple(found.causes) == UNKNOWN
     stated = sorted({run.spring_stiffness for run in two_off.runs})
     assert "Two springs that are not as stiff as stated would explain the gap: for example, " in found.verdict
