@@ -12,6 +12,7 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.blocks import without_long_rest
+from diagnosis.model.chance import Scatter
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
@@ -102,9 +103,11 @@ class WholeRuns(View):
         beyond: list[float] = []
 
         def enough(level: Sequence[Hypothesis]) -> bool:
-            tried = (self._beside(one) for one in level)
+            beyond.extend(
+                self._beyond_reach(level)
+            )  # with deviations of every run, so nothing beside them is tried
+            tried = () if beyond else (self._beside(one) for one in level)
             explained.extend(one for one in tried if one is not None and self._explains(one))
-            beyond.extend(() if explained else self._beyond_reach(level))
             return bool(explained or beyond)
 
         with clock.step("effects"):
@@ -118,7 +121,7 @@ class WholeRuns(View):
             return self._beside_scatter(likely, max(explained, key=scale.weight), clock)
         found = Sets(self, tuple(grown), left_by_all=beyond[0] if beyond else None)
         plain = self.with_moments(found, clock)
-        if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
+        if plain.weighed[0].effects != UNKNOWN or beyond or self.scattering is None:
             return plain
         beside = self._beside_scatter(likely, None, clock)
         return plain if beside.weighed[0].effects == UNKNOWN else beside
@@ -139,10 +142,19 @@ class WholeRuns(View):
 
         None where the runs do not differ, or the fit fails.
         """
-        base = self.scattering
-        if base is None or not one.effects:
-            return None if base is None else Hypothesis((), base, repeating=self.base)
-        fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, base.problem.scatter))
+        if self.scattering is None or not one.effects:
+            return None if self.scattering is None else Hypothesis((), self.scattering, repeating=self.base)
+        if one not in self._fitted_beside:
+            self._fitted_beside[one] = self._fitted_with_deviations(one, self.scattering.problem.scatter)
+        return self._fitted_beside[one]
+
+    @cached_property
+    def _fitted_beside(self) -> dict[Hypothesis, Hypothesis | None]:
+        """Sets beside chance differences, by the set in runs that repeat: some are asked for twice."""
+        return {}
+
+    def _fitted_with_deviations(self, one: Hypothesis, scatter: Scatter) -> Hypothesis | None:
+        fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, scatter))
         if fitted is None:
             return None
         found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
