@@ -58,9 +58,10 @@ def study_of(name, value, conditions=RUNS, settings=Settings(), **extra):
 
 def test_a_run_of_too_few_blocks_for_a_row_says_nothing_of_what_could_be_closed(detent):
     study, _ = detent
-    first, *others = study.nominal.problem.data.runs
-    short = study.nominal.problem.data.with_runs((first.part(0, 4), *others))
-    fitted = fit(replace(study.nominal.problem, data=short), study.nominal.point)
+    nominal = study.prepared.tested
+    first, *others = nominal.problem.data.runs
+    short = nominal.problem.data.with_runs((first.part(0, 4), *others))
+    fitted = fit(replace(nominal.problem, data=short), nominal.point)
     assert fitted.excess > 0.0
     assert min(path.residual.size for path in paths(fitted)) == 0
     shorter = replace(study, prepared=replace(study.prepared, nominal=fitted))
@@ -182,7 +183,7 @@ def test_a_vibration_is_a_steady_line():
 
 def test_what_does_not_keep_its_phase_is_not_a_line(detent):
     """Residuals made here: white noise, a resonance driven by noise, and a sinusoid, in a closed form."""
-    fit, rng = detent[0].nominal, np.random.default_rng(1)
+    fit, rng = detent[0].prepared.tested, np.random.default_rng(1)
     turn = 2.0 * np.pi * 7.0 * fit.problem.data.runs[0].interval
     radius = np.exp(-turn / 60.0)
 

@@ -242,5 +242,5 @@ def test_rests_stay_where_the_rest_of_the_runs_cannot_be_fitted(monkeypatch):
     monkeypatch.setattr("diagnosis.search.prepared.fit_nominal", lambda _data: fitted)
     found = investigate(stopped(), [effect_class("coulomb_friction")])
     assert found.prepared.rested == ()
-    assert [run.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6
+    assert [run.fine.reading.size for run in found.nominal.problem.data.runs] == [3000] * 6
     assert found.causes == ("coulomb_friction",)
