@@ -202,7 +202,7 @@ class Problem:
     def linear(self, point: Point) -> Array:
         """Of every run inertia, damping and stiffness, as in `Fit.linear`, shape (runs, 3)."""
         runs = self.data.runs
-        values = self._columns(np.tile(point.common, (len(runs), 1)), point.release)
+        values = self._columns(np.tile(point.common, (len(runs), 1)), point.release[: len(runs)])
         stated, pressure = self.data.model.settings(values, runs), [self.data.air_moment(run) for run in runs]
         speed = np.array([run.wind_speed if run.wind_on else np.inf for run in runs])
         stiffness = stated.spring_stiffness - pressure * stated["cn_beta"]
