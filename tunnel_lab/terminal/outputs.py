@@ -301,7 +301,7 @@ def parts_table(imported: Imported) -> TextTable:
     several = len(imported.sources) > 1
     rows = []
     for part in imported.parts:
-        time, run = part.raw.cleaned.time_s[part.piece.first : part.piece.last], part.run
+        time, run = part.raw.cleaned.file_time_s[part.piece.first : part.piece.last], part.run
         cells = [f"{time.size}", "left out", *[""] * (len(headings) - 2)]
         if run is not None:
             cells[1:] = [
