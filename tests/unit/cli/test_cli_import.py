@@ -117,7 +117,7 @@ def test_an_export_is_written(tunnel: Tunnel, tiny_campaign: Path, tmp_path: Pat
 
 def held_and_released(folder: Path, *, first: float) -> Path:
     """A record at 200 Hz, whose body is held aside for 4 s and then let go; its clock starts at ``first``, s."""
-    time, free = decay()
+    _, free = decay()
     angle = np.concatenate([np.linspace(0.0, 0.35, 200), np.full(600, 0.35), free])
     clock = first + np.arange(angle.size) / 200.0
     rows = "".join(f"{t:.3f},{value:.5f}\n" for t, value in zip(clock, angle, strict=True))
@@ -128,7 +128,7 @@ def test_times_of_notes_table_and_picture_are_those_that_start_takes(
     tunnel: Tunnel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[float] = []
-    monkeypatch.setattr(Axes, "axvline", lambda self, x, **style: drawn.append(x))  # where a run begins
+    monkeypatch.setattr(Axes, "axvline", lambda _axes, x, **_style: drawn.append(x))  # where a run begins
     path = held_and_released(tmp_path, first=100.0)
     status, said, _ = tunnel("import", path, "--preview", tmp_path / "look.png")
     assert status == 0
