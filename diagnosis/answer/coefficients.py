@@ -178,7 +178,8 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
         adds half the change from the nominal model. The effect that could hide and would move the coefficient most
         (`diagnosis.answer.hidden`) adds the square of half that move, since its largest size is two standard
         deviations. The central interval is given where it is not that of a normal distribution
-        (`interval_beside`). No standard deviation is given at a bound and where the runs do not determine the coefficient.
+        (`interval_beside`). No standard deviation is given at a bound and where the runs do not determine the
+        coefficient.
     """
     fit, found, chosen = answers.possible[0].fit, {}, answers.nominal.settings.answer
     for name in coefficients_of(fit):
@@ -218,9 +219,9 @@ def coefficients(answers: Answers, campaign: Campaign) -> dict[str, ParameterEst
 def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, float] | None:
     """The central interval of a mixture that is stated beside its mean and standard deviation.
 
-    Rivals too improbable to reach the interval may still be most of the variance, where their means are far away. The
-    interval is then shorter than value ± one standard deviation, and depends on whether each of them has more or less
-    than half the probability outside it, which is not known as well as that.
+    Rivals too improbable to reach the interval may still be most of the variance, where their means are far away.
+    The interval is then shorter than value ± one standard deviation, and depends on whether each of them has more or
+    less than half the probability outside it, which is not known as well as that.
 
     Returns:
         Its ends; None where value and standard deviation give the interval, as for a normal distribution.

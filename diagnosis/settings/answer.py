@@ -133,7 +133,7 @@ class AnswerSettings:
         2.0,
         "Length of that interval from which it is stated; below it value ± 1.96 std is the interval.",
         "convention",
-        "A shorter one leaves out the rare rivals that are most of the variance; value ± one standard deviation is as long.",
+        "Value ± one standard deviation is as long. A shorter one leaves out rare rivals, most of the variance.",
         unit="std",
     )
     small_causes: int = setting(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from diagnosis.settings import settings_of
+from diagnosis.words.answers import ranked, set_out
 from diagnosis.words.numbers import (
     KINDS,
     Document,
@@ -40,7 +41,7 @@ from identification.status import Remark
 
 def candidates_table(document: Document) -> TextTable:
     """The answers considered and the shares that they close, most probable first; a last row counts the others."""
-    rows, given, chosen = [], document["candidates"], settings_of(document).words
+    rows, given, chosen = [], ranked(document), settings_of(document).words
     probable = [c for c in given[: chosen.answers_listed] if c["probability"] >= chosen.answer_listed]
     shown = probable or given[:1]
     for candidate in shown:
@@ -66,7 +67,7 @@ def parameters_table(document: Document) -> TextTable:
         size = spread_estimate(document, owner, given) or estimated(given, mark)
         rows.append((owner if owner != effect else "", name, size))
         effect = owner
-    whose = "Parameters" if document.get("decided", True) else "Parameters of the most probable answer"
+    whose = "Parameters" if document.get("decided", True) else f"Parameters of the {set_out(document)}"
     return TextTable(f"{whose} ± one standard deviation", ("effect", "parameter", "estimate"), tuple(rows))
 
 
@@ -183,7 +184,8 @@ def diagnosis_brief(document: Document) -> str:
     gap, first = document["gap"], document["candidates"][0]
     causes = document["causes"]
     named = named_answer(causes).lower() if causes else "no gap"
-    undecided = "" if document.get("decided", True) else "undecided, most probably "
+    decided = document.get("decided", True)
+    undecided = "" if decided else f"undecided, the {set_out(document)} is "
     misfit, excess = misfit_of(document), gap["excess_before"]
     size = f"{held_out_excess(excess)} noise powers"
     if misfit is not None:
@@ -214,7 +216,7 @@ def listed_answers(document: Document) -> int:
 
 def other_answers(document: Document) -> str:
     """The answers that are not listed, in words; empty where all are."""
-    probabilities = [c["probability"] for c in document["candidates"][listed_answers(document) :]]
+    probabilities = [c["probability"] for c in ranked(document)[listed_answers(document) :]]
     if not probabilities:
         return ""
     together = probability(sum(probabilities)).replace("<", "less than")

@@ -15,6 +15,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from diagnosis.words.answers import set_out
 from diagnosis.words.numbers import Document, plain
 from diagnosis.words.remainder import closable_line
 from diagnosis.words.scatter import repeatability_line, repeatability_table, repeats
@@ -139,6 +140,7 @@ def render_report(
         "named": kind in ("open", "found"),
         "facts": view.facts(document),
         "found": view.causes_found(document),
+        "set_out": set_out(document),
         "coefficients": view.coefficient_rows(document),
         "next_steps": next_steps(document),
         "place": view.place_rows(document),

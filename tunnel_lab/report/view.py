@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from diagnosis.words.answers import ranked, set_out
 from diagnosis.words.causes import said_size
 from diagnosis.words.numbers import (
     ACTS_WHEN,
@@ -75,7 +76,7 @@ def facts(document: Document) -> list[Fact]:
     else:
         listed = [Fact(label, WITHIN_THE_NOISE, typeset(times_noise(before, decimals=3)))]
     if causes and causes != ["unknown"]:
-        label = f"With {'the causes' if decided else 'the most probable answer'} added"
+        label = f"With {'the causes' if decided else f'the {set_out(document)}'} added"
         if _calm(document):
             listed.append(Fact(label, WITHIN_THE_NOISE, noise_powers(after)))
         else:
@@ -83,7 +84,7 @@ def facts(document: Document) -> list[Fact]:
         listed.append(Fact("Share of the gap closed", percent(gap["closed"]), gap["closed_on"]))
     if document["candidates"]:
         rivals = decided and document["ambiguous_with"]
-        whose = "likeliest of these sets" if rivals else "answer" if decided else "most probable answer"
+        whose = "likeliest of these sets" if rivals else set_out(document)
         first = document["candidates"][0]["probability"]
         listed.append(Fact(f"Probability of the {whose}", probability(first)))
     return listed
@@ -191,7 +192,7 @@ def candidate_rows(document: Document) -> list[dict[str, Any]]:
                 for n, v in c["parameters"].items()
             ],
         }
-        for c in document["candidates"][: listed_answers(document)]
+        for c in ranked(document)[: listed_answers(document)]
     ]
 
 

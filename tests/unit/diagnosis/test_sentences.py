@@ -61,6 +61,20 @@ def test_only_what_locates_the_gap_is_said(given: Document) -> None:
     assert "By frequency" not in text
 
 
+def test_of_several_causes_it_is_said_which_act_where_the_gap_is(given: Document) -> None:
+    text = placed(given, compared=["coulomb_friction", "gravity_stiffness", "quadratic_damping"], agrees=True)
+    assert text.endswith(
+        "Of the causes coulomb friction and quadratic damping act there, and gravity stiffness acts on the restoring "
+        "moment (stiffness)."
+    )
+    assert "does not agree" not in text
+    text = placed(given, compared=["cubic_stiffness", "sensor_drift"], agrees=False)
+    assert text.endswith(
+        "That does not agree with cubic stiffness and sensor drift: cubic stiffness acts on the restoring moment "
+        "(stiffness) and sensor drift acts on the reading of the sensor."
+    )
+
+
 def test_causes_that_act_elsewhere_do_not_agree(given: Document) -> None:
     text = placed(given, compared=["cubic_stiffness"], agrees=False)
     assert text.endswith(
