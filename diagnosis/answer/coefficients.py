@@ -220,8 +220,8 @@ def interval_beside(whole: Mixture, chosen: AnswerSettings) -> tuple[float, floa
     """The central interval of a mixture that is stated beside its mean and standard deviation.
 
     Rivals too improbable to reach the interval may still be most of the variance, where their means are far away.
-    The interval is then shorter than value ± one standard deviation, and depends on whether each of them has more or
-    less than half the probability outside it, which is not known as well as that.
+    The interval is then shorter than value ± one standard deviation, and depends on whether each of them has more
+    or less than half the probability outside it, which is not known as well as that.
 
     Returns:
         Its ends; None where value and standard deviation give the interval, as for a normal distribution.

@@ -7,7 +7,7 @@ odds against an unknown cause are those of a logistic regression.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np

@@ -11,14 +11,14 @@ from diagnosis.words.numbers import Document
 def ranked(document: Document) -> list[Mapping[str, Any]]:
     """The answers of a document, the most probable first.
 
-    The document has the answer first. Of an undecided one that is the most probable set of effects, which an unknown
-    cause may exceed.
+    The document has the answer first. Of an undecided one that is the most probable set of effects, which an
+    unknown cause may exceed.
     """
     return sorted(document["candidates"], key=lambda one: -one["probability"])
 
 
 def set_out(document: Document) -> str:
-    """What the answer is called whose parameters are stated, without an article, such as ``most probable answer``."""
+    """What the answer is called whose parameters are stated, such as ``most probable answer``."""
     if document.get("decided", True):
         return "answer"
     first = document["candidates"][0]

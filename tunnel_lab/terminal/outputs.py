@@ -37,7 +37,10 @@ if TYPE_CHECKING:
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
-BRACKETS = "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10."
+BRACKETS = (
+    "In brackets: the standard deviation in the last digits; 12.53(10) is 12.53 ± 0.10. It is that of the noise; "
+    "tunnel diagnose adds what the model may miss."
+)
 """Printed once below tables in the short notation."""
 PROSE = 30
 """Columns: a longer cell is a sentence, which may go over several lines."""

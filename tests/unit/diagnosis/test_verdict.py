@@ -397,7 +397,10 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
     assert f" of the swing) comes from {words}: the damping" in verdict(one, "")
     assert "Measure the stiffness of the spring of 16.12 N m/rad again." in next_steps(one)
     one["found"]["choices"] = [OFF, OFF | {"stiffness": 44.84, "error": 0.02}]
-    springs = "an error of one of the two springs, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by 2.000 ± 0.010 %"
+    springs = (
+        "an error of one of the two springs, 16.12 N m/rad by −1.961 ± 0.010 % or 44.84 N m/rad by "
+        "2.000 ± 0.010 %"
+    )
     assert (
         headline(one)[0]
         == f"coulomb friction (98 %), and either {springs} (58 %) or gravity stiffness (40 %)"
@@ -409,11 +412,8 @@ def test_what_is_certain_is_said_first_and_what_is_open_by_its_size():
         {"effect": "coulomb_friction", "probability": 0.1, "parameters": {}},
     ]
     one["ambiguous_with"] = ["cubic_stiffness", "gravity_stiffness"]
-    assert headline(one)[0].endswith(
-        "and one of these: {} (58 %), gravity stiffness (40 %), cubic stiffness (20 %) or nothing else (10 %)".format(
-            springs
-        )
-    )
+    others = "gravity stiffness (40 %), cubic stiffness (20 %) or nothing else (10 %)"
+    assert headline(one)[0].endswith(f"and one of these: {springs} (58 %), {others}")
 
 
 def test_what_the_causes_change_is_said_in_per_cent():
