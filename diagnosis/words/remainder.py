@@ -132,7 +132,7 @@ def _line(found: dict[str, Any] | None) -> list[str]:
     mark, factor = unit_shown(found["unit"])
     amplitude = with_std(factor * found["amplitude"], factor * found["amplitude_std"])
     return [
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude} {mark}, root mean "
+        f"The line is at {frequency} Hz, with an amplitude of {amplitude}{mark if mark == '°' else f' {mark}'}, root mean "
         "square over the runs; chance alone shows one in less than "
         f"{100.0 * found['false_alarm_rate']:.2g} % of campaigns."
     ]

@@ -175,9 +175,10 @@ def test_coefficients(given: Document) -> None:
 def test_the_run_to_make(given: Document) -> None:
     run = given["next_run"]
     keys = ("spring_stiffness", "wind_speed", "release_angle", "duration", "separation")
-    assert_shows(run_words(run).replace(" rad", ""), [run[key] for key in keys])
+    own = run | {"release_angle": np.degrees(run["release_angle"])}
+    assert_shows(run_words(run), [own[key] for key in keys])
     calm = run_words(run | {"wind_speed": 0.0})
-    assert_shows(calm, [run[key] for key in keys if key != "wind_speed"])
+    assert_shows(calm, [own[key] for key in keys if key != "wind_speed"])
     assert len(rival_lines(given)) == 2
     assert len(rival_lines(given | {"next_run": None})) == 2
     close = rival_lines(given | {"next_run": run | {"separation": 2.9}})
@@ -188,8 +189,10 @@ def test_the_run_to_make(given: Document) -> None:
 
 def test_noise_and_confirmation(given: Document) -> None:
     first, second = closing_lines(given)
-    assert_shows(first, [given["noise"]["std"]])
-    assert_shows(second, [given["confirmation"]["largest_difference_rad"]])
+    assert_shows(first, [np.degrees(given["noise"]["std"]), given["noise"]["std"]])
+    assert_shows(second, [np.degrees(given["confirmation"]["largest_difference_rad"])])
+    given["gap"]["misfit"]["unit"] = "rad/s"
+    assert "°/s (noise_std = 0.000412 rad/s)" in closing_lines(given)[0]
     given["confirmation"]["agrees"] = False
     assert len(closing_lines(given)) == 1
 
@@ -210,7 +213,7 @@ def test_probabilities(value: float, text: str) -> None:
         (0.982, "98.2 %"),
         (0.0004, "< 0.1 %"),
         (0.0, "0 %"),
-        (-0.02, "-2.0 %"),
+        (-0.02, "none"),
     ],
 )
 def test_shares(value: float, text: str) -> None:
