@@ -131,8 +131,9 @@ def _line(found: dict[str, Any] | None) -> list[str]:
     frequency = with_std(found["frequency_hz"], found["frequency_std_hz"])
     mark, factor = unit_shown(found["unit"])
     amplitude = with_std(factor * found["amplitude"], factor * found["amplitude_std"])
+    amplitude += mark if mark == "°" else f" {mark}"
     return [
-        f"The line is at {frequency} Hz, with an amplitude of {amplitude}{mark if mark == '°' else f' {mark}'}, root mean "
+        f"The line is at {frequency} Hz, with an amplitude of {amplitude}, root mean "
         "square over the runs; chance alone shows one in less than "
         f"{100.0 * found['false_alarm_rate']:.2g} % of campaigns."
     ]

@@ -19,7 +19,11 @@ from diagnosis.words.numbers import probability, share
 from diagnosis.words.tables import (
     candidates_table,
     closing_lines,
+    coefficients_line,
+    diagnosis_parts,
     gap_table,
+    hidden_line,
+    hidden_table,
     inclusion_line,
     parameters_table,
     waterfall_table,
@@ -195,6 +199,31 @@ def test_noise_and_confirmation(given: Document) -> None:
     assert "°/s (noise_std = 0.000412 rad/s)" in closing_lines(given)[0]
     given["confirmation"]["agrees"] = False
     assert len(closing_lines(given)) == 1
+
+
+def test_what_the_deviations_of_the_coefficients_include_is_said_below_their_table(given: Document) -> None:
+    after = given["coefficients"]["after"]
+    after["cn_beta"]["shares"] = {"noise": 0.2, "hidden effects": 0.8}
+    after["cn_r"]["shares"] = {"noise": 0.6, "rivals": 0.4}
+    line = coefficients_line(given)
+    assert line.startswith(
+        "± includes the noise, what the model leaves unexplained, effects that could hide and other"
+    )
+    assert "that of Cnβ is mostly due to the effect that could hide" in line
+    assert "that of Cnr is mostly due to noise of the readings" in line
+    assert "tunnel identify includes the noise and the scatter between runs alone" in line
+    assert line in " ".join(str(part) for part in diagnosis_parts(given))
+    assert coefficients_line(given | {"coefficients": {"before": {}, "after": {}}}) == ""
+
+
+def test_a_unit_of_this_field_is_explained_where_it_is_used(given: Document) -> None:
+    move = {"cn_beta": {"value": 0.1, "std": None, "unit": "1/rad"}}
+    lag = {"effect": "unsteady_aero_lag", "size": {"value": 0.014, "std": None, "unit": "l/V"}, "moves": move}
+    meant = "l/V: the time in which the air passes the reference length"
+    assert f"of up to 0.014 l/V ({meant}), which these runs do not exclude" in hidden_line(
+        given | {"hidden": [lag]}
+    )
+    assert hidden_table(given | {"hidden": [lag]}).title == f"What could hide ({meant})"
 
 
 @pytest.mark.parametrize(

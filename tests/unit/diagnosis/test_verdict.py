@@ -271,6 +271,8 @@ def test_causes_that_change_no_coefficient_materially_are_called_immaterial():
         "than 0.3 %."
     )
     assert "immaterial" not in said("coulomb_friction")
+    tiny = said("coulomb_friction", immaterial={"cn_beta": 3.6e-9})
+    assert "its causes change Cnβ by less than 0.01 %." in tiny
 
 
 NEARLY = {

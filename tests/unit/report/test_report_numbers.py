@@ -193,6 +193,7 @@ def test_the_causes_have_their_sizes(given: Document, page: Sections) -> None:
     small = size | {"damping_ratio": size["damping_ratio_without"], "frequency_change": 1e-6}
     assert "damping" not in size_words(given, small)
     assert "frequency" not in size_words(given, small)
+    assert size_words(given, small | {"reading_change": 0.0, "zero_change": 0.0}) == ""
     for causes in ([], ["unknown"]):
         assert view.causes_found(given | {"causes": causes}) == []
 
