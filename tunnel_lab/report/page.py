@@ -116,7 +116,7 @@ def render_report(
 
     With ``summary`` it is only what fits one printed page.
     """
-    answer, kind = headline(document)
+    (answer, kind), hidden = headline(document), hidden_table(document)
     provenance = document.get("provenance") or {}
     alarms = significant(document["gap"]["false_alarm_rate"], 2)
     schema = ("schema of the document", document["schema_version"])
@@ -154,7 +154,10 @@ def render_report(
         "runs": view.run_rows(document, campaign),
         "windy": any(run.wind_on for run in campaign.runs),
         "budget": budget(document),
-        "hidden": hidden_table(document),
+        "hidden": hidden,
+        "hidden_heads": [
+            head[:1].upper() + head[1:] + "#" * (head in hidden.right) for head in hidden.columns
+        ],
         "tests": test_rows(document),
         "false_alarms": f"{alarms} of the campaigns without a gap",
         "seconds": [(name, f"{value:.1f} s") for name, value in document["seconds"].items()],

@@ -155,11 +155,11 @@ def test_the_theme_follows_the_system_until_it_is_chosen(opened: Opened) -> None
     dark = paper()
     opened.page.click("#theme")
     assert "light" in opened.page.inner_text("#theme")
-    assert paper() == "rgb(255, 255, 255)" != dark
+    assert paper_of() == "rgb(255, 255, 255)" != dark
     opened.page.click("#theme")
-    assert paper() == dark
+    assert paper_of() == dark
     opened.page.emulate_media(media="print")
-    assert paper() == "rgb(255, 255, 255)"
+    assert paper_of() == "rgb(255, 255, 255)"
     figure = opened.page.locator('figure[data-figure="fit"]')
     assert figure.locator("svg").is_visible()
     assert not figure.locator(".uplot").first.is_visible()
@@ -320,6 +320,13 @@ def pages(printed: bytes) -> int:
     return len(re.findall(rb"/Type\s*/Page\b", printed))
 
 
+def paper_of(printed: bytes) -> tuple[int, int]:
+    """Width and height of the pages of a PDF by Chromium, pt."""
+    (found,) = set(re.findall(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", printed))
+    return round(float(found[0])), round(float(found[1]))
+
+
+A4 = (595, 842)  # pt
 PT = 96.0 / 72.0  # px
 LETTER = 279.4 - 24.0  # mm: what is printed of the less high paper
 SUMMARY = """() => {
@@ -376,6 +383,7 @@ def test_the_summary_is_written_as_a_file_of_one_page(tmp_path: Path) -> None:
     path = write_summary(given, campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1
+    assert paper_of(path.read_bytes()) == A4
 
 
 BREAKS = """(what) => {
@@ -393,4 +401,21 @@ def test_no_printed_page_ends_with_a_heading_or_holds_the_footer_alone(opened: O
     assert opened.page.evaluate(BREAKS, "footer")[0] == "avoid"
     opened.page.emulate_media(media="screen")
     printed = {paper: pages(opened.page.pdf(format=paper)) for paper in ("A4", "Letter")}
-    assert max(printed.values()) <= 10, printed
+    assert max(printed.values()) <= 7, printed
+    assert paper_of(opened.page.pdf(prefer_css_page_size=True)) == A4
+
+
+SIDE_BY_SIDE = """() => {
+  const figures = [...document.querySelectorAll("#where figure")];
+  const tops = figures.map((one) => Math.round(one.getBoundingClientRect().top));
+  return [tops.length, new Set(tops).size];
+}"""
+
+
+def test_figures_of_where_the_gap_is_are_printed_two_to_a_row(opened: Opened) -> None:
+    opened.page.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+    opened.page.emulate_media(media="print")
+    opened.page.set_viewport_size({"width": 703, "height": 1032})  # A4 within its margins
+    figures, rows = opened.page.evaluate(SIDE_BY_SIDE)
+    assert figures >= 4
+    assert rows == -(-figures // 2)
