@@ -147,7 +147,7 @@ SOURCES = {
     "noise": "noise of the readings",
     "misfit": "what the model leaves unexplained",
     "small causes": "small causes that are not named",
-    "hidden effects": "the effect that could hide and moves it most",
+    "hidden effects": "effects that could hide",
     "air density": "rounding of the stated air density",
     "unseen form": "form of the cause that no free decay shows",
     "freed form": "freedom of the causes' forms",
@@ -155,6 +155,7 @@ SOURCES = {
 }
 """What each share of a coefficient's variance comes from."""
 _MOST = 0.5  # of a variance: more than all its other sources together
+_COUNTS = 0.005  # of a variance: a smaller share changes no digit of its root
 
 
 def coefficients_line(document: Document) -> str:
@@ -165,16 +166,19 @@ def coefficients_line(document: Document) -> str:
     after = {name: one for name, one in document["coefficients"]["after"].items() if one["std"]}
     if not after:
         return ""
-    most: dict[str, list[str]] = {}
-    for name, given in after.items():
-        for source, value in given.get("shares", {}).items():
-            if value > _MOST and source in SOURCES:
-                most.setdefault(SOURCES[source], []).append(COEFFICIENTS.get(name, name))
-    mostly = [f"that of {listed(names)} is mostly due to {source}" for source, names in most.items()]
-    included = "the noise, what the model leaves unexplained, effects that could hide and other answers"
+    parts = []
+    for source, words in SOURCES.items():
+        shares = {name: given.get("shares", {}).get(source, 0.0) for name, given in after.items()}
+        if max(shares.values()) >= _COUNTS:
+            mostly = listed(
+                [COEFFICIENTS.get(name, name) for name, share in shares.items() if share > _MOST] or [""]
+            )
+            parts.append(f"{words} (most of that of {mostly})" if mostly else words)
+    if not parts:
+        return ""
     return (
-        f"± includes {'; '.join([included, *mostly])}. tunnel identify includes the noise and the scatter between "
-        "runs alone, so that its ± may be far smaller."
+        f"± includes {listed(parts)}. tunnel identify includes the noise and the scatter between runs alone, so that "
+        "its ± may be far smaller."
     )
 
 

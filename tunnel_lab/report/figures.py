@@ -276,7 +276,7 @@ def backbone_figure(document: Document) -> Figure:
     drawn: dict[Axes, list[tuple[Array, Array]]] = {frequency: [], damping: []}
     for index, curve in enumerate(chosen):
         order = np.argsort(array(curve["amplitude_rad"]))
-        x, nominal = array(curve["amplitude_rad"])[order], curve["nominal_frequency_hz"]
+        x, nominal = np.degrees(array(curve["amplitude_rad"])[order]), curve["nominal_frequency_hz"]
         colour, marker = COLOURS[index], MARKERS[(index + index // len(MARKERS)) % len(MARKERS)]
         shift = 100.0 * (array(curve["frequency_hz"]) / nominal - 1.0)
         change = 1e3 * (array(curve["zeta"]) - curve["nominal_zeta"])
@@ -292,7 +292,7 @@ def backbone_figure(document: Document) -> Figure:
     damping.set_ylabel("damping ratio minus\nthe nominal one [10⁻³]")
     for axes, pairs in drawn.items():
         axes.axhline(0.0, color=INK, linewidth=1.0)
-        axes.set_xlabel("amplitude [rad]")
+        axes.set_xlabel("amplitude [°]")
         grid(axes)
         if pairs:
             limit_to_known(axes, *(np.concatenate(column) for column in zip(*pairs, strict=True)))
