@@ -54,7 +54,8 @@ def part(share: float) -> str:
 def share(value: float) -> str:
     """A share in per cent, never rounded to 0 or 100 %: text such as ``98.2 %`` or ``> 99.9 %``.
 
-    Where more is left than was there, ``none``.
+    Args:
+        value: a fraction; below 0, where more is left than was there, it is ``none``.
     """
     if value < 0.0:
         return "none"
@@ -156,7 +157,7 @@ def beside_noise(excess: float) -> str:
     """A residual in multiples of the noise, root mean square, such as ``0.999 times the noise``.
 
     Args:
-        excess: its mean square over the noise variance, minus one.
+        excess: its mean square over the noise variance, minus one, a ratio.
     """
     return f"{significant(math.sqrt(max(1.0 + excess, 0.0)), 3)} times the noise"
 

@@ -58,7 +58,7 @@ def candidates_table(document: Document) -> TextTable:
     if left := given[len(shown) :]:
         together = sum(candidate["probability"] for candidate in left)
         rows.append((f"{len(left)} more, together", probability(together), ""))
-    heads = ("answer", "probability", "share closed,\nfitted runs")
+    heads = ("answer", "probability", "closed in the fit")
     return TextTable(f"Answers for {document['campaign']}", heads, tuple(rows), right=heads[1:])
 
 
