@@ -144,8 +144,8 @@ class RunColumns:
         Args:
             widths: relative, shape (kinds,).
         """
-        within = marginal(self.products, prior.most).log_information
-        return Between(widths, marginal(self.products, widths), prior.cost(widths), within)
+        most = marginal(self.products, prior.most)
+        return Between(widths, marginal(self.products, widths), prior.cost(widths), most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +156,13 @@ class Between:
         widths: relative, shape (kinds,).
         found: the deviations integrated out.
         prior_cost: −2 ln of the prior density of the widths, up to a constant, dimensionless.
-        within: ln|H| of the common parameters' normal matrix where the runs may differ most, so that they are known
-            from what happens within runs; dimensionless up to a constant.
+        most: the same where the runs may differ most, so that all is known from what happens within runs.
     """
 
     widths: Array
     found: Marginal
     prior_cost: float
-    within: float
+    most: Marginal
 
     @property
     def likelihood(self) -> float:
@@ -179,12 +178,18 @@ class Between:
     def cost(self) -> float:
         """−2 ln of the evidence without the residuals' χ²: what it costs to let the runs differ so much.
 
-        Parameters that only the comparison of runs determines are integrated out over what greatest widths leave of
-        them. Else an effect that makes a few runs agree by chance would bring their width to nothing.
+        Deviations, and parameters that only the comparison of runs determines, are integrated out over what
+        greatest widths allow. Otherwise an effect that makes a few runs agree by chance would shrink their width
+        to nothing, and vortices, whose phase shows the speed of a run, would pay for that knowledge.
         """
         away = float(np.sum((self.found.deviations / self.widths) ** 2))
-        compared = self.found.log_information - self.within
-        return self.found.log_determinant + away + self.prior_cost + compared
+        own = self.found.log_determinant - self.most.log_determinant
+        return own + away + self.prior_cost + self.found.log_information - self.most.log_information
+
+    @property
+    def repeating_cost(self) -> float:
+        """The same of runs that repeat exactly, without what their common parameters take."""
+        return -self.most.log_determinant
 
 
 def _orthonormal(columns: Array) -> Array:

@@ -191,12 +191,14 @@ class ChannelMisfit:
         motion: sum of squares of the readings about their means in every cycle, in noise variances, dimensionless.
         scatter_cost: −2 ln of the evidence of chance differences between runs that it takes, dimensionless; 0 where
             they repeat.
+        repeats: whether the runs of the fit repeat exactly.
     """
 
     chi2: Array
     count: Array
     motion: float
     scatter_cost: float = 0.0
+    repeats: bool = True
 
     @property
     def excess(self) -> Array:
@@ -233,7 +235,10 @@ def misfit(fit: Fit, residuals: Sequence[Array] | None = None) -> ChannelMisfit:
         count.append([cycles - lines, cycles - lines, lines, lines, cycles, left.size - 3 * cycles])
         powers.append(float(np.sum(_centred(reading, starts, sizes) ** 2)))
     return ChannelMisfit(
-        np.sum(chi2, axis=0, dtype=np.float64), np.sum(count, axis=0, dtype=np.float64), float(np.sum(powers))
+        np.sum(chi2, axis=0, dtype=np.float64),
+        np.sum(count, axis=0, dtype=np.float64),
+        float(np.sum(powers)),
+        repeats=not fit.problem.scatter,
     )
 
 

@@ -22,7 +22,9 @@ class Chance:
     """One chance difference between runs: of the wind speed, the spring or the damping.
 
     A deviation changes the linear stiffness and damping of its run, by what the nominal model gives them. An effect
-    that depends on the speed or the spring does not see it: a deviation is to follow no error of its form.
+    that depends on the speed or the spring does not see it: a deviation is to follow no error of its form. The
+    exception is vortex shedding. It keeps time with the true speed; at the stated speed its phase is lost within
+    some cycles.
 
     Args:
         kind: the effect of the vocabulary that it is.
@@ -70,15 +72,21 @@ class Chance:
         return self.kind.departure(stated.spring_stiffness, own, stiffness, damping)
 
 
+_FOLLOWS_SPEED = "strouhal_number"
+
+
 class RunDeparture(Effect):
     """What a run's own deviations change of its motion; no effect of the vocabulary, and the last of a chain."""
 
     name = "run_departure"
 
     def on_run(self, run: RunSettings, stated: RunSettings, drawn: Drawn) -> RunSettings:
-        """Add stiffness and damping, ``drawn`` in this order."""
+        """Add stiffness and damping, and change the wind's speed by a share; ``drawn`` in this order."""
         del stated
-        stiffness, damping = self.drawn_numbers(drawn)
+        stiffness, damping, faster = self.drawn_numbers(drawn)
+        followed = run.parameters.get(_FOLLOWS_SPEED, 0.0)
+        if followed and faster:
+            run = run.with_parameters({_FOLLOWS_SPEED: (1.0 + float(faster)) * followed})
         return replace(
             run,
             spring_stiffness=max(run.spring_stiffness + float(stiffness), 0.0),
@@ -92,15 +100,18 @@ Scatter = tuple[Chance, ...]
 
 def departure(
     scatter: Sequence[Chance], deviations: Sequence[float], stated: RunSettings, data: Data
-) -> tuple[float, float]:
-    """What the deviations of a run change of its stiffness (N m/rad) and damping (N m s/rad).
+) -> tuple[float, float, float]:
+    """What the deviations of a run change.
 
     Args:
         deviations: relative, one for each chance difference.
         stated: the nominal physics of the run.
+
+    Returns:
+        Changes of the stiffness, N m/rad, and of the damping, N m s/rad, and that of the wind speed as a share.
     """
     changes = [one.change(stated, data) for one in scatter]
-    return (
-        sum(k * e for (k, _), e in zip(changes, deviations, strict=True)),
-        sum(c * e for (_, c), e in zip(changes, deviations, strict=True)),
-    )
+    stiffness = sum(k * e for (k, _), e in zip(changes, deviations, strict=True))
+    damping = sum(c * e for (_, c), e in zip(changes, deviations, strict=True))
+    of_speed = (e for one, e in zip(scatter, deviations, strict=True) if one.kind.scatters == "wind_speed")
+    return stiffness, damping, sum(of_speed)

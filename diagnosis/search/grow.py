@@ -136,7 +136,8 @@ def _worth_fitting(
 ) -> list[tuple[type[Effect], list[StartingPoint]]]:
     """The effects that linear theory predicts to close most; after the nominal model generously many.
 
-    Beside other effects, those that are predicted to do no more than a needless one are left out.
+    Beside other effects, those that are predicted to do no more than a needless one are left out. Where chance
+    differences between the runs explain the runs, the effects of greatest predicted likelihood are fitted.
     """
     scored = [(kind, starts) for kind in kinds if (starts := starting_points(parent.fit, kind))]
     weighing, chosen = parent.fit.settings.weighing, parent.fit.settings.search
@@ -148,12 +149,16 @@ def _worth_fitting(
         )
     )
     if parent.effects or parent.explains_runs:
-        needed, own = [], own_gain(parent.fit.problem)
-        for kind, starts in scored[: chosen.grown_by]:
-            by_chance = own_gain(starts[0].problem) - own
-            if starts[0].predicted_drop > chosen.least_drop + by_chance:
-                needed.append((kind, starts))
-        return needed
+        own, beyond = own_gain(parent.fit.problem), {}
+        for (
+            kind,
+            starts,
+        ) in scored:  # what the effect's own numbers in every run gain by chance does not count
+            beyond[kind.name] = starts[0].predicted_drop - (own_gain(starts[0].problem) - own)
+        if not parent.effects:
+            likely = sorted(scored, key=lambda item: -beyond[item[0].name])[: chosen.likely_beside_scatter]
+            return [item for item in likely if beyond[item[0].name] > 0.0]
+        return [item for item in scored[: chosen.grown_by] if beyond[item[0].name] > chosen.least_drop]
     limit = chosen.predicted_share * parent.fit.total
     return [
         item for i, item in enumerate(scored) if i < chosen.always_fitted or item[1][0].predicted_drop > limit

@@ -137,7 +137,8 @@ class Scale:
         Args:
             repeating: whether the runs then repeat, too; else they differ by chance as much as before.
         """
-        cost = 0.0 if repeating else hypothesis.fit.scatter_cost
+        fitted = hypothesis.fit
+        cost = fitted.repeating_cost if repeating else fitted.scatter_cost
         return self._log_weight(np.zeros(6), hypothesis, effects=1, scatter_cost=cost)
 
     def form_may_gain(self, hypothesis: Hypothesis) -> bool:

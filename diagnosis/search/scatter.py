@@ -146,15 +146,23 @@ def _shown(columns: RunColumns, prior: WidthPrior, chosen: ScatterSettings) -> K
     return kept
 
 
-def only_drifts(fitted: Fit) -> bool:
-    """Whether all differences between the runs follow their order: then they are no scatter."""
+def drifting(fitted: Fit) -> Between | None:
+    """What drifts make of the runs of a fit, where all differences between them follow their order; else None.
+
+    Such differences are no scatter.
+    """
     scatter, chosen = fitted.problem.scatter, fitted.settings.scatter
     if not scatter or len(fitted.residuals) < _IN_ORDER:
-        return False
+        return None
     columns, prior = fitted.columns, width_prior(fitted.problem)
     if not _evident(columns, prior, np.ones(len(scatter), bool), chosen):
-        return False
-    return all(drifts(fitted, int(place)) for place in np.flatnonzero(_shown(columns, prior, chosen)))
+        return None
+    places = [int(place) for place in np.flatnonzero(_shown(columns, prior, chosen))]
+    if not all(drifts(fitted, place) for place in places):
+        return None
+    for place in places:
+        columns, _ = columns.with_drift(place)
+    return columns.likeliest(prior)
 
 
 def drifts(fitted: Fit, place: int) -> bool:

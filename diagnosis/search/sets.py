@@ -18,7 +18,7 @@ from diagnosis.search.hypothesis import Hypothesis, restricted, with_forms
 from diagnosis.search.random_moments import RandomAnswer
 from diagnosis.search.resolved import unresolved
 from diagnosis.search.rivals.rival import FoundRival, Rival
-from diagnosis.search.scatter import only_drifts, with_scatter
+from diagnosis.search.scatter import drifting, with_scatter
 from diagnosis.search.weigh import UNKNOWN, FittedSet, Weighed, weigh
 
 if TYPE_CHECKING:
@@ -53,11 +53,7 @@ class Sets:
     def weighed(self) -> list[Weighed]:
         """The answers with their probabilities, the answer first; shares are of the gap in the view."""
         base, prepared, nominal = self.view.base, self.view.prepared, self.view.gap
-        sets = [
-            # what follows the order of the runs is no scatter, and no effect of the vocabulary
-            h.fitted_set(self.view.repeating, outside=not h.effects and only_drifts(h.fit))
-            for h in self.hypotheses
-        ]
+        sets = [self._fitted_set(one) for one in self.hypotheses]
         sets += [
             h.fitted_set(self.view.repeating, outside=True) for rival in self.rivals for h in rival.hypotheses
         ]
@@ -69,6 +65,17 @@ class Sets:
         whole = None if self.view.repeating is base else misfit(self.view.repeating)
         sets = [replace(one, excess=one.excess - own) for one in sets]
         return weigh(sets, nominal, base.settings.weighing, whole)
+
+    def _fitted_set(self, one: Hypothesis) -> FittedSet:
+        """What the weighing needs to know of a set.
+
+        What follows the order of the runs is no scatter and no effect of the vocabulary; it costs as much as one.
+        """
+        drift = None if one.effects else drifting(one.fit)
+        found = one.fitted_set(self.view.repeating, outside=drift is not None)
+        if drift is None:
+            return found
+        return replace(found, scatter_cost=drift.cost + 2.0 * one.fit.settings.weighing.set_price)
 
     def fitted(self, names: Sequence[str]) -> Hypothesis | None:
         """The set of these effects; None where they were not fitted together."""

@@ -151,14 +151,17 @@ def misfit_scale(
     """χ² by channel that needs no cause, shape (6,).
 
     Beside chance it is that of an error of the model: a share of the amplitude of the gap, since no real effect has
-    its textbook form, or what all sets leave if that is more, and a share of the motion at most.
+    its textbook form, or what all sets leave if that is more, and a share of the motion at most. Where the runs
+    differ by chance, it is also an answer that nothing else acts, and the likelihood decides between them: the
+    weight of a small χ² is half of it.
 
     Args:
         nominal: what the nominal model leaves, and the motion.
         common: χ² of a channel that all sets leave (`common_misfit`), dimensionless.
         chance: χ² that chance explains, by channel or common to all; None: that of a needless effect.
     """
-    by_chance = chosen.needless_chi2 if chance is None else chance
+    needless = chosen.needless_chi2 if nominal.repeats else 2.0 * chosen.steepness
+    by_chance = needless if chance is None else chance
     by_form = chosen.form_error**2 * float(np.sum(np.maximum(nominal.excess, 0.0)))
     error = min(max(by_form, common), chosen.model_error**2 * nominal.motion)
     return np.asarray(np.broadcast_to(by_chance, 6) + error, np.float64)

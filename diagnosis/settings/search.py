@@ -28,6 +28,14 @@ class SearchSettings:
         BY_CHANCE,
         unit="χ²",
     )
+    likely_beside_scatter: int = setting(
+        6,
+        "Effects fitted where chance differences between the runs explain them, however little linear theory "
+        "predicts that they close.",
+        "judgement",
+        "Linear theory falls short where deviations of the runs hide an effect. Time against coverage.",
+        unit="effects",
+    )
     beside_scatter: int = setting(
         4,
         "Sets in runs that repeat that are compared beside chance differences between the runs.",
@@ -290,11 +298,11 @@ class WeighingSettings:
         decision="0036",
     )
     needless_scatter: float = setting(
-        8.0,
+        2.0,
         "−2 ln of that evidence by which a needless effect may lower it.",
-        "judgement",
-        "With the price of an effect and what its size takes of the evidence it is 20 at usual widths, by which a "
-        "needless one lowers χ² once in 22,000 effects tried.",
+        "convention",
+        "With the price of an effect and what its size takes of the evidence it is 14 at usual widths, by which a "
+        "needless one lowers χ² once in 5,000 effects tried: of 25 effects one does in one campaign of 200.",
         unit="χ²",
         decision="0036",
     )

@@ -124,7 +124,7 @@ def left(*effects, damping):
         excess=np.array([damping, 0.0, 0.0, 0.0, 0.0, 0.0]),
         further_numbers=0,
         explains_runs=False,
-        fit=SimpleNamespace(settings=Settings(), scatter_cost=0.0),
+        fit=SimpleNamespace(settings=Settings(), scatter_cost=0.0, repeating_cost=0.0),
     )
 
 
