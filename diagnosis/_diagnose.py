@@ -17,6 +17,7 @@ from diagnosis.answer.units import in_own_units
 from diagnosis.diagnosable import Chosen, choose, gain_words, refuse_undiagnosable
 from diagnosis.facts.found import Fact, as_stated
 from diagnosis.facts.patch import PatchedModel
+from diagnosis.facts.repeatability import AnswerWithout, Repeatability
 from diagnosis.model.joint import recorded, with_law
 from diagnosis.model.nominal import NominalModel
 from diagnosis.noise.gap import noise_noted
@@ -88,7 +89,23 @@ def diagnose(
             answer = limit_cycle_answer(answer, chosen.remarks)
         else:
             answer = _with_remainder(answer, study, chosen, say)
+        if answer.repeatability is not None and answer.repeatability.outlier:
+            say(f"without run {answer.repeatability.outlier}")
+            answer = _and_without_outlier(answer, answer.repeatability, chosen, settings, rivals)
         return _without(answer, leave_out).in_words()
+
+
+def _and_without_outlier(
+    answer: Diagnosis, runs: Repeatability, chosen: Chosen, settings: Settings, rivals: Sequence[Rival]
+) -> Diagnosis:
+    """The answer, with that of the other runs beside it; as given where those cannot be diagnosed."""
+    others = replace(chosen, campaign=chosen.campaign.without([runs.outlier]))
+    try:
+        study = _studied(others, None, settings, rivals)
+    except TunnelError:
+        return answer
+    known = 1.0 if study.answer is None else study.answer.probability
+    return replace(answer, repeatability=replace(runs, without_outlier=AnswerWithout(study.causes, known)))
 
 
 def _without(answer: Diagnosis, left_out: Collection[str]) -> Diagnosis:

@@ -79,6 +79,19 @@ class RunRepeat:
 
 
 @dataclass(frozen=True)
+class AnswerWithout:
+    """The answer of the other runs, without one that deviates far beyond them.
+
+    Args:
+        causes: names, sorted; empty: no gap, or none is needed; ``unknown`` alone: no effect explains it.
+        probability: of that answer; 1 where there is no gap.
+    """
+
+    causes: tuple[str, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
 class Repeatability:
     """How the runs repeat under the answer.
 
@@ -87,9 +100,11 @@ class Repeatability:
         runs: every run against the model.
         outlier: id of the run that deviates far beyond the others; empty: none.
         trends: numbers that drift over the campaign, beyond chance.
+        without_outlier: the answer without that run; None: there is none, or the others cannot be diagnosed.
     """
 
     spreads: tuple[Spread, ...] = ()
     runs: tuple[RunRepeat, ...] = ()
     outlier: str = ""
     trends: tuple[Trend, ...] = ()
+    without_outlier: AnswerWithout | None = None

@@ -205,7 +205,22 @@ def outlier_words(document: Document) -> str:
         parts.append((abs(own[name]) / usual, f"{name} {percent_of(own[name], sign=True)}"))
     least = settings_of(document).words.deviation_named
     far = [text for stds, text in parts if stds >= least] or [max(parts)[1]]
-    return f"Run {run} deviates far beyond the others: {' and '.join(far)} against the model of all runs."
+    said = f"Run {run} deviates far beyond the others: {' and '.join(far)} against the model of all runs."
+    return " ".join(filter(None, (said, _without_outlier(document, found.get("without_outlier")))))
+
+
+def _without_outlier(document: Document, other: Document | None) -> str:
+    """The answer of the other runs; empty where it is not known."""
+    if not other:
+        return ""
+    causes, known = other["causes"], probability(other["probability"])
+    if causes == document["causes"]:
+        return f"Without it the causes are the same ({known})."
+    if not causes:
+        return "Without it there is no gap."
+    if causes == ["unknown"]:
+        return f"Without it no known effect explains the gap ({known})."
+    return f"Without it the answer is {plain(*causes)} ({known})."
 
 
 def repeat_steps(document: Document) -> list[str]:

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Self
 
+import numpy as np
+
 from diagnosis.likelihood.least_squares import Fit, try_fit
-from diagnosis.likelihood.residuals import misfit
+from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.blocks import without_long_rest
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import grow
-from diagnosis.search.hypothesis import Hypothesis, Scale, polish
+from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
 from diagnosis.search.scatter import (
@@ -71,6 +73,12 @@ class WholeRuns(View):
         """The fit of the nominal model to runs that differ by chance; None where they do not."""
         return scattered(self.base, self.prepared.kinds)
 
+    @cached_property
+    def _scattering_gap(self) -> ChannelMisfit:
+        """What the nominal model leaves of runs that differ by chance, by channel."""
+        assert self.scattering is not None
+        return replace(misfit(self.scattering), scatter_cost=self.scattering.scatter_cost)
+
     def on(self, base: Fit) -> Self:
         """The same view of runs with other noise, in which all sets are grown."""
         return replace(self, base=base, first=None, unscattered=None)
@@ -93,7 +101,7 @@ class WholeRuns(View):
 
         def enough(level: Sequence[Hypothesis]) -> bool:
             tried = (self._beside(one) for one in level)
-            explained.extend(one for one in tried if one is not None and one.explains_runs)
+            explained.extend(one for one in tried if one is not None and self._explains(one))
             return bool(explained)
 
         with clock.step("effects"):
@@ -103,7 +111,8 @@ class WholeRuns(View):
                 : self.base.settings.search.beside_scatter
             ]
         if explained:
-            return self._beside_scatter(likely, explained[0], clock)
+            scale = Scale.of(explained, self._scattering_gap, self.base.settings.weighing)
+            return self._beside_scatter(likely, max(explained, key=scale.weight), clock)
         plain = self.with_moments(Sets(self, tuple(grown)), clock)
         if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
             return plain
@@ -111,12 +120,26 @@ class WholeRuns(View):
         return plain if beside.weighed[0].effects == UNKNOWN else beside
 
     def _beside(self, one: Hypothesis) -> Hypothesis | None:
-        """A set beside chance differences between the runs; None where they do not differ, or the fit fails."""
+        """A set beside chance differences between the runs, its forms free where the runs need that.
+
+        None where the runs do not differ, or the fit fails.
+        """
         base = self.scattering
         if base is None or not one.effects:
             return None if base is None else Hypothesis((), base, repeating=self.base)
         fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, base.problem.scatter))
-        return None if fitted is None else replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
+        if fitted is None:
+            return None
+        found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)
+        if not found.explains_runs:
+            (found,) = with_forms([found], self._scattering_gap, 0.0)
+        return replace(found, fit=settled(found.fit))
+
+    def _explains(self, beside: Hypothesis) -> bool:
+        """Whether a set beside chance differences leaves no more within runs than chance and errors of form."""
+        weighing, gap = self.base.settings.weighing, self._scattering_gap
+        by_chance = weighing.needless_chi2 + weighing.chance_stds * np.sqrt(2.0 * gap.count)
+        return bool(np.all(beside.excess < misfit_scale(gap, weighing, chance=by_chance)))
 
     def _beside_scatter(
         self, likely: Sequence[Hypothesis], explained: Hypothesis | None, clock: Clock

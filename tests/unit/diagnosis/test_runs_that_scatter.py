@@ -129,3 +129,8 @@ def test_a_run_far_beyond_the_others_is_an_outlier() -> None:
     found = diagnose(replace(runs, runs=tuple(faulty if run.id == faulty.id else run for run in runs.runs)))
     assert found.repeatability is not None
     assert found.repeatability.outlier == faulty.id
+    others = found.repeatability.without_outlier
+    assert others is not None
+    assert set(others.causes) <= {STIFFNESS, DAMPED}
+    assert f"Run {faulty.id} deviates far beyond the others" in found.verdict
+    assert "Without it " in found.verdict
