@@ -114,7 +114,7 @@ def closable_table(document: Document) -> TextTable:
     A table without rows where nothing remains beyond chance.
     """
     found, chosen = document.get("closable") or {"ceilings": ()}, settings_of(document).remainder
-    ceilings = sorted(map(ceiling, found["ceilings"]), key=lambda one: one.kind != found["kind"])
+    ceilings = sorted(map(ceiling, found["ceilings"]), key=lambda one: one.kind != found.get("kind"))
     rows = [
         (
             KINDS[one.kind],
