@@ -94,7 +94,7 @@ def bare(file: Path, threads: int) -> dict[str, float]:
 def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]:
     """Seconds per run and peak memory of a sweep: by processes, or by one whose simulation has threads."""
     wall, cpu = time.perf_counter(), time.process_time()
-    from tunnel_lab.experiments.runner import lasting_processes
+    from tunnel_lab.experiments.runner import processes
     from tunnel_lab.experiments.sweep import run_sweep
     from tunnel_lab.experiments.sweep_cases import read_sweep
 
@@ -103,7 +103,7 @@ def sweep(file: Path, out: Path, workers: int, threads: int) -> dict[str, float]
             yield index, work(index, nthread=threads)
 
     plan = read_sweep(file)
-    run_sweep(plan, out, by_threads if threads > 1 else lasting_processes(workers, print))
+    run_sweep(plan, out, by_threads if threads > 1 else processes(workers, print))
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = time.process_time() - cpu + children.ru_utime + children.ru_stime
     return {

@@ -145,7 +145,8 @@ def _assembled(
     in_view = (Fact(study.caution),) if study.caution else ()
     gain = map(as_stated, gain_words(chosen.campaign, study.chosen))
     lead = map(as_stated, study.model.lead_words(study.similarity))
-    left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead)
+    beyond = () if study.left_by_all is None else (Fact("beyond reach", {"left": study.left_by_all}),)
+    left_out = (*chosen.left_out, *in_view, *gain, *unpatched, *lead, *beyond)
     answer = assemble(study, *localise(study), left_out, patched, chosen.kinds)
     noted = (
         *noise_noted(study.prepared.noise, study.prepared.trend, study.gap.test, named=study.named),

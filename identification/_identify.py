@@ -18,8 +18,9 @@ from identification.estimators import (
 from identification.examination.examine import as_angles, examine
 from identification.examination.self_excited import in_limit_cycle
 from identification.progress import Progress, shown_by
+from identification.returned import checked_return
 from identification.statistics import widened_by_contradictions
-from identification.status import left_out_as_asked
+from identification.status import Outcome, Remark, left_out_as_asked
 from tunnel_sim.files.campaign_folder import as_campaign
 from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.drive import checked_drive, refuse_untreated
@@ -54,7 +55,8 @@ def identify(
     Raises:
         TunnelError: for an unknown estimator, a campaign without runs, an id in ``leave_out`` that no run has, a
             wind-on run without air density, records that the examination refuses, and, with ``throw``, when no run
-            could be identified.
+            could be identified. A `WrongReturn` where an estimator of one's own returns something else than an
+            estimate of these runs with finite values.
     """
     campaign = as_campaign(campaign).without(leave_out)
     chosen = make_estimator(estimator) if isinstance(estimator, str) else estimator
@@ -77,7 +79,7 @@ def identify(
     left = examined.campaign
     with shown_by(progress):
         found = (
-            _checked(chosen.estimate(left), chosen.name, left)
+            checked_return(chosen.estimate(left), chosen.name, left)
             if left.runs
             else Estimate(campaign.name, chosen.name, ())
         )
@@ -101,21 +103,24 @@ def identify(
     contradicted = any("inertias_kg_m2" in one.figures for one in examined.remarks)  # which names the springs
     if not contradicted and (pair := pair_remark(left, estimate.runs)) is not None:
         estimate = replace(estimate, remarks=(*estimate.remarks, pair))
-    estimate = replace(estimate, remarks=(*left_out_as_asked(leave_out), *estimate.remarks))
+    estimate = replace(
+        estimate, remarks=(*left_out_as_asked(leave_out), *_assumed(campaign), *estimate.remarks)
+    )
     if throw and estimate.status.failed:
         what, _, remedy = estimate.status.value.partition(": ")
         raise TunnelError(what, where=campaign.name, remedy=remedy)
     return estimate
 
 
-def _checked(found: object, name: str, campaign: Campaign) -> Estimate:
-    """What an estimator returned, which may be of one's own."""
-    where, remedy = f"estimator {name}", "identification.check_estimator(...) checks a class"
-    if not isinstance(found, Estimate):
-        what = f"returned {type(found).__name__} and not an Estimate"
-        raise TunnelError(what, where=where, remedy=f"return identification.Estimate; {remedy}")
-    given, wanted = [run.id for run in found.runs], [run.id for run in campaign.runs]
-    if given != wanted:
-        what = f"returned runs {', '.join(given) or '(none)'}, not {', '.join(wanted)}"
-        raise TunnelError(what, where=where, remedy=f"give a RunEstimate for each run, in order; {remedy}")
-    return found
+def _assumed(campaign: Campaign) -> tuple[Remark, ...]:
+    """The remark on driven runs whose input is taken as linear between samples, since nobody states how it is."""
+    runs = [run for run in campaign.runs if run.drive is not None and run.drive.hold is None]
+    if not runs:
+        return ()
+    half = 500.0 * max(run.record.sample_interval for run in runs)
+    what = (
+        "drive_hold is not stated, and the input is taken as linear between samples; an input that is held acts "
+        f"half a sample ({half:.3g} ms) later, which changes stiffness and damping"
+    )
+    remedy = 'state drive_hold = "zero" or "linear"'
+    return (Remark(Outcome.NOTED, tuple(run.id for run in runs), what, remedy),)

@@ -22,12 +22,14 @@ from tunnel_lab.commands import (
     demo,
     diagnose,
     effects,
-    experiments,
     files,
     identify,
     paper,
+    score,
     show,
     simulate,
+    sweep,
+    train,
 )
 from tunnel_lab.terminal.encoding import replace_what_cannot_be_encoded
 from tunnel_lab.terminal.inputs import with_format, with_quiet
@@ -102,9 +104,9 @@ GROUPS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     },
     "Estimators": {
         "identify": identify.run,
-        "score": experiments.score,
-        "sweep": experiments.sweep,
-        "train": experiments.train,
+        "score": score.score,
+        "sweep": sweep.sweep,
+        "train": train.train,
     },
     "Results": {"compare": diagnose.compare, "paper": paper.paper},
     "Developers": {

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from diagnosis.answer.input_hold import other_hold
 from diagnosis.facts.closure import Confirmation
 from diagnosis.facts.found import Fact, Found, Nearly, Nowhere, PlaceFound, SpringError
 from diagnosis.facts.remainder import Move, Remainder
@@ -103,6 +104,7 @@ def beside_the_numbers(
         nearly=nearly(study),
         immaterial=immaterial(before, after, study.settings.words) if study.named else {},
         choices=spring_choices(study),
+        hold=other_hold(study),
         noise=study.prepared.noise.reason,
         cautions=caveats,
     )

@@ -10,6 +10,7 @@ import hashlib
 import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -245,16 +246,21 @@ def answer_set(
         progress(len(names & hashes.keys()), len(campaigns), "")
     without = tuple(sorted(set(excluded)))
     work = partial(answer_campaign, excluded=without, effects_file=effects_file)
-    for _, (name, answer) in in_processes(work, left, jobs if jobs > 1 and len(left) > 1 else 0):
-        hashes[name] = write_document(target / f"{name}.json", answer)
-        seal = {
-            "schema_version": SCHEMA_VERSION,
-            "excluded": list(without),
-            "answers_sha256": dict(sorted(hashes.items())),
-        }
-        write_document(target / SEAL, seal)
-        if progress is not None:
-            progress(len(names & hashes.keys()), len(campaigns), name)
+    try:
+        for _, (name, answer) in in_processes(work, left, jobs if jobs > 1 and len(left) > 1 else 0):
+            hashes[name] = write_document(target / f"{name}.json", answer)
+            seal = {
+                "schema_version": SCHEMA_VERSION,
+                "excluded": list(without),
+                "answers_sha256": dict(sorted(hashes.items())),
+            }
+            write_document(target / SEAL, seal)
+            if progress is not None:
+                progress(len(names & hashes.keys()), len(campaigns), name)
+    except BrokenProcessPool:
+        what = "a process that diagnoses died"
+        remedy = "check the memory, give fewer --jobs, and repeat the command: answers are kept"
+        raise TunnelError(what, where=str(target), remedy=remedy) from None
     return file_hash(target / SEAL)
 
 

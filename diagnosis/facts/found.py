@@ -11,6 +11,7 @@ from typing import Any
 
 from identification.status import Remark
 from tunnel_sim.files.writing import as_json
+from tunnel_sim.vocabulary.drive import Hold
 
 
 @dataclass(frozen=True)
@@ -166,6 +167,24 @@ class TwoModes:
 
 
 @dataclass(frozen=True)
+class OtherHold:
+    """A delay of the input that another hold between its samples explains as well.
+
+    Args:
+        delay_s, half_sample_s: s.
+        taken: the hold of the fits.
+        stated: whether the campaign states it for all driven runs.
+        better: whether the other hold explains the records better than chance would.
+    """
+
+    delay_s: float
+    half_sample_s: float
+    taken: Hold
+    stated: bool
+    better: bool
+
+
+@dataclass(frozen=True)
 class Found:
     """Everything that is said of an answer and is no number of it.
 
@@ -176,6 +195,7 @@ class Found:
         nearly: what nearly explains an unexplained gap; None where nothing does.
         immaterial: by coefficient, the share by which the causes change it, where they change none materially.
         choices: springs of which one may be off, the likeliest first.
+        hold: a delay of the input that another hold between samples explains as well; None: none.
         rivals: what is outside the vocabulary and would explain a gap whose cause is not known.
         second_modes: by run, where the gap is not explained.
         limit_cycles: the remarks on the runs where every run is in a limit cycle; else none.
@@ -190,6 +210,7 @@ class Found:
     nearly: Nearly | None = None
     immaterial: Mapping[str, float] = field(default_factory=dict)
     choices: tuple[SpringError, ...] = ()
+    hold: OtherHold | None = None
     rivals: tuple[Fact, ...] = ()
     second_modes: tuple[TwoModes, ...] = ()
     limit_cycles: tuple[Remark, ...] = ()

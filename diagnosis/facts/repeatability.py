@@ -84,7 +84,7 @@ class AnswerWithout:
 
     Args:
         causes: names, sorted; empty: no gap, or none is needed; ``unknown`` alone: no effect explains it.
-        probability: of that answer; 1 where there is no gap.
+        probability: of that answer (a probability); 1 where there is no gap.
     """
 
     causes: tuple[str, ...]

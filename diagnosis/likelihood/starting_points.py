@@ -78,7 +78,7 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
     One per trial; none where the effect cannot be seen in these runs.
     """
     data = base.problem.data
-    if (kind.condition == "wind_on" and not data.wind_on) or (kind.driven and not data.driven):
+    if not _may_show(data, kind):
         return []
     if kind.own_numbers(1):
         found = [_with_own_numbers(base, kind, one) for one in kind.sought(ResidualsOf(base)) if one]
@@ -86,6 +86,11 @@ def starting_points(base: Fit, kind: type[Effect]) -> list[StartingPoint]:
         tried = (_by_linear_theory(base, kind, trial) for trial in kind.trials(_circumstances(data)))
         found = [start for start in tried if start is not None]
     return sorted(found, key=lambda start: -start.predicted_drop)
+
+
+def _may_show(data: Data, kind: type[Effect]) -> bool:
+    """Whether the runs have the wind, or the input, that an effect needs."""
+    return (kind.condition != "wind_on" or data.wind_on) and (not kind.driven or data.driven)
 
 
 def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoint:
@@ -105,8 +110,28 @@ def _with_own_numbers(base: Fit, kind: type[Effect], one: Sought) -> StartingPoi
     return StartingPoint(problem, point, one.drop, predicted, base.point.common.size, scatter_cost=cost)
 
 
-def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
-    """An effect of the size that closes most by linear theory; None where it changes nothing that counts."""
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A trial of an effect at a moderate size.
+
+    Args:
+        problem: the fit with the effect added.
+        own: its free parameters, of which ``sizes`` has the values, shape (own,).
+        scaled: place among them of the one that is scaled; None: none is.
+        replaced: place of the common parameter that the effect replaces; None: it replaces none.
+        change: of the scaled prediction, by run, shape (n,).
+    """
+
+    problem: Problem
+    own: list[ParameterInfo]
+    sizes: Array
+    scaled: int | None
+    replaced: int | None
+    change: list[Array]
+
+
+def _moderate(base: Fit, kind: type[Effect], trial: Trial) -> _Tried | None:
+    """A trial at a moderate size; None where it changes the prediction without bound."""
     problem = _tried(base, kind, trial)
     own = _own_parameters(problem, kind)
     scaled = None if trial.scaled is None else [info.name for info in own].index(trial.scaled)
@@ -114,8 +139,31 @@ def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPo
     names = base.problem.names
     replaced = names.index(trial.replaces) if trial.replaces in names else None
     change = _moderate_change(base, problem, sizes, scaled, replaced, second_order=trial.second_order)
-    if change is None:
+    return None if change is None else _Tried(problem, own, sizes, scaled, replaced, change)
+
+
+def changes(base: Fit, kind: type[Effect]) -> Iterator[list[Array]]:
+    """What an effect without numbers of its own in every run changes at moderate sizes, one for each trial.
+
+    Returns:
+        Changes of the scaled prediction, by run, shape (n,); none where the runs cannot show the effect.
+    """
+    data = base.problem.data
+    if not _may_show(data, kind) or kind.own_numbers(1):
+        return
+    for trial in kind.trials(_circumstances(data)):
+        tried = _moderate(base, kind, trial)
+        if tried is not None:
+            yield tried.change
+
+
+def _by_linear_theory(base: Fit, kind: type[Effect], trial: Trial) -> StartingPoint | None:
+    """An effect of the size that closes most by linear theory; None where it changes nothing that counts."""
+    tried = _moderate(base, kind, trial)
+    if tried is None:
         return None
+    problem, own, sizes, change = tried.problem, tried.own, tried.sizes, tried.change
+    scaled, replaced = tried.scaled, tried.replaced
     moved = None
     if trial.second_order:
         moved = absorbed(base, change)

@@ -91,7 +91,7 @@ def _driven(data: RunData, run: Run, model: NominalModel) -> RunData:
         run.drive.values,
         scale=1.0 if run.drive.gain is None else run.drive.gain,
         delay=-model.lead,
-        held=run.drive.hold == "zero",
+        held=run.drive.held,
         on_body=run.drive.on_body,
     )
     return dataclasses.replace(data, drive=moment, gain_free=model.fits_gain(run.drive))

@@ -38,6 +38,8 @@ class Sets:
         random: answers with a random moment that passed its tests.
         rivals: what is outside the vocabulary and weighed beside the sets.
         refused: by names of refused answers, their effects that no half of the records shows.
+        left_by_all: the least share of the gap that all effects together leave, where that ended the search; None
+            elsewhere.
         settled: the answer fitted to whole runs, each of whose effects a half of them shows; None where the answer
             is no fitted set, or is not settled yet.
     """
@@ -47,6 +49,7 @@ class Sets:
     random: tuple[RandomAnswer, ...] = ()
     rivals: tuple[FoundRival, ...] = ()
     refused: Mapping[Names, Names] = field(default_factory=dict)
+    left_by_all: float | None = None
     settled: Hypothesis | None = None
 
     @cached_property

@@ -87,6 +87,8 @@ class Study:
         disturbed: runs that were disturbed, which are left out from then on.
         between_runs: of an unknown cause, the fit of the nominal model to runs that differ; None where they do not.
         caution: what is said of answers found in the view of the runs, by its key; empty: nothing.
+        left_by_all: the least share of the gap that all effects together leave, where that ended the search; None
+            elsewhere.
         seconds: wall time by step, s.
     """
 
@@ -98,6 +100,7 @@ class Study:
     disturbed: tuple[Disturbance, ...] = ()
     between_runs: Fit | None = None
     caution: str = ""
+    left_by_all: float | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -208,6 +211,7 @@ class Study:
             sets.rivals,
             between_runs=evident(base) if answers[0].effects == UNKNOWN and base.problem.scatter else None,
             caution=sets.view.caution,
+            left_by_all=sets.left_by_all,
             seconds=clock.seconds,
         )
 

@@ -28,6 +28,18 @@ class SearchSettings:
         BY_CHANCE,
         unit="χ²",
     )
+    reach_from: float = setting(
+        0.5,
+        "Share of the gap left by all sets of a size, from which it is asked whether larger ones could close it.",
+        "judgement",
+        "The largest of a few causes closes about half of a gap.",
+    )
+    out_of_reach: float = setting(
+        0.1,
+        "Share of the gap left by all effects together, from which no larger sets are grown.",
+        "judgement",
+        "A set that leaves a tenth of the power, a third of the amplitude, is never named.",
+    )
     likely_beside_scatter: int = setting(
         6,
         "Effects fitted where chance differences between the runs explain them, however little linear theory "

@@ -107,6 +107,12 @@ class WordsSettings:
     nearly_misfit_stds: float = setting(
         2.0, "χ² of a channel that is chance where their misfit is the reason.", "convention", unit="std"
     )
+    hold_rate: float = setting(
+        0.001,
+        "Rate at which the right hold of an input is not mentioned beside a delay of half a sample.",
+        "convention",
+        ONE_IN_1000,
+    )
     rival_explains: float = setting(
         0.8,
         "Share of a gap that a rival from outside the vocabulary must close to be mentioned.",

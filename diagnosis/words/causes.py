@@ -111,6 +111,36 @@ def said_size(document: Document, answer: Mapping[str, Any], name: str) -> str:
     return kind.phrase(values, {full: one["std"] for full, one in given.items()}, text)
 
 
+def hold_words(document: Document) -> str:
+    """That a delay of the input may be a wrong hold between samples, in sentences; empty where it may not."""
+    found = document["found"].get("hold")
+    if found is None:
+        return ""
+    held = "keeps its value between samples, as a controller's command does"
+    linear = "is linear between samples"
+    other, taken = (held, "linear") if found["taken"] == "linear" else (linear, "held")
+    why = "as the campaign states" if found["stated"] else "since drive_hold is not stated"
+    alike = "better" if found["better"] else "as well"
+    when = "later" if found["delay_s"] > 0.0 else "earlier"
+    delay = 1e3 * abs(found["delay_s"])
+    return (
+        f"One cause has two readings: either the input acts {delay:.3g} ms {when} than recorded, "
+        f"which is half a sample ({1e3 * found['half_sample_s']:.3g} ms), or it {other}, where it was taken as "
+        f"{taken}, {why}. The second reading, without a delay, explains the records {alike}."
+    )
+
+
+def hold_step(document: Document) -> str:
+    """What tells a delay of the input from a wrong hold, without a full stop; empty where nothing need do so."""
+    found = document["found"].get("hold")
+    if found is None:
+        return ""
+    other, how = ("zero", "is held") if found["taken"] == "linear" else ("linear", "is linear")
+    return (
+        f'If the input {how} between samples, state drive_hold = "{other}" for the runs, and diagnose again'
+    )
+
+
 def one_of_springs(document: Document) -> str:
     """That one of the springs is off that the runs cannot tell apart."""
     return f"one of the {_count_of_springs(document)} springs is off"

@@ -103,6 +103,10 @@ CAUTIONS: Mapping[str, Sentence] = {
         f'A zero of each run\'s own would close {share(given["share"])} of the gap. State zero = "per_run" under '
         "[sensor], and diagnose again, if the sensor or its mount may have moved between the runs."
     ),
+    "beyond reach": lambda given: (
+        f"By linear theory all known effects together would leave {share(given['left'])} of the gap or more, so "
+        "only single ones and pairs were tried."
+    ),
     "remainder not sought": "What could be closed of what remains, and by which formula, is not sought where "
     "nothing holds a driven body: every small error of a moment adds up in its angle.",
     "remainder not solved": "How much of what remains could be closed was not found: its equations cannot be "

@@ -6,7 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnosis.settings import settings_of
-from diagnosis.words.causes import advice, consequence, from_causes, known_and_open, one_of_springs
+from diagnosis.words.causes import (
+    advice,
+    consequence,
+    from_causes,
+    hold_step,
+    hold_words,
+    known_and_open,
+    one_of_springs,
+)
 from diagnosis.words.numbers import (
     CHANNELS,
     MISFITS,
@@ -44,6 +52,9 @@ _UNKNOWN = ["unknown"]
 def headline(document: Document) -> tuple[str, str]:
     """The answer in a few words, and its kind: one of ``none``, ``unknown``, ``open``, ``found``."""
     words, kind = _answer_in_words(document)
+    if document["found"].get("hold"):
+        delay = plain(*(kind.name for kind in known_effects() if kind.driven))
+        words = words.replace(delay, f"{delay} or wrong hold")
     disturbed = [one["run"] for one in document.get("disturbed", ())]
     return words + (f"; {_runs(disturbed)} disturbed" if disturbed else ""), kind
 
@@ -86,6 +97,7 @@ def verdict(document: Document, rest: str) -> str:
         *(_second_mode(one, unit_of(document)) for one in found["second_modes"]),
         _answer(document, rest),
         _choices(document),
+        hold_words(document),
         *(RIVALS[rival["kind"]](rival) for rival in found["rivals"]),
     ]
     return " ".join(filter(None, parts))
@@ -400,6 +412,7 @@ def next_steps(document: Document) -> list[str]:
         of_spring = {kind.name for kind in known_effects() if kind.chosen_spring()}
         to_mend = [name for name in causes if name not in of_spring or not document["found"]["choices"]]
         steps += [
+            *(f"{step}." for step in [hold_step(document)] if step),
             *(f"{advice(document, name)}." for name in to_mend),
             "Measure again, and compare the two diagnoses (tunnel compare).",
             "Until then use the coefficients with the causes, not those of the nominal model.",

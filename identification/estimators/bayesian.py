@@ -375,7 +375,7 @@ class Bayesian(RunByRun):
             bare = driven_run(run, sensor)
             if not isinstance(bare, DrivenRun) or bare.fit is None or bare.noise is None:
                 return RunDecay(bare.estimate)
-            times, held, derivative = bare.reading.time, drive.hold == "zero", sensor.derivative
+            times, held, derivative = bare.reading.time, drive.held, sensor.derivative
 
             def rows(decay: Decay) -> Array:
                 return driven_rows(

@@ -159,7 +159,7 @@ def input_response(reading: Reading, drive: Drive, decay: Decay, derivative: int
     Args:
         derivative: 0 for the angle, 1 for its rate.
     """
-    held = drive.hold == "zero"
+    held = drive.held
     of_decay = decay.rate, decay.stiffness
     rows = driven_rows(reading.time, drive.values, *of_decay, held=held, derivative=derivative)
     return np.asarray(rows[0], np.float64)
@@ -297,7 +297,7 @@ def linearised(
     model = constant * rest[0] + angle * rows[0] + initial * rows[1]
     local[:2] += constant * rest[1:]
     if run.drive is not None:
-        held = run.drive.hold == "zero"
+        held = run.drive.held
         driven = driven_rows(time, run.drive.values, rate, stiffness, held=held, derivative=derivative)
         model = model + gain * driven[0]
         local[:2] += gain * driven[1:]

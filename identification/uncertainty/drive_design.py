@@ -114,9 +114,7 @@ def peak_response(plan: CampaignPlan, rig: Rig) -> float:
         time = np.arange(condition.drive.values.size) / plan.sensor.sample_rate
         decay = _decay(plan, condition, rig)
         with np.errstate(all="ignore"):
-            motion = driven_rows(
-                time, condition.drive.values / inertia, *decay, held=condition.drive.hold == "zero"
-            )[0]
+            motion = driven_rows(time, condition.drive.values / inertia, *decay, held=condition.drive.held)[0]
         if not np.isfinite(motion).all():
             raise TunnelError(
                 "the motion grows without bound", where=f"run {condition.id}", remedy="lower wind_speeds"

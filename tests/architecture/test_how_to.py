@@ -86,6 +86,13 @@ def test_the_joint_of_a_robot_is_diagnosed_as_shown(tmp_path: Path) -> None:
     assert len(shown) == 4
 
 
+def test_the_joints_files_are_there_before_a_command_takes_them() -> None:
+    text = (PAGES / "a-joint-of-your-robot.md").read_text(encoding="utf-8")
+    command = text.index("tunnel diagnose elbow --model arm.xml")
+    for made in ('(folder / "campaign.toml").write_text', 'Path("arm.xml").write_text'):
+        assert text.index(made) < command
+
+
 def test_a_kind_of_rig_is_added_in_one_class(tmp_path: Path) -> None:
     shown = steps(PAGES / "add-a-kind-of-rig.md")
     assert [text for _, text in shown] == printed([code for code, _ in shown], tmp_path)

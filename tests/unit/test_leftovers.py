@@ -155,10 +155,10 @@ def test_an_interrupt_between_the_renamings_puts_the_old_folder_back(
 
 
 def test_a_command_that_refuses_an_occupied_folder_clears_first(tmp_path: Path) -> None:
-    from tunnel_lab.commands import experiments, simulate
+    from tunnel_lab.commands import score, simulate
 
     names_of_the_dead(tmp_path / "trials.parquet")[0].write_text("half")
-    experiments._refuse_occupied(tmp_path, overwrite=False)
+    score._refuse_occupied(tmp_path, overwrite=False)
     assert list(tmp_path.iterdir()) == []
     names_of_the_dead(tmp_path / "campaign")[1].mkdir()
     with pytest.raises(TunnelError, match="exists already"):

@@ -251,10 +251,10 @@ def test_the_pages_links_lead_somewhere() -> None:
 
 
 def test_networks_are_warned_of_where_they_are_used() -> None:
-    from tunnel_lab.commands import experiments, show
+    from tunnel_lab.commands import show, sweep
     from tunnel_lab.show import live
 
     for text in (live.WARNING, show.view.__doc__, PAGE.read_text(encoding="utf-8")):
         assert "password" in text
         assert "Origin" in text
-    assert "no password" in str(experiments.sweep.__doc__)
+    assert "no password" in str(sweep.sweep.__doc__)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -166,7 +166,20 @@ def _write(session: Session, document: dict[str, Any]) -> None:
     path = session.campaign / CAMPAIGN_FILE
     parse_document(document, path)
     comments = [line for line in path.read_text("utf-8").splitlines() if line.startswith(ORIGINAL)]
-    write_whole(path, campaign_text(document, comments).encode())
+    write_whole(path, campaign_text(document, comments, driven_runs(session)).encode())
+
+
+def driven_runs(session: Session) -> frozenset[str]:
+    """The ids of the driven runs of the campaign."""
+    files = [session.campaign / run["file"] for run in _document(session)["runs"]]
+    return _driven(session.campaign, tuple((file.stat().st_mtime_ns, file.stat().st_size) for file in files))
+
+
+@lru_cache(maxsize=16)
+def _driven(folder: Path, versions: tuple[tuple[int, int], ...]) -> frozenset[str]:
+    """Those of a folder while its run files keep their ``versions``: conditions do not change them."""
+    del versions
+    return frozenset(run.id for run in read_campaign(folder).runs if run.drive is not None)
 
 
 def restore(
@@ -227,7 +240,7 @@ class ConditionsPage:
         self._session, self._frame = session, frame
         self._cells = typed(session)
         self._runs = [row for row in self._cells if row != RIG]
-        self._driven = all("drive_hold" in run for run in _document(session)["runs"])
+        self._driven = driven_runs(session).issuperset(self._runs)
         ui.label(
             "Type, or paste a block from a spreadsheet into a cell. Valid values are saved at once in "
             f"{session.campaign / 'campaign.toml'}; nothing else of the campaign changes."

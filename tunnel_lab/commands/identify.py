@@ -21,6 +21,7 @@ from tunnel_lab.terminal.inputs import (
     chosen_estimator,
     chosen_estimators,
     ending,
+    estimator_option,
     given_campaign,
     own_code,
     refuse_unwritable_files,
@@ -55,13 +56,7 @@ def run(
     campaign: Annotated[Path, Argument(help=CAMPAIGN_HELP)],
     leave_out: LeaveOutOption = None,
     estimator: Annotated[
-        str,
-        Option(
-            "--estimator",
-            "-e",
-            metavar="NAME",
-            help="One of the estimators listed above or of an installed package, or module:Class of your own.",
-        ),
+        str, estimator_option("One of the estimators listed above or of an installed package")
     ] = "output_error",
     json: Annotated[
         Path | None,
@@ -129,7 +124,7 @@ def run(
       then reported, and a table shows which source dominates.
 
     [bold]Exit status[/bold]
-      0 identified, 1 nothing could be identified, 2 bad input.
+      0 identified, 1 nothing could be identified, or an estimator of your own failed, 2 bad input.
     """
     from identification import identify
     from tunnel_sim.files.writing import json_text, write_json

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import gymnasium as gym
 import numpy as np
@@ -28,16 +28,21 @@ from tunnel_lab.envs.session import (
     probabilities,
 )
 from tunnel_sim.effects import effect_class
+from tunnel_sim.effects.registry import known_effects
 from tunnel_sim.envs import arguments_of, refuse_unknown
+from tunnel_sim.envs.conditions import refuse_long
 from tunnel_sim.files.rig_file import load_rig
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.arguments import POSITIVE, Number, checked_choice, checked_names, checked_numbers
 from tunnel_sim.vocabulary.between_runs import Scatter
 from tunnel_sim.vocabulary.campaign import Campaign
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Array
 
 Observation = dict[str, Array]
 WIDTH, HEIGHT = 960, 480
 _DPI = 100
+PartsT = TypeVar("PartsT", Costs, Scatter)
 
 
 class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
@@ -56,6 +61,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
             its unit; the diagnosis preset only.
         targets: relative standard deviations (fractions) of Cnβ and Cnr at which an identification ends.
         probability: of one effect (a probability) at which a diagnosis ends.
+        costs: rig time of a run, `Costs` or some of its times by name, s; None: those of `Costs`.
         seconds_per_nat: rig time that a nat is worth, s.
         rig: path of a rig description; None takes the packaged rig.
         scatter: differences between the runs, a `Scatter` or some of its numbers by name; None: none.
@@ -81,7 +87,7 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         severities: Mapping[str, tuple[float, float]] | None = None,
         targets: tuple[float, float] = (0.01, 0.05),
         probability: float = 0.9,
-        costs: Costs | None = None,
+        costs: Costs | Mapping[str, float] | None = None,
         seconds_per_nat: float = 600.0,
         max_runs: int | None = None,
         rig: Path | str | None = None,
@@ -91,26 +97,26 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         **unknown: object,
     ) -> None:
         refuse_unknown(unknown, arguments_of(CampaignEnv), WHERE)
-        if preset not in PRESETS:
-            raise refusal(f"unknown preset {preset!r}", did_you_mean(preset, PRESETS))
-        base = PRESETS[preset]
+        base = PRESETS[checked_choice(preset, tuple(PRESETS), "preset", WHERE)]
         self.severities = _checked_severities(base, severities)
-        if simulation not in (None, "linear", "full"):
-            raise refusal(f"unknown simulation {simulation!r}", "give 'linear' or 'full'")
+        if simulation is not None:
+            checked_choice(simulation, ("linear", "full"), "simulation", WHERE)
+        if render_mode is not None:
+            checked_choice(render_mode, self.metadata["render_modes"], "render_mode", WHERE)
         if simulation == "linear" and self.severities:
             raise refusal("a diagnosis needs the full simulation", "leave simulation out")
-        runs = base.max_runs if max_runs is None else max_runs
+        if rig is not None and not isinstance(rig, str | Path):
+            raise refusal(f"rig = {rig!r} is not a path", "give the path of a rig description (TOML)")
         loaded = load_rig(None if rig is None else Path(rig))
-        for name, value, most in (
-            ("cn_beta target", targets[0], np.inf),
-            ("cn_r target", targets[1], np.inf),
-            ("max_runs", runs, np.inf),
-            ("seconds_per_nat", seconds_per_nat, np.inf),
-            ("probability", probability, 1.0),
-        ):
-            if isinstance(value, bool) or not 0.0 < value <= most:
-                bound = "above 0" if most == np.inf else f"above 0 and at most {most:g}"
-                raise refusal(f"{name} = {value!r} must be {bound}", "correct it")
+        of_cn_beta, of_cn_r = checked_numbers(targets, "targets", WHERE, POSITIVE, length=2)
+        self.targets = (of_cn_beta, of_cn_r)
+        self.probability = Number(most=1.0, above=True).checked(probability, "probability", WHERE)
+        self.seconds_per_nat = Number(above=True, unit="s").checked(seconds_per_nat, "seconds_per_nat", WHERE)
+        self.max_runs = int(
+            Number(least=1, most=limits.CAMPAIGN_RUNS, whole=True).checked(
+                base.max_runs if max_runs is None else max_runs, "max_runs", WHERE
+            )
+        )
         self.conditions = Conditions(
             rig=loaded,
             sensor=preset_sensor(base, noise_std, sample_rate),
@@ -121,23 +127,21 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
                 base.release_angles_deg if release_angles_deg is None else release_angles_deg,
                 base.durations if durations is None else durations,
             ),
-            costs=Costs() if costs is None else costs,
+            costs=_by_name(costs, Costs, "costs"),
             effects=tuple(self.severities),
             linear=not self.severities and simulation != "full",
-            scatter=_checked_scatter(scatter),
-            max_runs=int(runs),
+            scatter=_by_name(scatter, Scatter, "scatter"),
+            max_runs=self.max_runs,
         )
-        self.targets = (float(targets[0]), float(targets[1]))
-        self.probability = float(probability)
-        self.seconds_per_nat = float(seconds_per_nat)
-        self.max_runs = int(runs)
+        for duration in self.conditions.menu.durations:
+            refuse_long(duration, self.conditions.sensor.sample_rate, "durations", WHERE)
         self.expose_truth = expose_truth
         self.render_mode = render_mode
-        menu, costs = self.conditions.menu, self.conditions.costs
+        menu, rates = self.conditions.menu, self.conditions.costs
         self.action_space = spaces.MultiDiscrete(list(menu.shape))
         stiffest = max(stiffness for _, stiffness in menu.springs)
         highest = [stiffest, max(menu.wind_speeds), max(menu.release_angles), max(menu.durations)]
-        longest = costs.setup + costs.spring_change + costs.speed_change + highest[3]
+        longest = rates.setup + rates.spring_change + rates.speed_change + highest[3]
         most_progress = np.array([self.max_runs, self.max_runs * longest])
         parts: dict[str, spaces.Space[Any]] = {
             "estimate": spaces.Box(-LARGE, LARGE, (4,), np.float64),
@@ -243,14 +247,12 @@ class CampaignEnv(gym.Env[Observation, NDArray[np.int64]]):
         return info
 
 
-def _checked_scatter(given: Scatter | Mapping[str, float] | None) -> Scatter:
-    if isinstance(given, Scatter):
+def _by_name(given: object, kind: type[PartsT], name: str) -> PartsT:
+    """An object of a class of numbers: as given, or from some of its numbers by name; None: its defaults."""
+    if isinstance(given, kind):
         return given
-    known = [one.name for one in dataclasses.fields(Scatter)]
-    for name in given or {}:
-        if name not in known:
-            raise refusal(f"scatter has no number {name!r}", did_you_mean(str(name), known))
-    return Scatter(**(given or {}))
+    known = [one.name for one in dataclasses.fields(kind)]
+    return kind(**checked_names({} if given is None else given, known, name, WHERE))
 
 
 def _checked_severities(
@@ -259,13 +261,18 @@ def _checked_severities(
     if given is not None and not (preset.severities and given):
         remedy = "give preset='diagnosis' and at least one effect with the range of its severity"
         raise refusal("severities are for the diagnosis preset only", remedy)
+    stated = preset.severities if given is None else given
     ranges = {}
-    for name, (low, high) in (preset.severities if given is None else given).items():
+    for name, bounds in checked_names(
+        stated, [kind.name for kind in known_effects()], "severities", WHERE
+    ).items():
         severity = effect_class(name).parameters()[0]
-        if not 0.0 < low <= high < np.inf:
-            remedy = f"give the range of {severity.name} in {severity.unit}"
-            raise refusal(f"{name}: ({low!r}, {high!r}) is not a range above 0", remedy)
-        ranges[name] = (float(low), float(high))
+        kind = Number(above=True, unit=severity.unit)
+        low, high = checked_numbers(bounds, f"severities[{name!r}]", WHERE, kind, length=2)
+        if low > high:
+            remedy = f"give the lower end of {severity.name} first, in {severity.unit}"
+            raise refusal(f"severities[{name!r}] = {bounds!r} is not a range", remedy)
+        ranges[name] = (low, high)
     return ranges
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from tunnel_sim.envs import EnvError
 from tunnel_sim.envs.conditions import FreeDecayConfig
 from tunnel_sim.envs.engines import operator_action
 from tunnel_sim.envs.information import propagator
+from tunnel_sim.vocabulary.arguments import Number
 
 _FOLLOWS = 0.5  # gain of the observer in a sixth of a cycle
 _BAND = 0.05  # of the amplitude, within which the moment is reduced
@@ -45,9 +45,12 @@ class Resonant:
         wind_speed: float,
         amplitude: float,
     ) -> None:
-        for name, value in (("stiffness", stiffness), ("inertia", inertia), ("amplitude", amplitude)):
-            if not 0.0 < value < np.inf:
-                raise EnvError(f"{name} = {value!r} is not a positive number", remedy="give it in SI units")
+        for name, value, unit in (
+            ("stiffness", stiffness, "N m/rad"),
+            ("inertia", inertia, "kg m2"),
+            ("amplitude", amplitude, "rad"),
+        ):
+            Number(above=True, unit=unit).checked(value, name, "excitation")
         self.config, self.wind_speed, self.amplitude = config, wind_speed, amplitude
         self.stiffness, self.omega = stiffness, float(np.sqrt(stiffness / inertia))
         still, square = np.zeros(1), np.array([self.omega**2])

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from itertools import product
-from math import degrees, isfinite, radians
+from math import degrees, radians
 
 import numpy as np
 
-from tunnel_sim.vocabulary.errors import TunnelError
+from tunnel_sim.vocabulary.arguments import COUNT, EnvError, Number, checked_numbers
 from tunnel_sim.vocabulary.plan import Condition, SensorModel
 from tunnel_sim.vocabulary.rig import Rig
 
@@ -19,9 +19,9 @@ WHERE = "Campaign-v0"
 """How errors name the environment."""
 
 
-def refusal(what: str, remedy: str) -> TunnelError:
+def refusal(what: str, remedy: str) -> EnvError:
     """The error of an argument or an action of the environment."""
-    return TunnelError(what, where=WHERE, remedy=remedy)
+    return EnvError(what, where=WHERE, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -116,26 +116,19 @@ def make_menu(
     Raises:
         TunnelError: when a list is empty, repeats itself, or holds a value that the rig does not allow.
     """
-    for name, values in (
-        ("springs", springs),
-        ("wind_speeds", wind_speeds),
-        ("release_angles_deg", release_angles_deg),
-        ("durations", durations),
-    ):
-        least = 0.0 if name == "wind_speeds" else np.nextafter(0.0, 1.0)
-        if len(values) == 0 or len(set(values)) != len(values):
-            raise TunnelError(
-                f"{name} = {list(values)!r} is empty or holds a value twice", remedy="correct the list"
-            )
-        for value in values:
-            if isinstance(value, bool) or not (isfinite(value) and value >= least):
-                bound = "of 0 or more" if least == 0.0 else "above 0"
-                raise TunnelError(f"{name}: {value!r} is not a number {bound}", remedy="correct the list")
+    numbers = [int(number) for number in checked_numbers(springs, "springs", WHERE, COUNT)]
+    for number in numbers:
+        if number not in rig.springs:
+            remedy = f"use one of {', '.join(map(str, rig.springs))}"
+            raise refusal(f"springs: there is no spring {number}", remedy)
+    angles = checked_numbers(
+        release_angles_deg, "release_angles_deg", WHERE, Number(above=True, unit="degrees")
+    )
     return Menu(
-        tuple((int(number), rig.spring(number)) for number in springs),
-        tuple(map(float, wind_speeds)),
-        tuple(radians(angle) for angle in release_angles_deg),
-        tuple(map(float, durations)),
+        tuple((number, rig.spring(number)) for number in numbers),
+        checked_numbers(wind_speeds, "wind_speeds", WHERE, Number(unit="m/s")),
+        tuple(map(radians, angles)),
+        checked_numbers(durations, "durations", WHERE, Number(above=True, unit="s")),
     )
 
 
@@ -152,6 +145,11 @@ class Costs:
     setup: float = 60.0
     spring_change: float = 300.0
     speed_change: float = 60.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is not a time."""
+        for name, value in vars(self).items():
+            Number(unit="s").checked(value, f"costs: {name}", WHERE)
 
     def of(self, choice: Choice, last: Choice | None) -> float:
         """Rig time of a run after another, s; the first run (None) needs a change of spring and speed."""
@@ -197,10 +195,9 @@ def preset_sensor(preset: Preset, noise_std: float | None, sample_rate: float | 
     """
     noise = preset.noise_std if noise_std is None else noise_std
     rate = preset.sample_rate if sample_rate is None else sample_rate
-    for name, value, unit in (("noise_std", noise, "rad"), ("sample_rate", rate, "Hz")):
-        if isinstance(value, bool) or not (isfinite(value) and value > 0.0):
-            raise refusal(f"{name} = {value!r} must be above 0", f"give it in {unit}")
+    noise = Number(above=True, unit="rad").checked(noise, "noise_std", WHERE)
+    rate = Number(above=True, unit="Hz").checked(rate, "sample_rate", WHERE)
     if rate > 1000.0 or abs(1000.0 / rate - round(1000.0 / rate)) > 1e-9:
         what = f"sample_rate = {rate:g} Hz does not divide the rig's 1000 steps per second"
         raise refusal(what, "give 1000, 500, 250, 200, 125, 100 Hz or another divisor of 1000 Hz")
-    return SensorModel(sample_rate=float(rate), noise_std=float(noise), resolution=0.0)
+    return SensorModel(sample_rate=rate, noise_std=noise, resolution=0.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import exp, isfinite, log
+from math import exp, inf, log
 from typing import Any
 
 import numpy as np
@@ -30,13 +30,14 @@ from identification.signal.decay_fit import Reading, RunFit
 from identification.signal.free_decay import Decay, free_decay
 from identification.signal.noise import stated_noise
 from identification.signal.run_fit import identify_run
-from tunnel_lab.envs.menu import Choice, Costs, Menu
+from tunnel_lab.envs.menu import WHERE, Choice, Costs, Menu
 from tunnel_sim.effects import Effect, effect_class, effect_from
 from tunnel_sim.engine.simulate import simulate
 from tunnel_sim.engine.virtual_campaign import run_settings, stated_run
+from tunnel_sim.vocabulary.arguments import Number, checked_names
 from tunnel_sim.vocabulary.between_runs import Scatter, between_runs
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
-from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
+from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import SensorModel, Truth
 from tunnel_sim.vocabulary.record import Array, Record
 from tunnel_sim.vocabulary.rig import Rig
@@ -347,10 +348,7 @@ def draw_truth(
     Raises:
         TunnelError: for an unknown option, coefficient or effect, or a number that is out of range.
     """
-    options = options or {}
-    for key in options:
-        if key not in OPTIONS:
-            raise TunnelError(f"unknown reset option {key!r}", remedy=did_you_mean(str(key), OPTIONS))
+    options = checked_names({} if options is None else options, OPTIONS, "reset options", WHERE)
     values = {name: _normal(rng, MEAN[name], STD[name]) for name in PARAMETERS}
     zero = _normal(rng, 0.0, 0.004)
     effects: tuple[Effect, ...] = ()
@@ -359,21 +357,12 @@ def draw_truth(
         low, high = severities[name]
         severity = exp(rng.uniform(log(low), log(high)))
         effects = (effect_from(name, {effect_class(name).parameters()[0].name: severity}),)
-    truth, known = options.get("truth", {}), (*PARAMETERS, "sensor_zero")
-    if not isinstance(truth, Mapping):
-        raise TunnelError("option truth is not a mapping", remedy=f"give some of {', '.join(known)} by name")
+    truth = checked_names(options.get("truth", {}), (*PARAMETERS, "sensor_zero"), "option truth", WHERE)
+    given = {}
     for name, value in truth.items():
-        if name not in known:
-            raise TunnelError(
-                f"unknown coefficient {name!r}", where="truth", remedy=did_you_mean(name, known)
-            )
         positive = name in ("yaw_inertia", "mechanical_damping")
-        number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-        if not number or (positive and value <= 0.0):
-            unit = UNITS.get(name, "rad")
-            remedy = f"give a {'positive ' if positive else ''}number in {unit}"
-            raise TunnelError(f"{name} = {value!r} is out of range", where="truth", remedy=remedy)
-    given = {name: float(value) for name, value in truth.items()}
+        kind = Number(0.0 if positive else -inf, above=positive, unit=UNITS.get(name, "rad"))
+        given[name] = kind.checked(value, f"truth: {name}", WHERE)
     zero = given.pop("sensor_zero", zero)
     stated = options.get("effects")
     if stated is not None:

@@ -43,7 +43,7 @@ _FEWEST_IN_FLIGHT = 8
 
 
 class Workers(Protocol):
-    """Those that do the work: `processes`, `lasting_processes`, or a cluster."""
+    """Those that do the work: `processes` or a cluster."""
 
     def __call__(
         self, work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT], /
@@ -108,13 +108,15 @@ def _with_own(own: Sequence[Own], work: Callable[[TaskT], ResultT], task: TaskT)
     return work(task)
 
 
-def processes(jobs: int) -> Workers:
-    """Processes of this machine; no job works in this one."""
-    return partial(in_processes, jobs=jobs)
+def said(line: str) -> None:
+    """Print a line about the workers on standard error."""
+    from tunnel_lab.terminal.outputs import say  # only here: worker processes start with this module
+
+    say(f"tunnel: {line}", stderr=True)
 
 
-def lasting_processes(jobs: int, say: Say) -> Workers:
-    """Processes of this machine; the tasks of a process that dies are repeated."""
+def processes(jobs: int, say: Say = said) -> Workers:
+    """Processes of this machine; no job works in this one. The tasks of a process that dies are repeated."""
 
     def workers(work: Callable[[TaskT], ResultT], tasks: Sequence[TaskT]) -> Iterator[tuple[TaskT, ResultT]]:
         waiting = list(tasks)
@@ -128,10 +130,13 @@ def lasting_processes(jobs: int, say: Say) -> Workers:
             except BrokenProcessPool:
                 broken += 1
                 if broken >= PATIENCE:
-                    what = f"worker processes died {PATIENCE} times without finishing a shard"
-                    remedy = "check the memory and give fewer --jobs; finished shards are kept"
+                    what = f"worker processes died {PATIENCE} times without finishing a task"
+                    remedy = (
+                        "give fewer --jobs if memory is short, and check that an estimator of your own does not "
+                        "end its process; finished work in --out is kept"
+                    )
                     raise TunnelError(what, remedy=remedy) from None
-                say("a worker process was lost; its shards are repeated")
+                say("a worker process was lost; its tasks are repeated")
 
     return workers
 

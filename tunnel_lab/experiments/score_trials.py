@@ -21,6 +21,7 @@ import polars as pl
 
 from identification.estimate import UNITS, Quantity
 from identification.scoring import ScoredEstimate, Trials, collect
+from tunnel_lab.experiments.asked import RAISED, VERBS, Failure, asked, counted_failures
 from tunnel_lab.experiments.runner import Progress, knowing, processes, run_tasks
 from tunnel_lab.experiments.score_grid import Grid
 from tunnel_lab.terminal.inputs import NO_EFFECT
@@ -35,10 +36,9 @@ from tunnel_sim.files.reading import (
 )
 from tunnel_sim.files.writing import json_line, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
-from tunnel_sim.vocabulary.errors import TunnelError, own_traceback, shown
+from tunnel_sim.vocabulary.errors import TunnelError, shown
 
 if TYPE_CHECKING:
-    from identification.estimate import Estimate
     from tunnel_sim.vocabulary.campaign import Campaign
 
 
@@ -110,30 +110,28 @@ def estimate_rows(
 ) -> list[Row]:
     """One estimator on one campaign of known truth, a row for each quantity of the truth.
 
-    An estimator that raises an exception has failed, and its status names the exception: one bad record must not
-    stop the work. Value and std are then None, and the first row has the ``traceback``.
+    Where the estimator raises an exception or returns something wrong, value and std are None, the status says
+    which, and the first row has the `Failure` as ``failure``.
 
     Args:
         truth: by quantity, SI; ζ and ωn are those of the first run.
         bound: the Cramér–Rao bound by quantity, SI; quantities without one are left out.
         about: first columns of every row.
     """
-    from identification import identify
-
-    begun, raised = time.perf_counter(), dict[str, str]()
-    try:
-        estimate: Estimate | None = identify(campaign, estimator, throw=False)
-        status = "" if estimate is None else estimate.status.name.lower()
-    except (Exception, SystemExit) as error:  # whatever an estimator raises is counted and shown
-        estimate, status = None, f"raised {type(error).__name__}"
-        raised = {"traceback": own_traceback(error)}
+    begun = time.perf_counter()
+    answer = asked(campaign, estimator)
     milliseconds = 1000.0 * (time.perf_counter() - begun) / len(campaign.runs)
+    if isinstance(answer, Failure):
+        estimate, failed = None, {"failure": vars(answer)}
+        status = f"{RAISED} {answer.error}" if answer.status == RAISED else answer.status
+    else:
+        estimate, failed, status = answer, {}, answer.status.name.lower()
     rows = []
     for quantity, value in truth.items():
         source = (
             None if estimate is None else estimate.runs[0] if quantity in ("zeta", "omega_n") else estimate
         )
-        answer = getattr(source, quantity, None)
+        found = getattr(source, quantity, None)
         rows.append(
             {
                 **about,
@@ -141,14 +139,14 @@ def estimate_rows(
                 "quantity": quantity,
                 "unit": _UNITS[quantity],
                 "truth": value,
-                "value": None if answer is None else answer.value,
-                "std": None if answer is None else answer.std,
+                "value": None if found is None else found.value,
+                "std": None if found is None else found.std,
                 "bound": bound.get(quantity),
                 "status": status,
                 "milliseconds": milliseconds,
             }
         )
-    rows[0] |= raised
+    rows[0] |= failed
     return rows
 
 
@@ -288,7 +286,7 @@ class Results:
         return {key: collect(every) for key, every in outcomes.items()}
 
     def milliseconds(self, estimator: str, cells: Sequence[int]) -> float:
-        """Median time an estimator took for one record of some cells, ms."""
+        """Median time of `identify` for one record of some cells, its examination included, ms."""
         wanted = set(cells)
         return median(
             float(row["milliseconds"])
@@ -297,16 +295,17 @@ class Results:
         )
 
 
-def raised_lines(rows: Sequence[Row]) -> list[str]:
-    """What is said of estimators that raised exceptions: how often, and the first traceback of each."""
-    tracebacks: dict[str, list[str]] = {}
+def failure_lines(rows: Sequence[Row]) -> list[str]:
+    """What is said of estimators that raised exceptions or returned something wrong: how often, and the first."""
+    by_estimator: dict[str, list[Failure]] = {}
     for row in rows:
-        if "traceback" in row:
-            tracebacks.setdefault(row["estimator"], []).append(row["traceback"])
+        if "failure" in row:
+            by_estimator.setdefault(row["estimator"], []).append(Failure(**row["failure"]))
     lines = []
-    for name, found in tracebacks.items():
-        times = "once" if len(found) == 1 else f"{len(found)} times"
-        lines += [f"{name} raised an exception {times}; counted as failures. The first:", found[0]]
+    for name, failures in by_estimator.items():
+        for one in counted_failures(failures):
+            times = "once" if one.count == 1 else f"{one.count} times"
+            lines += [f"{name} {VERBS[one.status]} {times}; counted as failures. The first:", one.first]
     return lines
 
 

@@ -41,7 +41,8 @@ NAMES = {**SYMBOLS, "zeta": "ζ", "omega_n": "ωn"}
 """How the quantities of a score are written."""
 ABOUT = (
     "Bound: Cramér–Rao's, of the nominal model, with the scatter where runs scatter. Worst: of the cells. In "
-    "brackets: the standard error in the last digits; after shares: their 95 % interval."
+    "brackets: the standard error in the last digits; after shares: their 95 % interval. Time: of identify for a "
+    "record, its examination included."
 )
 _SHOWN_WORSE = 12
 _SHOWN = ("zeta", "omega_n", "cn_beta", "cn_r")
@@ -202,7 +203,7 @@ def _section(result: Table, results: Results, name: str, cells: Sequence[int]) -
         result.add_section()
     result.columns[0].no_wrap = True
     result.add_row(Text(name, style="bold"))
-    result.add_row("  ms/record", significant(results.milliseconds(name, cells), 2))
+    result.add_row("  identify [ms]", significant(results.milliseconds(name, cells), 2))
 
 
 def pooled_figures(every: Sequence[Trials]) -> tuple[str, str, str, str, str]:

@@ -15,7 +15,7 @@ import os
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cache, lru_cache, partial
 from importlib.metadata import version
 from math import hypot
@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from identification import identify
 from identification.estimate import PARAMETERS, UNITS
 from identification.estimators import make_estimator, own_estimators
+from tunnel_lab.experiments.asked import Failed, Failure, asked, counted_failures
 from tunnel_lab.experiments.bounds import PlanBounds, nominal_oscillation, plan_bounds
 from tunnel_lab.experiments.runner import Progress, Workers, knowing, run_tasks
 from tunnel_lab.experiments.sweep_cases import Sweep, SweepCase
@@ -36,7 +36,7 @@ from tunnel_sim.files.reading import as_described, read_json, read_regular
 from tunnel_sim.files.writing import clear_leftovers, output_folder, write_json, write_whole
 from tunnel_sim.vocabulary import limits
 from tunnel_sim.vocabulary.between_runs import SCATTERED, Scatter
-from tunnel_sim.vocabulary.errors import TunnelError, one_line, own_traceback, raised_line, shown
+from tunnel_sim.vocabulary.errors import TunnelError, one_line, shown
 from tunnel_sim.vocabulary.plan import CampaignPlan
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ _ELSEWHERE = "name another --out"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """The last bit of sums in a linear algebra library depends on its number of threads; a shard uses one."""
 _PACKAGES = ("virtual-wind-tunnel", "mujoco", "numpy", "scipy", "polars")
-NOT_SIMULATED, SIMULATED, REFUSED, RAISED = "not_simulated", "simulated", "refused", "raised"
+NOT_SIMULATED, SIMULATED = "not_simulated", "simulated"
 RUN_QUANTITIES: Mapping[str, str] = {"omega_n": "rad/s", "zeta": "1"}
 CAMPAIGN_QUANTITIES: Mapping[str, str] = {**{name: UNITS[name] for name in PARAMETERS}, "sensor_zero": "rad"}
 SCATTER_COLUMNS: Mapping[str, str] = {f"scatter_{one.name}": one.name for one in fields(Scatter)}
@@ -86,7 +86,7 @@ RECORD_COLUMNS: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class Finished:
-    """A finished shard, ready to be written: Parquet files, versions, and the estimates that raised.
+    """A finished shard, ready to be written: Parquet files, versions, and the estimates that failed.
 
     Results and records (None where they are not stored) do not depend on where or when the shard is done.
     """
@@ -95,17 +95,7 @@ class Finished:
     results: bytes
     records: bytes | None
     made_with: Mapping[str, str]
-    crashes: int
-    first_crash: str = ""
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why a case has no estimate: `NOT_SIMULATED`, `REFUSED` or `RAISED`, and the message, with its traceback."""
-
-    status: str
-    message: str
-    traceback: str = ""
+    failed: tuple[Failed, ...] = ()
 
 
 @cache
@@ -142,17 +132,8 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
     campaigns = [(case, done[case.index]) for case in cases]
     answers: list[tuple[SweepCase, str | None, Estimate | Failure | None]] = []
     for name in plan.document.estimators:
-        for case, campaign in campaigns:  # one bad case must not stop the sweep
-            found: Estimate | Failure
-            if isinstance(campaign, Failure):
-                found = campaign
-            else:
-                try:
-                    found = identify(campaign, _estimator(name), throw=False)
-                except TunnelError as error:
-                    found = Failure(REFUSED, one_line(error))
-                except (Exception, SystemExit) as error:
-                    found = Failure(RAISED, one_line(raised_line(error)), own_traceback(error))
+        for case, campaign in campaigns:
+            found = campaign if isinstance(campaign, Failure) else asked(campaign, _estimator(name))
             answers.append((case, name, found))
     if not plan.document.estimators:
         answers = [
@@ -172,14 +153,12 @@ def run_shard(sweep: str, index: int, nthread: int = 1) -> Finished:
             for run in campaign.runs
         ]  # fmt: skip
         records = _parquet(kept, RECORD_COLUMNS)
-    crashes = [found.traceback for _, _, found in answers if isinstance(found, Failure) and found.traceback]
     return Finished(
         index=index,
         results=results,
         records=records,
         made_with={**made_with_all(plan), "threads": os.environ.get(ONE_THREAD[0], "several")},
-        crashes=len(crashes),
-        first_crash=next(iter(crashes), ""),
+        failed=counted_failures(found for _, _, found in answers if isinstance(found, Failure)),
     )
 
 
@@ -414,16 +393,11 @@ def open_store(folder: Path) -> Store:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of a sweep: shards found finished, and estimates that raised an exception in those done now.
-
-    Args:
-        first_crash: traceback of the first of them; empty without any.
-    """
+    """The outcome of a sweep: shards found finished, and the estimates that failed in those done now."""
 
     store: Store
     found: int
-    crashes: int
-    first_crash: str = ""
+    failed: tuple[Failed, ...] = ()
 
 
 def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress | None = None) -> Outcome:
@@ -436,11 +410,11 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
         TunnelError: when the folder belongs to another sweep, or the work cannot be done.
     """
     store = begin(sweep, folder)
-    crashes: list[Finished] = []
+    failed: dict[int, tuple[Failed, ...]] = {}
 
     def keep(_: int, shard: Finished) -> None:
         store.keep(shard)
-        crashes.extend([replace(shard, results=b"", records=None)] if shard.crashes else [])
+        failed[shard.index] = shard.failed
 
     found = run_tasks(
         knowing(partial(run_shard, sweep.to_json()), sweep.document.estimators),
@@ -453,5 +427,4 @@ def run_sweep(sweep: Sweep, folder: Path, workers: Workers, progress: Progress |
     )
     for name in (RESULTS, RECORDS, CHECKSUMS):  # partial files that a killed run left
         clear_leftovers(store.folder / name)
-    first = min(crashes, key=lambda shard: shard.index).first_crash if crashes else ""
-    return Outcome(store, found, sum(shard.crashes for shard in crashes), first)
+    return Outcome(store, found, counted_failures(one for index in sorted(failed) for one in failed[index]))

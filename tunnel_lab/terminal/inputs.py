@@ -149,6 +149,17 @@ LeaveOutOption = Annotated[
 ]
 
 
+def estimator_option(what: str, more: str = "") -> Any:
+    """The option ``--estimator`` of a command, which takes a name or a class.
+
+    Args:
+        what: the command does with it, for the help.
+        more: sentences after that.
+    """
+    text = f"{what}: a name, or module:Class of your own.{more and ' '}{more}"
+    return Option("--estimator", "-e", metavar="NAME", help=text)
+
+
 def split_names(words: Sequence[str] | None) -> tuple[str, ...]:
     """Names from repeated options, from lists with commas, or from both."""
     return tuple(name.strip() for word in words or () for name in word.split(",") if name.strip())
@@ -182,14 +193,22 @@ def chosen_estimators(words: Sequence[str] | None) -> tuple[str, ...]:
 
 @contextmanager
 def own_code(estimators: Sequence[str]) -> Iterator[None]:
-    """End the command with the traceback and status 1 where an estimator of one's own raises within the block."""
+    """End the command with status 1 where an estimator raises an exception or returns no valid estimate.
+
+    The traceback of an exception of one's own is printed.
+    """
+    from identification.returned import WrongReturn
+    from tunnel_lab.terminal.outputs import say
+
     try:
         yield
+    except WrongReturn as error:
+        say(f"tunnel: {error}", stderr=True)
+        raise typer.Exit(1) from None
     except TunnelError:
         raise
     except Exception as error:
         from identification.estimators import SUMMARIES
-        from tunnel_lab.terminal.outputs import say
 
         own = [name for name in estimators if name not in SUMMARIES]
         if not own:

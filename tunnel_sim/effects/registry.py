@@ -29,39 +29,90 @@ _under_way: ContextVar[tuple[type[Effect], ...]] = ContextVar(
     "effects of the diagnosis under way", default=()
 )
 
-_room = __name__.rpartition(".")[0]
-_names = [f"{_room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
-_modules = [import_module(name) for name in _names if name != __name__]
-_defined = {
-    kind
-    for module in _modules
-    for kind in vars(module).values()
-    if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
-}
+_OF_SPECTRUM = 2  # parameters of a random moment
 
 
-def in_order(kinds: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
-    """Effects by their place in the vocabulary; classes without a name are bases of others and left out.
+def check_described(kind: object) -> None:
+    """Refuse what cannot be an effect of the vocabulary, built in or of one's own."""
+    where = f"effect {one_line(getattr(kind, 'name', getattr(kind, '__qualname__', kind)))}"
+    if not (isinstance(kind, type) and issubclass(kind, Effect) and dataclasses.is_dataclass(kind)):
+        remedy = "derive it from Effect, and write @dataclass(frozen=True) above it"
+        raise TunnelError("is not a dataclass derived from Effect", where=where, remedy=remedy)
+    stated = ("name", "channel", "condition", "equation", "signature", "references", "example")
+    missing = [text for text in stated if not hasattr(kind, text)]
+    if missing:
+        raise TunnelError(f"states no {missing[0]}", where=where, remedy="state it in the class")
+    if not kind.name.isidentifier() or kind.name in RESERVED:
+        raise TunnelError("is not a name for an effect", where=where, remedy="use letters, digits and _")
+    for text, allowed in (("channel", get_args(Channel)), ("condition", get_args(Condition))):
+        if getattr(kind, text) not in allowed:
+            what = f"unknown {text} {getattr(kind, text)!r}"
+            raise TunnelError(what, where=where, remedy=f"use one of {', '.join(allowed)}")
+    try:
+        severity = kind.parameters()[0]
+        has_null = severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
+    except (TypeError, IndexError):  # not described, or none
+        has_null = False
+    if not has_null:
+        what = "the first parameter is its severity, whose default must be 0 within its bounds"
+        remedy = "declare its parameters with tunnel_sim.effects.parameters.parameter"
+        raise TunnelError(what, where=where, remedy=remedy)
+    for info in kind.parameters():  # the answer is converted from its unit
+        try:
+            dimension(info.unit)
+        except TunnelError as error:
+            place = f"{where}, parameter {info.name}"
+            raise TunnelError(error.what, where=place, remedy=error.remedy) from None
+    if (kind.line or kind.skips) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
+        what = "has a phase or instants in every run, and does not say how they are found"
+        raise TunnelError(what, where=where, remedy="override sought")
+    if kind.random and len(kind.parameters()) != _OF_SPECTRUM:
+        what = "is a random moment, whose parameters are an intensity and a bandwidth or Strouhal number"
+        raise TunnelError(what, where=where, remedy="declare these two")
+
+
+def built_in(kinds: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
+    """Effects of this package by their place in the vocabulary, checked as those of one's own are.
+
+    Args:
+        kinds: classes; those without a name that others derive from, or whose own name begins with ``_``, are bases
+            and left out.
 
     Raises:
-        TypeError: when an effect has no place, or that of another.
+        TunnelError: when an effect is not complete, or has no place or that of another.
     """
-    named = sorted((kind for kind in kinds if hasattr(kind, "name")), key=lambda kind: kind.name)
+    bases = [
+        kind
+        for kind in kinds
+        if not hasattr(kind, "name") and (kind.__subclasses__() or kind.__name__.startswith("_"))
+    ]
+    stated = [kind for kind in kinds if kind not in bases]
+    for kind in stated:
+        check_described(kind)
     places: dict[int, type[Effect]] = {}
-    following = 1 + max((kind.place for kind in named if hasattr(kind, "place")), default=0)
-    for kind in named:
+    following = 1 + max((kind.place for kind in stated if hasattr(kind, "place")), default=0)
+    for kind in sorted(stated, key=lambda kind: kind.name):
         place = getattr(kind, "place", None)
         if place is None or place in places:
             other = "no place" if place is None else f"the place of {places[place].name}"
-            raise TypeError(
-                f"{kind.__module__}.{kind.__name__} has {other} in the vocabulary: write place = {following}"
-            )
+            what = f"has {other} in the vocabulary"
+            raise TunnelError(what, where=f"effect {kind.name}", remedy=f"write place = {following}")
         places[place] = kind
     return tuple(places[place] for place in sorted(places))
 
 
+_room = __name__.rpartition(".")[0]
+_names = [f"{_room}.{module.name}" for module in iter_modules([str(Path(__file__).parent)])]
+_modules = [import_module(name) for name in _names if name != __name__]
+_defined = [
+    kind
+    for module in _modules
+    for kind in vars(module).values()
+    if isinstance(kind, type) and issubclass(kind, Effect) and kind.__module__ == module.__name__
+]
+
 #: Every built-in effect, in the order of the vocabulary: a module of this package that defines one is enough.
-ALL_EFFECTS: tuple[type[Effect], ...] = in_order(_defined)
+ALL_EFFECTS: tuple[type[Effect], ...] = built_in(_defined)
 
 
 def known_effects() -> tuple[type[Effect], ...]:
@@ -86,37 +137,12 @@ def register_effect(kind: KindT) -> KindT:
 
 
 def check_kind(kind: object) -> None:
-    """Refuse what cannot be an effect of the vocabulary."""
-    where = f"effect {one_line(getattr(kind, 'name', kind))}"
-    if not (isinstance(kind, type) and issubclass(kind, Effect) and dataclasses.is_dataclass(kind)):
-        raise TunnelError("is not a class derived from Effect", where=where, remedy="derive it from Effect")
-    stated = ("name", "channel", "condition", "equation", "signature", "references", "example")
-    missing = [text for text in stated if not hasattr(kind, text)]
-    if missing:
-        raise TunnelError(f"states no {missing[0]}", where=where, remedy="state it in the class")
-    if not kind.name.isidentifier() or kind.name in RESERVED:
-        raise TunnelError("is not a name for an effect", where=where, remedy="use letters, digits and _")
+    """Refuse what cannot be an effect of one's own."""
+    check_described(kind)
+    kind = cast("type[Effect]", kind)
+    where = f"effect {kind.name}"
     if any(kind.name == one.name and kind is not one for one in ALL_EFFECTS):
         raise TunnelError("is the name of a built-in effect", where=where, remedy="choose another name")
-    for text, allowed in (("channel", get_args(Channel)), ("condition", get_args(Condition))):
-        if getattr(kind, text) not in allowed:
-            what = f"unknown {text} {getattr(kind, text)!r}"
-            raise TunnelError(what, where=where, remedy=f"use one of {', '.join(allowed)}")
-    try:
-        severity = kind.parameters()[0]
-        has_null = severity.default == 0.0 and severity.lower <= 0.0 <= severity.upper
-    except (TypeError, IndexError):  # not described, or none
-        has_null = False
-    if not has_null:
-        what = "the first parameter is its severity, whose default must be 0 within its bounds"
-        remedy = "declare its parameters with tunnel_sim.effects.parameters.parameter"
-        raise TunnelError(what, where=where, remedy=remedy)
-    for info in kind.parameters():  # the answer is converted from its unit
-        try:
-            dimension(info.unit)
-        except TunnelError as error:
-            place = f"{where}, parameter {info.name}"
-            raise TunnelError(error.what, where=place, remedy=error.remedy) from None
     for trait, of in (
         ("lattice", "effect that is read off the records"),
         ("scatters", "effects between runs"),
@@ -124,15 +150,6 @@ def check_kind(kind: object) -> None:
         if getattr(kind, trait):
             what = f"{trait} is for the built-in {of}"
             raise TunnelError(what, where=where, remedy="leave it at its default")
-    if (kind.line or kind.skips) and cast(Any, kind.sought).__func__ is cast(Any, Effect.sought).__func__:
-        what = "has a phase or instants in every run, and does not say how they are found"
-        raise TunnelError(what, where=where, remedy="override sought")
-    if kind.random and len(kind.parameters()) != _OF_SPECTRUM:
-        what = "is a random moment, whose parameters are an intensity and a bandwidth or Strouhal number"
-        raise TunnelError(what, where=where, remedy="declare these two")
-
-
-_OF_SPECTRUM = 2  # parameters of a random moment
 
 
 @functools.cache

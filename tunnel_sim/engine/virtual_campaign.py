@@ -151,7 +151,7 @@ def run_settings(truth: Truth, condition: Condition, *, sample_rate: float | Non
         moment = DriveMoment(
             np.arange(given.values.size) / sample_rate,
             given.values,
-            held=given.hold == "zero",
+            held=given.held,
             on_body=given.on_body,
         )
     return RunSettings(

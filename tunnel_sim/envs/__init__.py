@@ -16,11 +16,8 @@ from inspect import Parameter, signature
 # The environments' modules, and MuJoCo with them, are imported when an environment is made.
 from gymnasium.envs.registration import register, registry
 
+from tunnel_sim.vocabulary.arguments import EnvError as EnvError
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
-
-
-class EnvError(TunnelError, ValueError):
-    """A bad argument, option or action of an environment, described in one line."""
 
 
 def as_env_error(error: TunnelError, where: str) -> EnvError:

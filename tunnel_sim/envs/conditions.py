@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from math import isfinite, radians
+from math import radians
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +16,8 @@ from tunnel_sim.envs import EnvError, as_env_error, refuse_unknown
 from tunnel_sim.envs.information import Prior
 from tunnel_sim.files.rig_file import load_rig
 from tunnel_sim.physics.run_settings import RunSettings
+from tunnel_sim.vocabulary import limits
+from tunnel_sim.vocabulary.arguments import Number, checked_choice
 from tunnel_sim.vocabulary.errors import TunnelError, did_you_mean
 from tunnel_sim.vocabulary.plan import (
     POTENTIOMETER_RESOLUTION,
@@ -31,7 +33,17 @@ from tunnel_sim.vocabulary.rig import Rig
 PRESETS = ("operator", "plain")
 LEAST_DEVIATION = 1e-6
 """Least standard deviation of a reading, rad: below it the prior is lost in the rounding of the information."""
-_MAY_BE_ZERO = frozenset({"noise_std", "resolution", "effect_probability"})
+WHERE = "FreeDecay-v0"
+"""How errors name the environment."""
+_NUMBERS: Mapping[str, Number] = {
+    **{name: Number(above=True, unit="s") for name in ("duration", "control_period", "wind_time_constant")},
+    "sample_rate": Number(above=True, most=limits.FASTEST_RATE, unit="Hz"),
+    "noise_std": Number(unit="rad"),
+    "resolution": Number(unit="rad"),
+    "wind_limit": Number(above=True, unit="m/s"),
+    "moment_limit": Number(above=True, unit="N m"),
+    "effect_probability": Number(most=1.0),
+}
 
 
 @dataclass(frozen=True)
@@ -69,28 +81,24 @@ class FreeDecayConfig:
 
     def __post_init__(self) -> None:
         """Refuse an argument out of range, or a duration that is not a whole number of the shorter interval."""
-        if self.preset not in PRESETS:
-            raise EnvError(f"unknown preset {self.preset!r}", remedy=did_you_mean(str(self.preset), PRESETS))
-        for item in fields(self):
-            if item.type == "float":
-                name, value = item.name, getattr(self, item.name)
-                number = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-                if not number or value < 0.0 or (value == 0.0 and name not in _MAY_BE_ZERO):
-                    least = "0 or more" if name in _MAY_BE_ZERO else "above 0"
-                    remedy = f"give a finite number {least} (SI)"
-                    raise EnvError(f"{name} = {value!r} is out of range", remedy=remedy)
-        if self.effect_probability > 1.0:
-            raise EnvError("effect_probability is above 1", remedy="give a probability")
+        checked_choice(self.preset, PRESETS, "preset", WHERE)
+        for name, kind in _NUMBERS.items():
+            kind.checked(getattr(self, name), name, WHERE)
+        if self.rig_file is not None and not isinstance(self.rig_file, str | Path):
+            what = f"rig_file = {self.rig_file!r} is not a path"
+            raise EnvError(what, where=WHERE, remedy="give the path of a rig description (TOML)")
         if self.reading_variance < LEAST_DEVIATION**2:
             raise EnvError(
                 f"noise_std and resolution together are below {LEAST_DEVIATION:g} rad",
+                where=WHERE,
                 remedy="increase one of them: without noise a record holds infinite information",
             )
         _whole("control_period", self.control_period * self.sample_rate, "sample intervals")
         _whole("duration", self.duration / self.control_period, "control periods")
         if self.steps < 2:
-            raise EnvError("duration is one control period", remedy="give a longer run")
-        Prior.changed(self.prior)
+            raise EnvError("duration is one control period", where=WHERE, remedy="give a longer run")
+        refuse_long(self.duration, self.sample_rate, "duration", WHERE)
+        Prior.changed(self.prior, WHERE)
 
     @property
     def samples_per_step(self) -> int:
@@ -129,13 +137,28 @@ def free_decay_config(arguments: Mapping[str, Any], beside: Iterable[str] = ()) 
         beside: names that the environment takes beside them, for the remedy.
     """
     known = [item.name for item in fields(FreeDecayConfig)]
-    refuse_unknown(arguments, (*known, *beside), "FreeDecay-v0")
+    refuse_unknown(arguments, (*known, *beside), WHERE)
     return FreeDecayConfig(**arguments)
 
 
 def _whole(name: str, count: float, of: str) -> None:
     if round(count) < 1 or abs(count - round(count)) > 1e-9 * count:
-        raise EnvError(f"{name} is {count:g} {of}", remedy=f"make it a whole number of {of}")
+        remedy = f"make it a whole number of {of}"
+        raise EnvError(f"{name} is {count:g} {of}", where=WHERE, remedy=remedy)
+
+
+def refuse_long(duration: float, rate: float, name: str, where: str) -> None:
+    """Refuse a run of more samples than one record may have.
+
+    Args:
+        duration: s.
+        rate: Hz.
+    """
+    if not duration * rate <= limits.RUN_SAMPLES:
+        what = f"{name} = {duration:g} s at {rate:g} Hz is longer than a record can be"
+        longest = limits.RUN_SAMPLES / rate
+        remedy = f"give at most {longest:g} s: the samples of a record are {limits.RUN_SAMPLES:,} at most"
+        raise EnvError(what, where=where, remedy=remedy)
 
 
 OPTIONS = ("spring", "spring_stiffness", "wind_speed", "air_density", "release_angle", "truth", "effects")
@@ -258,12 +281,7 @@ def _number(
     """A given number, checked; if none is given, a drawn one, or the first bound without a generator."""
     if given.get(name) is None:
         return float(rng.uniform(*bounds)) if rng is not None else bounds[0]
-    value = given[name]
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not (number and isfinite(value) and least <= value <= most):
-        remedy = f"give a number from {least:g} to {most:g} in SI units"
-        raise EnvError(f"{value!r} is out of range", where=f"option {name}", remedy=remedy)
-    return float(value)
+    return Number(least, most, unit="SI units").checked(given[name], name, f"option {name}")
 
 
 def _effects(

@@ -12,10 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from tunnel_sim.envs import EnvError, arguments_of
-from tunnel_sim.envs.conditions import free_decay_config
+from tunnel_sim.envs.conditions import WHERE, free_decay_config
 from tunnel_sim.envs.engines import ManyRuns, Models, OneRun, action_space, operator_action
 from tunnel_sim.envs.episodes import Episodes, EpisodeState, observation_space
 from tunnel_sim.envs.rendering import RENDER_MODES, RigView, render_modes
+from tunnel_sim.vocabulary.arguments import COUNT, Number
 from tunnel_sim.vocabulary.errors import counted
 from tunnel_sim.vocabulary.record import Array, Record
 
@@ -154,7 +155,10 @@ class FreeDecayVectorEnv(VectorEnv[Array, Any, Any]):
         self.config = free_decay_config(arguments, arguments_of(FreeDecayVectorEnv))
         self.rig = self.config.rig()
         self.metadata = {**self.metadata, "render_fps": render_fps(self.config.control_period)}  # type: ignore[misc]
-        self.num_envs, self.render_mode = num_envs, render_mode
+        self.num_envs, self.render_mode = int(COUNT.checked(num_envs, "num_envs", WHERE)), render_mode
+        if max_episode_steps is not None:
+            COUNT.checked(max_episode_steps, "max_episode_steps", WHERE)
+        Number(whole=True).checked(nthread, "nthread", WHERE)
         self._most_steps = max_episode_steps
         self.single_observation_space = observation_space(self.config)
         self.observation_space = batch_space(self.single_observation_space, num_envs)

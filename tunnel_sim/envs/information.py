@@ -10,13 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from math import isfinite
 
 import numpy as np
 
-from tunnel_sim.envs import EnvError
 from tunnel_sim.physics.run_settings import RunSettings
-from tunnel_sim.vocabulary.errors import did_you_mean
+from tunnel_sim.vocabulary.arguments import Number, checked_names
 from tunnel_sim.vocabulary.record import Array
 from tunnel_sim.vocabulary.rig import Body
 
@@ -64,16 +62,12 @@ class Prior:
     cn_r: float = 0.5
 
     @staticmethod
-    def changed(changes: Mapping[str, float]) -> Prior:
-        """The prior with some of its standard deviations changed."""
+    def changed(changes: Mapping[str, float], where: str = "prior") -> Prior:
+        """The prior with some of its standard deviations changed; ``where`` is for errors."""
         known = [item.name for item in fields(Prior)]
-        for name, value in changes.items():
-            if name not in known:
-                raise EnvError(f"unknown prior {name!r}", where="prior", remedy=did_you_mean(name, known))
-            least = 0.0 if name not in ("cn_beta", "cn_r") else 1e-300
-            if not isinstance(value, int | float) or not isfinite(value) or value < least:
-                what = f"{name} = {value!r} is not a standard deviation"
-                raise EnvError(what, where="prior", remedy="give it, SI units")
+        for name, value in checked_names(changes, known, "prior", where).items():
+            deviation = Number(above=name in ("cn_beta", "cn_r"), unit="SI units")
+            deviation.checked(value, f"prior of {name}", where)
         return replace(Prior(), **changes)
 
     def scales(self, run: RunSettings) -> Array:

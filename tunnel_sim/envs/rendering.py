@@ -18,6 +18,7 @@ import numpy as np
 from tunnel_sim.engine.model import build_model
 from tunnel_sim.envs import EnvError
 from tunnel_sim.physics.run_settings import RodTwist, RunSettings
+from tunnel_sim.vocabulary.arguments import COUNT
 from tunnel_sim.vocabulary.errors import did_you_mean
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.rig import Rig
@@ -43,6 +44,8 @@ class RigView:
         if mode is not None and mode not in RENDER_MODES:
             remedy = did_you_mean(str(mode), RENDER_MODES)
             raise EnvError(f"unknown mode {mode!r}", where="render_mode", remedy=remedy)
+        for name, pixels in (("width", width), ("height", height)):
+            COUNT.checked(pixels, name, "render_mode")
         self._rig, self._mode, self._period = rig, mode, period
         self._width, self._height, self._camera = width, height, camera
         self._model: Any = None

@@ -228,7 +228,7 @@ def read_campaign(folder: Path | str, progress: Callable[[int, int], None] | Non
                 what = f"drive_gain = {run.drive_gain:g} of the column {held.input_column}"
                 remedy = "give drive_gain of a column drive only, in N m per unit, not zero"
                 raise TunnelError(what, where=where, remedy=remedy)
-            drive = Drive(held.input_column, held.input, run.drive_hold or "linear", run.drive_gain)
+            drive = Drive(held.input_column, held.input, run.drive_hold, run.drive_gain)
         elif run.drive_hold is not None or run.drive_gain is not None:
             what = f"{'drive_gain' if run.drive_hold is None else 'drive_hold'} without an input column"
             remedy = "add a column moment_nm, drive or base_rad to the run file, or leave the key out"

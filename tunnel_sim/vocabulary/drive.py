@@ -36,17 +36,23 @@ class Drive:
 
     Args:
         values: at the times of the record, shape (n,): N m, any unit, or rad, as ``column`` says.
+        hold: between the samples; None: not stated, and taken as linear.
         gain: N m per unit of a ``drive``; None where it is not stated.
     """
 
     column: InputColumn
     values: Array
-    hold: Hold = "linear"
+    hold: Hold | None = None
     gain: float | None = None
 
     def __post_init__(self) -> None:
         """Copy the values and make them read-only."""
         object.__setattr__(self, "values", read_only(self.values))
+
+    @property
+    def held(self) -> bool:
+        """Whether the input keeps its value between samples; else it is linear."""
+        return self.hold == "zero"
 
     @property
     def on_body(self) -> bool:

@@ -12,11 +12,13 @@ import numpy as np
 from diagnosis.likelihood.least_squares import Fit, try_fit
 from diagnosis.likelihood.residuals import ChannelMisfit, misfit
 from diagnosis.model.blocks import without_long_rest
+from diagnosis.model.chance import Scatter
 from diagnosis.search.clock import Clock
 from diagnosis.search.grow import grow
 from diagnosis.search.hypothesis import Hypothesis, Scale, polish, with_forms
 from diagnosis.search.prepared import Prepared
 from diagnosis.search.random_moments import weigh_random_moments, without_the_random_moment
+from diagnosis.search.reach import left_by_all
 from diagnosis.search.scatter import (
     evident,
     likelier,
@@ -98,11 +100,15 @@ class WholeRuns(View):
         if self.unscattered is not None or self.first is not None:
             return self.with_moments(super().sets(clock), clock)
         explained: list[Hypothesis] = []
+        beyond: list[float] = []
 
         def enough(level: Sequence[Hypothesis]) -> bool:
-            tried = (self._beside(one) for one in level)
+            beyond.extend(
+                self._beyond_reach(level)
+            )  # with deviations of every run, so nothing beside them is tried
+            tried = () if beyond else (self._beside(one) for one in level)
             explained.extend(one for one in tried if one is not None and self._explains(one))
-            return bool(explained)
+            return bool(explained or beyond)
 
         with clock.step("effects"):
             grown = grow(self, clock.progress, enough)
@@ -113,21 +119,42 @@ class WholeRuns(View):
         if explained:
             scale = Scale.of(explained, self._scattering_gap, self.base.settings.weighing)
             return self._beside_scatter(likely, max(explained, key=scale.weight), clock)
-        plain = self.with_moments(Sets(self, tuple(grown)), clock)
-        if plain.weighed[0].effects != UNKNOWN or self.scattering is None:
+        found = Sets(self, tuple(grown), left_by_all=beyond[0] if beyond else None)
+        plain = self.with_moments(found, clock)
+        if plain.weighed[0].effects != UNKNOWN or beyond or self.scattering is None:
             return plain
         beside = self._beside_scatter(likely, None, clock)
         return plain if beside.weighed[0].effects == UNKNOWN else beside
+
+    def _beyond_reach(self, level: Sequence[Hypothesis]) -> list[float]:
+        """The least share of the gap that all effects together leave, where no larger set could be the cause.
+
+        It is asked for where the sets of a level leave most of the gap; else empty.
+        """
+        chosen, gap = self.base.settings.search, self.base.total - self.base.count
+        if any(not one.effects or one.fit.total - one.fit.count < chosen.reach_from * gap for one in level):
+            return []
+        left = left_by_all(self.base, self.able, self.prepared.kinds)
+        return [left] if left > chosen.out_of_reach else []
 
     def _beside(self, one: Hypothesis) -> Hypothesis | None:
         """A set beside chance differences between the runs, its forms free where the runs need that.
 
         None where the runs do not differ, or the fit fails.
         """
-        base = self.scattering
-        if base is None or not one.effects:
-            return None if base is None else Hypothesis((), base, repeating=self.base)
-        fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, base.problem.scatter))
+        if self.scattering is None or not one.effects:
+            return None if self.scattering is None else Hypothesis((), self.scattering, repeating=self.base)
+        if one not in self._fitted_beside:
+            self._fitted_beside[one] = self._fitted_with_deviations(one, self.scattering.problem.scatter)
+        return self._fitted_beside[one]
+
+    @cached_property
+    def _fitted_beside(self) -> dict[Hypothesis, Hypothesis | None]:
+        """Sets beside chance differences, by the set in runs that repeat: some are asked for twice."""
+        return {}
+
+    def _fitted_with_deviations(self, one: Hypothesis, scatter: Scatter) -> Hypothesis | None:
+        fitted = try_fit(*with_deviations(one.fit.problem, one.fit.point, scatter))
         if fitted is None:
             return None
         found = replace(one, fit=settled(fitted), textbook=None, repeating=one.fit)

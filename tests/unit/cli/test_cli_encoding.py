@@ -30,7 +30,7 @@ def printed(encoding: str, *words: object) -> tuple[int, bytes, bytes]:
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("encoding", ["strict latin-1", "C locale"])
 def test_what_cannot_be_encoded_is_replaced(encoding: str, tiny_campaign: Path) -> None:
     status, out, err = printed(encoding, "identify", tiny_campaign)
     assert (status, err) == (0, b"")
@@ -48,7 +48,9 @@ def test_help_lists_and_messages_in_ascii(tmp_path: Path) -> None:
 
 
 def test_json_holds_the_same_document_in_any_encoding(tiny_campaign: Path) -> None:
-    texts = [printed(e, "identify", tiny_campaign, "--json", "-")[1] for e in ("ascii", "cp1252")]
+    done = [printed(e, "identify", tiny_campaign, "--json", "-") for e in ("ascii", "cp1252")]
+    assert [(status, err) for status, _, err in done] == [(0, b"")] * 2
+    texts = [out for _, out, _ in done]
     assert texts[0].isascii()
     assert json.loads(texts[0]) == json.loads(texts[1].decode("cp1252"))
     _, rows, _ = printed("ascii", "identify", tiny_campaign, "--format", "json")

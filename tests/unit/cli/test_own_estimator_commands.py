@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,8 +17,10 @@ from identification.datasets import measured_campaign
 from identification.estimators.matrix_pencil import MatrixPencil
 from tests.reference.free_decays import TWELVE, campaign
 from tests.unit.sweep.small_sweep import SMALL
-from tunnel_lab.experiments import breakdown, score_trials
+from tunnel_lab.experiments import breakdown, runner, score_trials
+from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.score_grid import load_grid
+from tunnel_lab.experiments.sweep import run_sweep
 from tunnel_lab.experiments.sweep_cases import read_sweep
 from tunnel_sim import TunnelError
 
@@ -63,6 +66,24 @@ class Leaves:
 
     def estimate(self, campaign):
         raise SystemExit(3)
+
+
+class NotANumber(Mine):
+    name = "not_a_number"
+
+    def estimate(self, campaign):
+        found = super().estimate(campaign)
+        runs = [replace(run, zeta=replace(run.zeta, value=float("nan"))) for run in found.runs]
+        return replace(found, runs=tuple(runs))
+
+
+class Dies:
+    name = "dies"
+
+    def estimate(self, campaign):
+        import os
+
+        os._exit(9)
 '''
 GRID = """
 schema_version = 1
@@ -164,9 +185,46 @@ def test_the_breakdown_takes_it_into_its_processes(folder: Path) -> None:
     mine, broken = ([row for row in rows if row["estimator"] == name] for name in names)
     assert all(row["value"] is not None for row in mine)
     assert {row["status"] for row in broken} == {"raised TypeError"}
-    said, traceback = score_trials.raised_lines(rows)
+    said, traceback = score_trials.failure_lines(rows)
     assert said == "broken raised an exception once; counted as failures. The first:"
     assert RAISED in traceback
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_wrong_return_is_one_line_in_every_command(tunnel, tiny_campaign: Path) -> None:
+    said = r"estimator not_a_number: zeta of run \S+ with campaign .* is nan ± .*; give None and a status"
+    status, out, err = tunnel("identify", tiny_campaign, "-e", "own_method:NotANumber")
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert re.match(f"tunnel: {said}", err)
+    status, out, err = tunnel("score", "grid.toml", "--jobs", "0", "-e", "own_method:NotANumber")
+    assert status == 0
+    assert "not_a_number returned no valid estimate 4 times; counted as failures. The first:\n" in err
+    assert re.search(said, err)
+    assert "Traceback" not in err
+
+
+def test_a_wrong_return_fails_a_sweep(folder: Path) -> None:
+    sys.path.insert(0, str(folder))
+    names = [estimators.register_from(f"own_method:{kind}") for kind in ("NotANumber", "Mine")]
+    outcome = run_sweep(read_sweep(folder / "small.toml", names), folder / "out", processes(0))
+    (failed,) = outcome.failed
+    assert (failed.status, failed.of_the_estimator) == ("wrong_return", True)
+    rows = outcome.store.scan().collect().filter(estimator="not_a_number")
+    assert (set(rows["status"]), failed.count) == ({"wrong_return"}, rows["case"].n_unique())
+    assert "is nan ±" in rows["message"][0]
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_process_that_dies_is_one_line(tunnel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that an estimator ends is not a traceback, and its work is tried again."""
+    monkeypatch.setattr(runner, "PATIENCE", 2)  # of the three times
+    status, out, err = tunnel("score", "grid.toml", "--jobs", "1", "-e", "own_method:Dies")
+    lost, last = err.splitlines()
+    assert (status, out) == (2, "")
+    assert lost == "tunnel: a worker process was lost; its tasks are repeated"
+    assert last.startswith(
+        "tunnel: worker processes died 2 times without finishing a task; give fewer --jobs"
+    )
 
 
 @pytest.mark.slow

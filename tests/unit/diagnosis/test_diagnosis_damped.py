@@ -6,6 +6,8 @@ from diagnosis import diagnose
 from tests.unit.gap_campaigns import CN_BETA, campaign
 from tunnel_sim.effects import effect_from
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 
 @pytest.mark.parametrize(
     ("name", "parameters"),

@@ -300,28 +300,29 @@ def test_turbulence_that_misleads_the_fit_of_still_air_is_tried_where_it_is_stea
     assert len(settled) == 1
 
 
+DRIFT = effect_from("sensor_drift", {"drift": 0.01})
+SPRING = effect_from("cubic_stiffness", {"coefficient": 0.1})
+
+
+@pytest.fixture(scope="module")
+def drifting():
+    return nominal(buffeted(campaign(DRIFT, SPRING), 0.003, 3.0))
+
+
 @pytest.mark.parametrize("order", [(1, 2, 1), (2, 1, 2)])
-def test_of_sets_that_the_rounds_go_to_and_fro_between_the_likeliest_is_taken(monkeypatch, order):
+def test_of_sets_that_the_rounds_go_to_and_fro_between_the_likeliest_is_taken(monkeypatch, drifting, order):
     """One round finds the drift alone, the next the spring beside it; both act beside turbulence."""
-    drift, spring = (
-        effect_from(name, {parameter: value})
-        for name, parameter, value in (
-            ("sensor_drift", "drift", 0.01),
-            ("cubic_stiffness", "coefficient", 0.1),
-        )
-    )
-    base = nominal(buffeted(campaign(drift, spring), 0.003, 3.0))
     turns = iter(order)
 
     def grown(view):
-        found, chosen = view.base, (type(drift), type(spring))[: next(turns)]
+        found, chosen = view.base, (type(DRIFT), type(SPRING))[: next(turns)]
         for kind in chosen:
             point = starting_points(found, kind)[0]
             found = fit(point.problem, point.point)
         return [Hypothesis(tuple(kind.name for kind in chosen), found)]
 
     monkeypatch.setattr(random_moments, "grow", grown)
-    (answer,) = weigh_random_moments(whole_runs(base, BUFFETING), [])
+    (answer,) = weigh_random_moments(whole_runs(drifting, BUFFETING), [])
     assert answer.effects == ("buffeting", "cubic_stiffness", "sensor_drift")
 
 

@@ -27,6 +27,8 @@ from tunnel_sim.vocabulary.campaign import Repeatability
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 #: Effects of every channel and unit, of a size that shows. Their wind speeds and angles stay as they are.
 SHOWN = {
     "coulomb_friction": {"friction_moment": 0.05},

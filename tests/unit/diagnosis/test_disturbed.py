@@ -36,7 +36,10 @@ from tunnel_sim.vocabulary.campaign import Campaign
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 CHOSEN = Settings().selection
+FEW = tuple(map(effect_class, ("coulomb_friction", "cubic_stiffness")))
 FOREIGN = Path(__file__).parents[2] / "data" / "foreign"
 
 
@@ -162,9 +165,8 @@ def test_a_blow_soon_after_the_release_leaves_the_run_out() -> None:
 
 
 def test_the_causes_beside_a_blow_are_those_planted() -> None:
-    kinds = tuple(map(effect_class, ("coulomb_friction", "cubic_stiffness")))
     data = read_campaign(FOREIGN / "disturbed")
-    found = diagnose(data, kinds=kinds).to_json_dict()
+    found = diagnose(data, kinds=FEW).to_json_dict()
     assert (found["causes"], found["decided"]) == (["coulomb_friction", "cubic_stiffness"], True)
     assert [one["run"] for one in found["disturbed"]] == ["r07"]
     assert found["verdict"].startswith("Run r07 was disturbed at 5.4")
@@ -219,7 +221,7 @@ def test_a_run_without_which_the_model_is_not_determined_is_used_and_named(monke
     monkeypatch.setattr(disturbed_runs, "prepared_and_tested", of_all_runs_only)
     struck = with_blow(campaign(), 5e-3, 4.0, "r2")
     assert max(run.record.time_s[-1] for run in struck.runs) > 9.0
-    found = diagnose(struck).to_json_dict()
+    found = diagnose(struck, kinds=FEW).to_json_dict()
     (one,) = found["disturbed"]
     assert (one["run"], one["kept_until_s"], one["used"]) == ("r2", None, True)
     assert "is used all the same: the other runs do not determine the model." in verdict(found, "")

@@ -20,6 +20,8 @@ from diagnosis.model.run_noise import WhiteNoise
 from tunnel_sim.vocabulary.campaign import Campaign, RigProperties, Run, SensorProperties
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 

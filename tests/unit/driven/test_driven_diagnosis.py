@@ -21,6 +21,8 @@ from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 RATE, INERTIA, DAMPING, SPRING, GAIN, NOISE = 100.0, 0.1, 0.05, 16.0, 0.5, 3e-4
 TIME = np.arange(1200) / RATE
 

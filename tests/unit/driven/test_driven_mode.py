@@ -20,6 +20,8 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import AeroDerivatives
 from tunnel_sim.vocabulary.record import Array, Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 OMEGA, ZETA = 40.0, 0.02
 RINGING = OMEGA * sqrt(1.0 - ZETA**2)
 RATE, INERTIA, DAMPING, NOISE = 100.0, 0.1, 0.05, 3e-4

@@ -17,6 +17,8 @@ from tunnel_sim.files.plan_file import load_plan
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import CampaignPlan, EffectSetting
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 PLAN = """
 name = "driven"
 seed = 3

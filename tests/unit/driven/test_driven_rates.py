@@ -17,6 +17,8 @@ from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 RATE, INERTIA, DAMPING, SPRING, NOISE, ZERO = 200.0, 0.1, 0.05, 16.0, 2e-3, 0.01
 TIME = np.arange(1500) / RATE
 RIG = RigProperties(yaw_inertia=INERTIA)

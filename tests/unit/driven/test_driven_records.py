@@ -23,7 +23,9 @@ FREE = 0.3 * np.exp(-0.1 * TIME) * np.cos(12.0 * TIME)
 
 
 def campaign(drive: Drive | None = None, spring: float | None = 16.0) -> Campaign:
-    driven = Run("driven", Record(TIME, RESPONSE), 0.0, spring, drive=drive or Drive("moment_nm", INPUT))
+    driven = Run(
+        "driven", Record(TIME, RESPONSE), 0.0, spring, drive=drive or Drive("moment_nm", INPUT, "linear")
+    )
     free = Run("free", Record(TIME, FREE), 0.0, 16.0, release_angle=0.3)
     return Campaign("mixed", RigProperties(), SensorProperties(100.0), (driven, free))
 
@@ -210,14 +212,29 @@ def test_columns_are_named_as_written_or_by_number(tmp_path: Path, angle: str, n
 
 
 def test_the_number_of_the_input_is_not_that_of_the_angle(tmp_path: Path) -> None:
-    with pytest.raises(TunnelError, match="no column '2' for the input"):
+    said = r"'2' is the column 'q.*', from which the angle is read; give --input with"
+    with pytest.raises(TunnelError, match=said):
         read_records([logged(tmp_path)], ImportChoices(angle=("q",), input="2"))
+    with pytest.raises(TunnelError, match=r"'1' is the column .*, from which the times are read"):
+        read_records([logged(tmp_path)], ImportChoices(angle=("q",), input="1"))
+    with pytest.raises(TunnelError, match="no column '9' for the input"):
+        read_records([logged(tmp_path)], ImportChoices(angle=("q",), input="9"))
+
+
+def test_a_letter_in_a_robots_log_is_no_wind(tmp_path: Path) -> None:
+    rows = np.column_stack([TIME, RESPONSE, INPUT, 3.0 + 0.1 * np.sin(TIME)])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="t [s],q [rad],tau [Nm],u", comments="")
+    found = read_records([tmp_path / "log.csv"])
+    assert found.campaign.runs[0].wind_speed == 0.0
+    said = "\n".join(found.remarks())
+    assert "'u' is left out: it may be wind_speed or an input, but has no unit" in said
+    assert "--set wind_speed=u uses it, --input u if it drives the body" in said
 
 
 def test_the_hold_of_an_input_is_asked_for(tmp_path: Path) -> None:
     path = logged(tmp_path)
     found = read_records([path], ImportChoices(input="3"))
-    assert any("linear between samples is assumed; --input-hold zero" in line for line in found.remarks())
+    assert any("not stated, linear is assumed; --input-hold zero" in line for line in found.remarks())
     found = read_records([path], ImportChoices(input="3", input_hold="zero"))
     assert found.campaign.runs[0].drive is not None
     assert found.campaign.runs[0].drive.hold == "zero"
@@ -230,6 +247,7 @@ def test_the_import_of_a_joint_speaks_of_no_wind(tmp_path: Path) -> None:
     for word in ("Cn", "frontal_area", "reference_length", "air_density", "width"):
         assert word not in text
     assert "0 for a joint without a spring" in text
+    assert "# drive_hold =" in text
     assert not any("wind" in line for line in imported.remarks())
     assert "V\n[m/s]" not in parts_table(imported).columns
     read_campaign(tmp_path / "joint")

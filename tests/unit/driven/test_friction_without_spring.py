@@ -22,6 +22,8 @@ from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
+pytestmark = pytest.mark.usefixtures("causes_alone")
+
 RATE, STEPS, INERTIA, DAMPING, OFFSET, FRICTION, NOISE = 100.0, 5, 2.0, 3.0, 0.4, 1.0, 3e-3
 TIME = np.arange(2000) / RATE
 

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from diagnosis import diagnose, vocabulary
 from diagnosis.diagnosable import kinds_for
 from diagnosis.model.rig import Rig
+from diagnosis.words.verdict import headline
 from tests.marks import slow
 from tunnel_sim.effects import ALL_EFFECTS, Effect, the_effect
 from tunnel_sim.engine.virtual_campaign import plan_effects
@@ -20,6 +21,8 @@ from tunnel_sim.vocabulary.drive import Drive
 from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.plan import EffectSetting
 from tunnel_sim.vocabulary.record import Record
+
+pytestmark = pytest.mark.usefixtures("causes_alone")
 
 RATE, INERTIA, DAMPING, SPRING, NOISE = 500.0, 0.1, 0.05, 16.0, 3e-4
 TIME = np.arange(6000) / RATE
@@ -72,6 +75,8 @@ def test_it_is_named_with_its_value(delay: float, kinds: Sequence[type[Effect]])
     assert abs(own.value - delay) < 3.0 * own.std < 1e-4
     assert found.gap.closed > 0.99
     assert found.sizes == ()  # it has none in a free decay
+    assert found.found.hold is None  # no hold is wrong by two samples
+    assert headline(found.to_json_dict())[0] == "input delay"
 
 
 @SLOW

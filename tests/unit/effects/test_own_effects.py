@@ -92,7 +92,7 @@ OF_VOLTS = {
         (changed(scatters="wind_speed"), "for the built-in effects between runs"),
         (changed(random="broad_band"), "is a random moment"),
         (changed(**OF_VOLTS), "parameter hardening: unknown unit 'V'"),
-        (int, "is not a class derived from Effect"),
+        (int, "is not a dataclass derived from Effect"),
     ],
 )
 def test_what_cannot_be_an_effect_is_not_registered(kind: type, part: str) -> None:

@@ -136,6 +136,8 @@ def test_the_reward_is_information_less_rig_time():
 
 def test_the_cost_of_a_run_is_the_callers_to_state():
     env = CampaignEnv(**SHORT, costs=Costs(setup=1.0, spring_change=2.0, speed_change=4.0))
+    by_name = CampaignEnv(**SHORT, costs={"setup": 1.0, "spring_change": 2.0, "speed_change": 4.0})
+    assert by_name.conditions.costs == env.conditions.costs
     env.reset(seed=2)
     assert env.step(OFF)[-1]["rig_time_s"] == 12.0
 
@@ -244,10 +246,32 @@ def test_an_option_leaves_the_other_draws_as_they_are():
         ({"seconds_per_nat": -1.0}, "seconds_per_nat"),
         ({"max_runs": 0}, "max_runs"),
         ({"rig": "nowhere.toml"}, "nowhere.toml"),
+        (
+            {"springs": 5},
+            r"Campaign-v0: springs = 5 is not a list of numbers; give one number or more in a list",
+        ),
+        ({"springs": ("soft",)}, r"springs\[0\] = 'soft' is not a whole number"),
+        ({"springs": {5: 1.0}}, "springs = .* is not a list"),
+        ({"wind_speeds": "12"}, "wind_speeds = '12' is not a list"),
+        ({"durations": (1e9,)}, "durations = 1e[+]09 s at .* is longer than a record can be; give at most"),
+        ({"targets": (0.01,)}, r"targets = \(0.01,\) has 1 number, not 2; give 2 numbers"),
+        ({"targets": 0.01}, "targets = 0.01 is not a list"),
+        ({"probability": "sure"}, "probability = 'sure' is not a number above 0 and at most 1"),
+        ({"max_runs": 2.5}, "max_runs = 2.5 is not a whole number"),
+        ({"max_runs": 1e9}, "max_runs = .* is not a whole number from 1 to 10000"),
+        ({"costs": {"setup": -1.0}}, "costs: setup = -1.0 is not a number of 0 or more; .*in s"),
+        ({"costs": {"set_up": 1.0}}, "costs has no 'set_up'; did you mean 'setup'"),
+        ({"costs": 60.0}, "costs = 60.0 is not a mapping"),
+        ({"scatter": 0.1}, "scatter = 0.1 is not a mapping"),
+        ({"preset": ["diagnosis"]}, "unknown preset"),
+        ({"preset": "diagnosis", "severities": {"cubic_stiffness": 0.1}}, "severities.* is not a list"),
+        ({"preset": "diagnosis", "severities": ("cubic_stiffness",)}, "severities = .* is not a mapping"),
+        ({"rig": 5}, "rig = 5 is not a path"),
+        ({"render_mode": "rgb"}, "unknown render_mode 'rgb'; use one of human, rgb_array"),
     ],
 )
 def test_a_bad_argument_is_one_clear_line(arguments, said):
-    with pytest.raises(TunnelError, match=said) as caught:
+    with pytest.raises(TunnelError, match=said) as caught:  # a file that is missing is not a ValueError
         CampaignEnv(**arguments)
     assert "\n" not in str(caught.value)
     assert caught.value.remedy
@@ -258,8 +282,9 @@ def test_a_bad_argument_is_one_clear_line(arguments, said):
     [
         ({"thruth": {}}, "did you mean 'truth'"),
         ({"truth": {"cn_betta": 0.4}}, "did you mean 'cn_beta'"),
-        ({"truth": {"yaw_inertia": -1.0}}, "positive number in kg m2"),
-        ({"truth": {"cn_beta": float("inf")}}, "out of range"),
+        ({"truth": {"yaw_inertia": -1.0}}, "yaw_inertia = -1.0 is not a number above 0; .* in kg m2"),
+        ({"truth": {"cn_beta": float("inf")}}, "truth: cn_beta = inf is not a number; .* in 1/rad"),
+        (3, "reset options = 3 is not a mapping"),
         ({"truth": 3}, "not a mapping"),
         ({"effects": "cubic_stiffness"}, "not a mapping"),
         ({"effects": {"coulomb": {}}}, "coulomb"),
@@ -404,7 +429,7 @@ def test_a_drift_is_complete_at_the_last_run():
 @pytest.mark.parametrize(
     ("scatter", "said"),
     [
-        ({"wind": 0.1}, "scatter has no number 'wind'"),
+        ({"wind": 0.1}, "scatter has no 'wind'; use one of"),
         ({"wind_speed": 2.0}, "wind_speed = 2.0 is out of range"),
     ],
 )

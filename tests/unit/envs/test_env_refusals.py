@@ -10,7 +10,7 @@ import pytest
 from env_episodes import NAME, make
 
 from tunnel_sim.envs import EnvError
-from tunnel_sim.envs.free_decay import FreeDecayEnv
+from tunnel_sim.envs.free_decay import FreeDecayEnv, FreeDecayVectorEnv
 from tunnel_sim.vocabulary.errors import TunnelError
 
 
@@ -32,7 +32,13 @@ from tunnel_sim.vocabulary.errors import TunnelError
         ({"effect_probability": 1.5}, ["probability"]),
         ({"prior": {"cn_bta": 0.1}}, ["did you mean 'cn_beta'"]),
         ({"prior": {"cn_r": 0.0}}, ["cn_r = 0.0"]),
+        ({"prior": 5}, ["FreeDecay-v0: prior = 5 is not a mapping", "give values by name"]),
         ({"rig_file": "nowhere.toml"}, ["nowhere.toml", "no such file"]),
+        ({"rig_file": 5}, ["rig_file = 5 is not a path"]),
+        ({"preset": ["operator"]}, ["unknown preset ['operator']"]),
+        ({"duration": 1e9}, ["FreeDecay-v0: duration = 1e+09 s at 1000 Hz", "give at most 20000 s"]),
+        ({"width": 0}, ["width = 0 is not a whole number of 1 or more"]),
+        ({"height": "tall"}, ["height = 'tall' is not a whole number"]),
     ],
 )
 def test_arguments(arguments: dict[str, Any], parts: list[str]) -> None:
@@ -110,6 +116,21 @@ def test_resets_of_many(reset: dict[str, Any], parts: list[str]) -> None:
     with pytest.raises(EnvError) as refusal:
         envs.reset(**reset)
     assert_one_line(refusal.value, parts)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        ({"num_envs": 0}, ["num_envs = 0 is not a whole number of 1 or more"]),
+        ({"num_envs": 1.5}, ["num_envs = 1.5"]),
+        ({"nthread": -1}, ["nthread = -1 is not a whole number of 0 or more"]),
+        ({"max_episode_steps": "all"}, ["max_episode_steps = 'all'"]),
+    ],
+)
+def test_arguments_of_many(arguments: dict[str, Any], parts: list[str]) -> None:
+    with pytest.raises(EnvError) as refusal:
+        FreeDecayVectorEnv(**arguments)
+    assert_one_line(refusal.value, ["FreeDecay-v0: ", *parts])
 
 
 def test_unknown_camera_and_modes_of_many() -> None:

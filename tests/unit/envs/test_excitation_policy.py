@@ -54,7 +54,7 @@ def test_the_swing_is_kept_whatever_the_inertia(share, release, period):
 @pytest.mark.parametrize("value", [0.0, float("nan")])
 def test_what_is_not_positive_is_refused_in_one_line(name, value):
     given = {"stiffness": 16.0, "inertia": INERTIA, "wind_speed": 0.0, "amplitude": AMPLITUDE} | {name: value}
-    with pytest.raises(EnvError, match=f"{name} = .* is not a positive number"):
+    with pytest.raises(EnvError, match=f"{name} = .* is not a number above 0"):
         Resonant(FreeDecayConfig(), **given)
 
 

@@ -101,75 +101,73 @@ def _nothing(data: Campaign) -> Campaign:
     return data
 
 
+PLAIN = honest()
+"""Four honest runs, the same for all slips."""
 ALL = ("r1", "r2", "r3", "r4")
 ON, OFF = ("r2", "r4"), ("r1", "r3")
 WIND = {"wind_speed": 15.0, "air_density": 1.2}
 
 TABLE: dict[str, Case] = {
-    "springs in N mm/rad": Case(honest(), scaling(spring_stiffness=1e3), "Cn_beta = 495", ON, refused=False),
-    "springs in N cm/rad": Case(honest(), scaling(spring_stiffness=1e2), "Cn_beta = 49.5", ON, refused=False),
+    "springs in N mm/rad": Case(PLAIN, scaling(spring_stiffness=1e3), "Cn_beta = 495", ON, refused=False),
+    "springs in N cm/rad": Case(PLAIN, scaling(spring_stiffness=1e2), "Cn_beta = 49.5", ON, refused=False),
     "springs in N m/deg": Case(
-        honest(), scaling(spring_stiffness=np.pi / 180.0), "spring_stiffness in N m/deg", OFF, refused=False
+        PLAIN, scaling(spring_stiffness=np.pi / 180.0), "spring_stiffness in N m/deg", OFF, refused=False
     ),
-    "time in minutes": Case(honest(), clocking(lambda t: t / 60.0), "time_s in minutes", OFF, refused=False),
+    "time in minutes": Case(PLAIN, clocking(lambda t: t / 60.0), "time_s in minutes", OFF, refused=False),
     "fan off in every run": Case(
         _speeds(0.0, 0.0, 0.0, 0.0), stating(*ON, **WIND), "check whether the fan was on", ON, refused=False
     ),
-    "one speed in km/h": Case(
-        honest(), stating("r2", wind_speed=54.0), "54 of r2 as 15 m/s (in km/h)", ("r2",)
-    ),
+    "one speed in km/h": Case(PLAIN, stating("r2", wind_speed=54.0), "54 of r2 as 15 m/s (in km/h)", ("r2",)),
     "one speed of the stiff spring in km/h": Case(
-        honest(), stating("r4", wind_speed=54.0), "54 of r4 as 15 m/s (in km/h)", ("r4",)
+        PLAIN, stating("r4", wind_speed=54.0), "54 of r4 as 15 m/s (in km/h)", ("r4",)
     ),
-    "1.5 for 15 m/s": Case(honest(), stating("r2", wind_speed=1.5), "1.5 of r2 as 15 m/s", ("r2",)),
+    "1.5 for 15 m/s": Case(PLAIN, stating("r2", wind_speed=1.5), "1.5 of r2 as 15 m/s", ("r2",)),
     "wind labels exchanged": Case(
-        honest(),
+        PLAIN,
         both(stating(*OFF, **WIND), stating(*ON, wind_speed=0.0)),
         "the runs with the wind on and off are exchanged",
         ALL,
     ),
     "wind labels exchanged of one spring": Case(
-        honest(),
+        PLAIN,
         exchanged("r1", "r2", "wind_speed", "air_density"),
         "wind_speed of r1 and r2 exchanged",
         ("r1", "r2"),
     ),
-    "one sign inverted": Case(
-        honest(), reading(lambda y: -y, "r2"), "sign of the sensor is inverted", ("r2",)
-    ),
+    "one sign inverted": Case(PLAIN, reading(lambda y: -y, "r2"), "sign of the sensor is inverted", ("r2",)),
     "one sign inverted, release stated": Case(
         honest(release=True), reading(lambda y: -y, "r2"), "sign of the sensor is inverted", ("r2",)
     ),
     "half of the runs mirrored": Case(
-        honest(), reading(lambda y: -y, "r1", "r2"), "sign of the sensor is inverted", ("r1", "r2")
+        PLAIN, reading(lambda y: -y, "r1", "r2"), "sign of the sensor is inverted", ("r1", "r2")
     ),
     "one spring's label wrong": Case(
-        honest(), stating("r2", spring_stiffness=44.84), "44.84 of r2 as 16.12 N m/rad", ("r2",)
+        PLAIN, stating("r2", spring_stiffness=44.84), "44.84 of r2 as 16.12 N m/rad", ("r2",)
     ),
     "last third zeros": Case(
-        honest(), reading(padded(1.0 / 3.0)), "the reading stands at 0 rad", ("r1",), refused=False
+        PLAIN, reading(padded(1.0 / 3.0)), "the reading stands at 0 rad", ("r1",), refused=False
     ),
     "last third held": Case(
-        honest(), reading(padded(1.0 / 3.0, None), "r3"), "the reading stands at", ("r3",), refused=False
+        PLAIN, reading(padded(1.0 / 3.0, None), "r3"), "the reading stands at", ("r3",), refused=False
     ),
     "repeated with noise of 1e-9": Case(
-        honest(), _with_noise(1e-9), "so counted once", ("again",), refused=False
+        PLAIN, _with_noise(1e-9), "so counted once", ("again",), refused=False
     ),
     "repeated and rounded": Case(
-        honest(), twice(lambda t, y: (t, np.round(y, 4))), "so counted once", ("again",), refused=False
+        PLAIN, twice(lambda t, y: (t, np.round(y, 4))), "so counted once", ("again",), refused=False
     ),
     "repeated and cut by 50 samples": Case(
-        honest(), twice(lambda t, y: (t[50:], y[50:])), "so counted once", ("again",), refused=False
+        PLAIN, twice(lambda t, y: (t[50:], y[50:])), "so counted once", ("again",), refused=False
     ),
     "repeated times 1.001": Case(
-        honest(), twice(lambda t, y: (t, 1.001 * y)), "so counted once", ("again",), refused=False
+        PLAIN, twice(lambda t, y: (t, 1.001 * y)), "so counted once", ("again",), refused=False
     ),
-    "wraps at pi": Case(honest(), reading(wrapped()), "jumps by whole turns", ALL, refused=False),
+    "wraps at pi": Case(PLAIN, reading(wrapped()), "jumps by whole turns", ALL, refused=False),
     "clock drifts by 0.5 %": Case(_clock(0.005), _nothing, "the clock of the logger drifts", ALL),
-    "AC-coupled": Case(honest(), reading(high_passed(1.0, held=False)), "AC-coupled", ALL),
-    "AC-coupled, held before": Case(honest(), reading(high_passed(1.0, held=True)), "AC-coupled", ALL),
+    "AC-coupled": Case(PLAIN, reading(high_passed(1.0, held=False)), "AC-coupled", ALL),
+    "AC-coupled, held before": Case(PLAIN, reading(high_passed(1.0, held=True)), "AC-coupled", ALL),
     "resolution of 0.5 rad": Case(
-        honest(), sensing(resolution=0.5), "resolution = 0.5 rad contradicts", ("r1",), refused=False
+        PLAIN, sensing(resolution=0.5), "resolution = 0.5 rad contradicts", ("r1",), refused=False
     ),
     "release on the other side": Case(
         honest(release=True), stating("r2", release_angle=-0.26), "the other side", ("r2",), refused=False
@@ -177,23 +175,23 @@ TABLE: dict[str, Case] = {
 }
 
 FURTHER: dict[str, Case] = {
-    "one speed in mph": Case(honest(), scaling("r4", wind_speed=2.2369), "of r4 as 15 m/s (in mph)", ("r4",)),
-    "one speed in knots": Case(honest(), scaling("r2", wind_speed=1.9438), "of r2 as 15 m/s (in knots)", ("r2",)),
-    "one speed in ft/s": Case(honest(), scaling("r2", wind_speed=3.2808), "of r2 as 15 m/s (in ft/s)", ("r2",)),
-    "150 for 15 m/s": Case(honest(), stating("r4", wind_speed=150.0), "150 of r4 as 15 m/s", ("r4",)),
+    "one speed in mph": Case(PLAIN, scaling("r4", wind_speed=2.2369), "of r4 as 15 m/s (in mph)", ("r4",)),
+    "one speed in knots": Case(PLAIN, scaling("r2", wind_speed=1.9438), "of r2 as 15 m/s (in knots)", ("r2",)),
+    "one speed in ft/s": Case(PLAIN, scaling("r2", wind_speed=3.2808), "of r2 as 15 m/s (in ft/s)", ("r2",)),
+    "150 for 15 m/s": Case(PLAIN, stating("r4", wind_speed=150.0), "150 of r4 as 15 m/s", ("r4",)),
     "fan off in one run": Case(
         _speeds(0.0, 0.0, 0.0, 15.0), stating("r2", **WIND), "15 of r2 as 0 m/s (with the wind off)", ("r2",)
     ),
     "wind on in a wind-off run": Case(
         _speeds(15.0, 15.0, 0.0, 15.0), stating("r1", wind_speed=0.0), "0 of r1 as 15 m/s", ("r1",)
     ),
-    "one spring in N mm/rad": Case(honest(), scaling("r3", spring_stiffness=1e3), "of r3 as 44.84", ("r3",)),
+    "one spring in N mm/rad": Case(PLAIN, scaling("r3", spring_stiffness=1e3), "of r3 as 44.84", ("r3",)),
     "one spring in N m/deg": Case(
-        honest(), scaling("r2", spring_stiffness=np.pi / 180.0), "of r2 as 16.12", ("r2",)
+        PLAIN, scaling("r2", spring_stiffness=np.pi / 180.0), "of r2 as 16.12", ("r2",)
     ),
-    "one spring's decimal point": Case(honest(), scaling("r1", spring_stiffness=0.1), "of r1 as 16.12", ("r1",)),
+    "one spring's decimal point": Case(PLAIN, scaling("r1", spring_stiffness=0.1), "of r1 as 16.12", ("r1",)),
     "a spring's decimal point in all its runs": Case(
-        honest(), scaling("r3", "r4", spring_stiffness=0.1), "4.484 of r3, r4 as 44.84", ("r3", "r4")
+        PLAIN, scaling("r3", "r4", spring_stiffness=0.1), "4.484 of r3, r4 as 44.84", ("r3", "r4")
     ),
     "two of twelve speeds in km/h": Case(
         repeated(), scaling("r4", "r11", wind_speed=3.6), "54 of r4, r11 as 15 m/s (in km/h)", ("r4", "r11")
@@ -215,12 +213,12 @@ FURTHER: dict[str, Case] = {
     "one density's decimal point": Case(
         _several_speeds(), scaling("r3", air_density=10.0), "air_density = 12 of r3 as 1.2", ("r3",)
     ),
-    "one run in minutes": Case(honest(), clocking(lambda t: t / 60.0, "r3"), "time_s of r3 in minutes", ("r3",)),
+    "one run in minutes": Case(PLAIN, clocking(lambda t: t / 60.0, "r3"), "time_s of r3 in minutes", ("r3",)),
     "one run in milliseconds": Case(
-        honest(), clocking(lambda t: 1e3 * t, "r3"), "time_s of r3 in milliseconds", ("r3",)
+        PLAIN, clocking(lambda t: 1e3 * t, "r3"), "time_s of r3 in milliseconds", ("r3",)
     ),
     "one run at another rate": Case(
-        honest(), clocking(lambda t: 2.0 * t, "r2"), "of r2 of a run sampled 2 times as fast", ("r2",)
+        PLAIN, clocking(lambda t: 2.0 * t, "r2"), "of r2 of a run sampled 2 times as fast", ("r2",)
     ),
     "one run in degrees": Case(
         honest([Condition(k, v, release=0.05) for k in SPRINGS for v in SPEEDS]),
@@ -228,60 +226,60 @@ FURTHER: dict[str, Case] = {
         "degrees",
         ("r3",),
     ),
-    "one run backwards": Case(honest(), reading(lambda y: y[::-1], "r1"), "grows with the wind off", ("r1",)),
+    "one run backwards": Case(PLAIN, reading(lambda y: y[::-1], "r1"), "grows with the wind off", ("r1",)),
     "one spring's label in all runs": Case(
-        honest(), stating(spring_stiffness=16.12), "they state equal springs and winds", ALL
+        PLAIN, stating(spring_stiffness=16.12), "they state equal springs and winds", ALL
     ),
-    "no wind in all runs": Case(honest(), stating(wind_speed=0.0), "they state equal springs and winds", ALL),
-    "AC-coupled at 0.3 s": Case(honest(), reading(high_passed(0.3, held=False)), "AC-coupled", ALL),
-    "AC-coupled in one run": Case(honest(), reading(high_passed(3.0, held=False), "r3"), "AC-coupled", ("r3",)),
+    "no wind in all runs": Case(PLAIN, stating(wind_speed=0.0), "they state equal springs and winds", ALL),
+    "AC-coupled at 0.3 s": Case(PLAIN, reading(high_passed(0.3, held=False)), "AC-coupled", ALL),
+    "AC-coupled in one run": Case(PLAIN, reading(high_passed(3.0, held=False), "r3"), "AC-coupled", ("r3",)),
     "clock drifts by -0.3 %": Case(_clock(-0.003), _nothing, "the clock of the logger drifts", ALL),
     "clock of one run drifts": Case(_clock(0.003, (44.84, 0.0)), _nothing, "clock of the logger", ("r3",)),
-    "last tenth zeros": Case(honest(), reading(padded(0.1)), "stands at 0 rad", ("r2",), refused=False),
-    "sensor unplugged": Case(honest(), reading(_unplugged, "r3"), "stands at 0.00", ("r3",), refused=False),
+    "last tenth zeros": Case(PLAIN, reading(padded(0.1)), "stands at 0 rad", ("r2",), refused=False),
+    "sensor unplugged": Case(PLAIN, reading(_unplugged, "r3"), "stands at 0.00", ("r3",), refused=False),
     "reading stuck for a second": Case(
-        honest(), _holding(2000, 2600), "the reading keeps one value", ("r1",), refused=False
+        PLAIN, _holding(2000, 2600), "the reading keeps one value", ("r1",), refused=False
     ),
     "zeros in the middle": Case(
-        honest(), _holding(2000, 2400, 0.0), "the reading keeps one value", ("r1",), refused=False
+        PLAIN, _holding(2000, 2400, 0.0), "the reading keeps one value", ("r1",), refused=False
     ),
-    "repeated with noise of 1e-4": Case(honest(), _with_noise(1e-4), "so counted once", ("again",), refused=False),
+    "repeated with noise of 1e-4": Case(PLAIN, _with_noise(1e-4), "so counted once", ("again",), refused=False),
     "repeated and mirrored": Case(
-        honest(), twice(lambda t, y: (t, -y), "r2"), "so counted once", ("again",), refused=False
+        PLAIN, twice(lambda t, y: (t, -y), "r2"), "so counted once", ("again",), refused=False
     ),
     "repeated under another wind": Case(
-        honest(),
+        PLAIN,
         twice(lambda t, y: (t, np.round(y, 4)), wind_speed=20.0, air_density=1.2),
         "the same record, by its noise",
         ("again",),
     ),
     "repeated and thinned": Case(
-        honest(), twice(lambda t, y: (t[::2], y[::2])), "so counted once", ("again",), refused=False
+        PLAIN, twice(lambda t, y: (t[::2], y[::2])), "so counted once", ("again",), refused=False
     ),
     "its middle repeated": Case(
-        honest(), twice(lambda t, y: (t[500:4000], y[500:4000]), "r3"), "so counted once", ("again",), refused=False
+        PLAIN, twice(lambda t, y: (t[500:4000], y[500:4000]), "r3"), "so counted once", ("again",), refused=False
     ),
     "wraps at a whole turn": Case(
-        honest(),
+        PLAIN,
         reading(lambda y: y % (2.0 * np.pi), "r4"),
         "jumps by whole turns",
         ("r4",),
         refused=False,
     ),
-    "resolution in degrees": Case(honest(), sensing(resolution=0.03), "contradicts", ("r1",), refused=False),
+    "resolution in degrees": Case(PLAIN, sensing(resolution=0.03), "contradicts", ("r1",), refused=False),
     "half of twelve mirrored": Case(
         repeated(), reading(lambda y: -y, "r1", "r2", "r4", "r5", "r7", "r10"), "sign of the sensor", ("r1", "r3")
     ),
     "one of twelve mirrored": Case(repeated(), reading(lambda y: -y, "r8"), "sign of the sensor", ("r8",)),
     "area in cm2": Case(
-        honest(),
+        PLAIN,
         lambda d: replace(d, rig=replace(d.rig, frontal_area=360.0)),
         "frontal_area in cm2",
         OFF,
         refused=False,
     ),
     "length in cm": Case(
-        honest(), lambda d: replace(d, rig=replace(d.rig, reference_length=62.5)), "reference_length in cm", OFF,
+        PLAIN, lambda d: replace(d, rig=replace(d.rig, reference_length=62.5)), "reference_length in cm", OFF,
         refused=False,
     ),
     "springs in kgf m/rad": Case(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
-from slip_cases import FURTHER, TABLE, Case
+from slip_cases import FURTHER, PLAIN, TABLE, Case
 from slip_rig import SPEEDS, SPRINGS, Condition, honest, repeated
 
 from diagnosis import diagnose
@@ -19,9 +20,19 @@ from tunnel_sim.vocabulary.errors import TunnelError
 from tunnel_sim.vocabulary.record import Record
 
 
+@cache
+def plain_is_not_questioned() -> bool:
+    """Of the campaign without a slip that most cases have."""
+    return not examine(PLAIN).remarks
+
+
+def not_questioned(given: Campaign) -> bool:
+    return plain_is_not_questioned() if given is PLAIN else not examine(given).remarks
+
+
 @pytest.mark.parametrize("case", [pytest.param(case, id=name) for name, case in (TABLE | FURTHER).items()])
 def test_a_slip_is_named_with_its_runs(case: Case):
-    assert examine(case.given).remarks == () or case.given is case.campaign
+    assert case.given is case.campaign or not_questioned(case.given)
     found = [remark for remark in examine(case.campaign).remarks if case.says in str(remark)]
     assert found
     assert set(case.runs) <= {name for remark in found for name in remark.runs}

@@ -136,7 +136,7 @@ def test_an_estimator_that_raises_is_a_failure_that_is_named(small, monkeypatch)
 
     monkeypatch.setattr(Conventional, "estimate", fall)
     results = Results(small, NAMES, tuple(score_trials.score_grid(small, NAMES, jobs=0)))
-    said, traceback = score_trials.raised_lines(results.rows)
+    said, traceback = score_trials.failure_lines(results.rows)
     assert said.startswith("conventional raised an exception ")
     assert traceback.endswith("numpy.linalg.LinAlgError: singular")
     assert f"{Path(__file__).name}" in traceback

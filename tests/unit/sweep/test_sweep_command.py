@@ -293,7 +293,7 @@ def test_a_figure_without_quantities_to_draw_is_none() -> None:
 
 def test_the_sweep_package_loads_nothing_heavy() -> None:
     code = (
-        "import sys, tunnel_lab.commands.experiments, tunnel_lab.experiments.runner\n"
+        "import sys, tunnel_lab.commands.sweep, tunnel_lab.experiments.runner\n"
         "print(sorted({'mujoco', 'numpy', 'polars', 'dask', 'distributed'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -19,7 +19,7 @@ import pytest
 from tests.unit.killed import names_of_the_dead
 from tests.unit.sweep.small_sweep import SMALL, contents
 from tunnel_lab.experiments import sweep as engine
-from tunnel_lab.experiments.runner import lasting_processes
+from tunnel_lab.experiments.runner import processes
 from tunnel_lab.experiments.sweep import begin, open_store, run_sweep
 from tunnel_lab.experiments.sweep_cases import Sweep, read_sweep
 from tunnel_sim.vocabulary.errors import TunnelError
@@ -95,8 +95,8 @@ def test_a_lost_process_costs_nothing(sweep: Sweep, here, tmp_path: Path) -> Non
             killed.append(int(mine[0]))
             os.kill(killed[0], signal.SIGKILL)
 
-    run_sweep(sweep, tmp_path / "out", lasting_processes(2, said.append), kill_one)
-    assert said == ["a worker process was lost; its shards are repeated"]
+    run_sweep(sweep, tmp_path / "out", processes(2, said.append), kill_one)
+    assert said == ["a worker process was lost; its tasks are repeated"]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
 
 
@@ -214,13 +214,14 @@ def test_an_estimator_that_crashes_is_a_status(
 
     monkeypatch.setattr(engine, "_estimator", lambda _: Broken())
     outcome = run_sweep(sweep, tmp_path / "out", here)
-    assert outcome.crashes == 12
+    (failed,) = outcome.failed
+    assert (failed.status, failed.count) == ("raised", 12)
     rows = outcome.store.scan().collect()
     assert set(rows["status"]) == {"raised"}
     (message,) = set(rows["message"])
     assert re.fullmatch(r"ZeroDivisionError: planted, test_sweep_engine\.py line \d+", message)
-    assert outcome.first_crash.startswith("Traceback (most recent call last):")
-    assert outcome.first_crash.endswith("ZeroDivisionError: planted")
+    assert failed.first.startswith("Traceback (most recent call last):")
+    assert failed.first.endswith("ZeroDivisionError: planted")
 
 
 def damages(first: Path, second: Path) -> Iterator[None]:

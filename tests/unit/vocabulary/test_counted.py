@@ -20,7 +20,7 @@ PLURAL = re.compile(rf"^ (?:(?:more|further|finished|repeated|missing|driven) )?
 TWO_OR_MORE = {
     "tunnel_lab/commands/about.py",  # the self-check's runs
     "tunnel_lab/commands/demo.py",  # runs of plans in the package
-    "tunnel_lab/commands/experiments.py",  # samples that train a network
+    "tunnel_lab/commands/train.py",  # samples that train a network
     "tunnel_lab/commands/paper.py",  # characters beyond the limit
     "tunnel_lab/plotting/runs.py",  # records that do not fit on a figure
     "tunnel_sim/engine/model_files.py",  # more than one folder

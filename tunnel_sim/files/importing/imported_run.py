@@ -164,7 +164,8 @@ def _check_wind(
         return
     wind_off = "--set wind_speed=0 states wind-off"
     for hint in open_ones:
-        if hint.key == "wind_speed" and hint.value != 0.0:
+        letter = hint.symbol and raw.input is not None  # beside a command it is a velocity or another command
+        if hint.key == "wind_speed" and hint.value != 0.0 and not letter:
             what = f"{hint.what} is left out: {hint.why}; wind-off is not assumed beside it"
             raise Unstated(what, where=where, remedy=f"{hint.use}, {wind_off}")
     if _WIND_ON.search(f"{raw.source.stem} {run}"):
@@ -181,10 +182,10 @@ def _drive(raw: RawRecord, kept: slice, choices: ImportChoices, said: list[str])
         return None
     column, values = raw.input
     order, gain = raw.input_facts.get("drive_hold"), raw.input_facts.get("drive_gain") or None
-    hold: Hold = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else "linear")
+    hold: Hold | None = choices.input_hold or (HOLDS[int(order)] if order in (0.0, 1.0) else None)
     gain = gain if column == "drive" else None
     if choices.input_hold is None:
-        asked = "linear between samples is assumed; --input-hold zero if a controller holds each command"
+        asked = "not stated, linear is assumed; --input-hold zero if a controller holds each command"
         said.append(f"drive_hold = {hold} from the file" if order in (0.0, 1.0) else f"drive_hold: {asked}")
     said += [] if gain is None else [f"drive_gain = {gain:g} from the file"]
     return Drive(column, values[kept], hold, gain)

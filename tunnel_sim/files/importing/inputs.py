@@ -62,7 +62,15 @@ def find_input(
     others = [channel for channel in channels if all(channel is not one for one in beside)]
     if choices.input is not None:
         named = stated_input(channels, choices)
-        if named is None or all(named is not one for one in others):
+        if named is not None and all(named is not one for one in others):
+            use = "times are" if named is beside[0] else "angle is"
+            column = f"'{one_line(choices.input, 40)}' is the column '{one_line(named.name, 40)}'"
+            what = f"{column}, from which the {use} read"
+            remedy = (
+                "give --input with the name or number of another column, or --angle with that of the angle"
+            )
+            raise TunnelError(what, where=where, remedy=remedy)
+        if named is None:
             what = f"no column '{one_line(choices.input, 40)}' for the input"
             remedy = f"--input: {did_you_mean(choices.input, {c.name for c in others})}"
             raise TunnelError(what, where=where, remedy=remedy)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -230,10 +230,15 @@ _RUN = {
     "air_density": "kg/m3: needed for Cnβ and Cnr",
     "release_angle": "rad, nominal; optional",
 }
+_OF_INPUT = {
+    "drive_gain": "N m per unit of a column drive; estimated where it is not stated",
+    "drive_hold": "'zero' if a controller holds each command, 'linear' if the input moves between samples; "
+    "linear is assumed where it is not stated",
+}
 _RIG_OF_JOINT = {"yaw_inertia": "kg m2, nominal inertia about the joint; optional"}
 _RUN_OF_JOINT = {
     "spring_stiffness": "N m/rad: 0 for a joint without a spring",
-    "drive_gain": "N m per unit of a column drive; estimated where it is not stated",
+    **_OF_INPUT,
 }
 """Of driven runs in still air: no coefficient of the wind is sought in them."""
 ORIGINAL = "# Original: "
@@ -270,6 +275,7 @@ def write_imported(
 ) -> None:
     """Write what was read as a campaign, with its recipe; arguments as in `import_records`."""
     samples = sum(run.record.time_s.size for run in imported.campaign.runs)
+    driven = {run.id for run in imported.campaign.runs if run.drive is not None}
     recipe = {
         "schema_version": 1,
         "choices": imported.choices.model_dump(exclude_none=True, exclude_defaults=True),
@@ -286,7 +292,7 @@ def write_imported(
         folder,
         run_format="csv" if samples <= _AS_TEXT else "parquet",
         overwrite=overwrite,
-        text=lambda document: campaign_text(document, originals(imported)),
+        text=lambda document: campaign_text(document, originals(imported), driven),
         beside=beside,
         checked=True,
     )
@@ -297,11 +303,15 @@ def originals(imported: Imported) -> list[str]:
     return [f"{ORIGINAL}{one_line(s.path.name)}, SHA-256 {s.sha256}" for s in imported.sources]
 
 
-def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
-    """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too."""
+def campaign_text(document: Mapping[str, Any], originals: Sequence[str], driven: Collection[str]) -> str:
+    """``campaign.toml`` after comments on its originals; the keys that nobody has stated are comments too.
+
+    Args:
+        driven: ids of the driven runs.
+    """
     tables = {key: value for key, value in document.items() if key != "runs"}
     rig = tables.pop("rig", {})
-    joint = _is_joint(document)
+    joint = all(run["id"] in driven and not run.get("wind_speed") for run in document["runs"])
     unknown = [
         f"# {key} =   # {why}" for key, why in (_RIG_OF_JOINT if joint else _RIG).items() if key not in rig
     ]
@@ -309,12 +319,7 @@ def campaign_text(document: Mapping[str, Any], originals: Sequence[str]) -> str:
     head += [_RUNS_HEAD] if "repeatability" in tables else [_REPEATABILITY, _RUNS_HEAD]
     blocks = []
     for run in document["runs"]:
-        wanted = _RUN_OF_JOINT if joint else _RUN
+        wanted = _RUN_OF_JOINT if joint else _RUN | (_OF_INPUT if run["id"] in driven else {})
         unknown = [f"# {key} =   # {why}" for key, why in wanted.items() if key not in run]
         blocks.append("\n".join(["[[runs]]", tomli_w.dumps(run).strip(), *unknown, ""]))
     return "\n".join([*originals, *head, *blocks])
-
-
-def _is_joint(document: Mapping[str, Any]) -> bool:
-    """Whether all runs are driven, and none is in wind."""
-    return all("drive_hold" in run and not run.get("wind_speed") for run in document["runs"])

@@ -30,6 +30,7 @@ class Hint:
         what: in the file or its name, for a message.
         why: it is not used.
         use: the option that uses or states it.
+        symbol: whether a column's letter alone suggests it, which in a robot's log is a command or a velocity.
     """
 
     key: str
@@ -37,6 +38,7 @@ class Hint:
     what: str
     why: str
     use: str
+    symbol: bool = False
 
     @property
     def words(self) -> str:
@@ -180,6 +182,16 @@ def _hint(name: str, unit: str, key: str | None, value: float) -> Hint | None:
     if key is None:
         return None
     use = f'--set {key}="{shown_name}" uses it' if " " in shown_name else f"--set {key}={shown_name} uses it"
+    if key == "wind_speed" and not unit and np.isnan(value) and len(name.strip()) == 1:
+        use = f"{use}, --input {shown_name} if it drives the body"
+        return Hint(
+            key,
+            value,
+            f"'{shown_name}'",
+            "it may be wind_speed or an input, but has no unit",
+            use,
+            symbol=True,
+        )
     if unit:
         value = value * (in_si(key, unit) or 1.0)
         return Hint(

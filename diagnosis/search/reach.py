@@ -1,0 +1,69 @@
+"""How much of a gap the known effects could close at most: where they could not, no set of them is the cause.
+
+By linear theory a set of effects closes no more than all effects together, each in every trial of it, and with a
+deviation of every run's own of whatever may differ between runs. That takes as long as it takes to start one fit of
+every effect, and fitting the sets takes ten times as long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.likelihood.least_squares import Fit, sensitivities
+from diagnosis.likelihood.starting_points import changes, misses_motion, starting_points
+from diagnosis.search.scatter import may_scatter, usual, with_deviations
+from tunnel_sim.effects import Effect
+from tunnel_sim.vocabulary.record import Array
+
+_NULL = 1e-9  # singular value, relative to the largest, that counts as zero
+_RANK = 1e-6  # likewise of the columns of all effects, which are changes by finite differences
+
+
+def left_by_all(base: Fit, kinds: Sequence[type[Effect]], between_runs: Sequence[type[Effect]]) -> float:
+    """The least share of the gap that all effects together leave, by linear theory.
+
+    Args:
+        base: the fit of the nominal model.
+        kinds: the effects; what they have of every run's own is taken to close all that it could alone.
+        between_runs: the effects of which those that differ between runs by chance may act as well.
+
+    Returns:
+        A fraction, 0 where linear theory says nothing: the fit misses the motion itself.
+    """
+    if misses_motion(base):
+        return 0.0
+    able = may_scatter(between_runs, base.problem.data)
+    problem, point = with_deviations(base.problem, base.point, tuple(usual(base, kind) for kind in able))
+    jacobian = sensitivities(problem, point, base)
+    bases = [_orthonormal(own) for _, own in jacobian]
+
+    def beside(change: Sequence[Array]) -> Array:
+        """A change, what the runs' own parameters do taken out; all runs in one."""
+        parts = zip(change, bases, strict=True)
+        return np.concatenate([one - basis @ (basis.T @ one) for one, basis in parts])
+
+    common = range(jacobian[0][0].shape[1])
+    columns = [beside([one[:, place] for one, _ in jacobian]) for place in common]
+    columns += [beside(change) for kind in kinds for change in changes(base, kind)]
+    scaled = [one / size for one in columns if np.isfinite(size := np.linalg.norm(one)) and size > 0.0]
+    left = beside(base.residuals)
+    if scaled:
+        matrix = np.stack(scaled, axis=1)
+        left = left - matrix @ np.linalg.lstsq(matrix, left, rcond=_RANK)[0]
+    of_runs = sum(_closed_by_own_numbers(base, kind) for kind in kinds)
+    return max(float(left @ left) - base.count - of_runs, 0.0) / (base.excess * base.count)
+
+
+def _closed_by_own_numbers(base: Fit, kind: type[Effect]) -> float:
+    """χ² that an effect closes by a phase or instants in every run; 0 for one without."""
+    if not kind.own_numbers(1):
+        return 0.0
+    return max((start.predicted_drop for start in starting_points(base, kind)), default=0.0)
+
+
+def _orthonormal(columns: Array) -> Array:
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    vectors, values, _ = np.linalg.svd(columns / size, full_matrices=False)
+    return np.asarray(vectors[:, values > _NULL * values[0]], np.float64)

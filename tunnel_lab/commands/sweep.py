@@ -1,0 +1,144 @@
+"""``tunnel sweep``: a product of simulated campaigns, continued where it stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer import Argument, Option
+
+from tunnel_lab.terminal.inputs import chosen_estimators, estimator_option
+from tunnel_lab.terminal.outputs import bar, say, show_tables
+from tunnel_sim.vocabulary.errors import TunnelError, counted
+
+
+def sweep(
+    file: Annotated[Path | None, Argument(help="The sweep file (TOML).", show_default=False)] = None,
+    out: Annotated[
+        Path | None, Option("--out", "-o", metavar="FOLDER", help="Folder of the results.")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        Option("--jobs", min=1, help="Processes on this machine. Default: one for each processor."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Use the Dask cluster of this scheduler (tcp://host:8786), or start one here: local.",
+        ),
+    ] = None,
+    estimators: Annotated[list[str] | None, estimator_option("Estimate with this one too")] = None,
+    summary: Annotated[
+        Path | None,
+        Option("--summary", metavar="FOLDER", help="Draw and tabulate the finished part of a sweep."),
+    ] = None,
+) -> None:
+    r"""Simulate and estimate a product of campaigns; continue where it stopped.
+
+    Every case is a campaign: one rig, conditions, sensor, truth and effect from
+    the file. Its seed is computed from these, so results are identical to the bit
+    with any number of workers, on one machine or a cluster. They go to
+    FOLDER/results, a Parquet dataset in the order of the cases. After an
+    interruption the same command does the rest.
+
+    A Dask scheduler has no password: anyone who reaches its port can run any code
+    on its workers and here. Use --scheduler only in a network that you trust.
+
+    [bold]A sweep file[/bold]
+      name = "noise-and-friction"
+      seed = 1
+      replicates = 10              # of every case, with other noise
+      estimators = ["output_error", "conventional"]
+      records = false              # true also keeps the runs
+      conditions.springs = [5, 8]            # of the paper's Table II
+      conditions.wind_speeds = [0.0, 15.0]   # m/s; 0 is wind-off
+      conditions.release_angles_deg = [20.0]
+      conditions.duration = 10.0             # s
+      truth.cn_beta = [0.35, 0.495]          # 1/rad; a number or a list
+      truth.cn_r = -0.114                    # 1/rad
+      sensor.noise_std = [0.0002, 0.0005, 0.002]   # rad
+      effects = [
+        { name = "none" },
+        { name = "mains_hum", parameters.amplitude = [1e-4, 1e-3] },   # rad
+      ]
+
+    [bold]Examples[/bold]
+      tunnel sweep sweep.toml --out results
+      tunnel sweep sweep.toml --out results -e my_module:MyMethod
+      tunnel sweep sweep.toml --out results --scheduler tcp://host:8786
+      tunnel sweep --summary results
+
+    [bold]Exit status[/bold]
+      0 finished, 1 an estimator raised an exception or returned no valid estimate,
+      2 bad input, 130 interrupted (finished work is kept).
+    """
+    if summary is not None:
+        if file is not None or out is not None:
+            raise TunnelError(
+                "takes neither FILE nor --out", where="--summary", remedy="name the folder of a sweep only"
+            )
+        _summarise(summary)
+        return
+    if file is None or out is None:
+        missing = "FILE" if file is None else "--out"
+        raise TunnelError(
+            f"{missing} is missing", where="sweep", remedy="give FILE --out FOLDER, or --summary FOLDER"
+        )
+    if jobs is not None and scheduler not in (None, "local"):
+        what = "its workers are started on their own machines"
+        raise TunnelError(what, where=f"--scheduler {scheduler}", remedy="leave out --jobs")
+    from tunnel_lab.experiments.asked import VERBS
+    from tunnel_lab.experiments.runner import available_processors, on_cluster, processes, said
+    from tunnel_lab.experiments.sweep import run_sweep
+    from tunnel_lab.experiments.sweep_cases import read_sweep
+
+    plan = read_sweep(file, chosen_estimators(estimators))
+    count = min(jobs or available_processors(), plan.shards)
+
+    crew = processes(count) if scheduler is None else on_cluster(scheduler, count, said)
+    with bar("cases", plan.size) as progress:
+        outcome = run_sweep(plan, out, crew, progress)
+    if outcome.found:
+        say(f"{outcome.found} of {counted(plan.shards, 'shard')} finished before")
+    estimates = plan.size * len(plan.document.estimators)
+    sizes = (plan.size, "case"), (plan.runs, "run"), (estimates, "estimate")
+    say(f"Written: {out} ({', '.join(counted(*size) for size in sizes)})")
+    for failed in outcome.failed:
+        what = f"{counted(failed.count, 'estimate')} {VERBS[failed.status]}"
+        say(f"{what}: see status '{failed.status}' in the results. The first:", stderr=True)
+        say(failed.first, stderr=True)
+    if any(failed.of_the_estimator for failed in outcome.failed):
+        raise typer.Exit(1)
+
+
+def _summarise(folder: Path) -> None:
+    """Tabulate and draw the finished part of a sweep."""
+    import polars as pl
+
+    from tunnel_lab.experiments import sweep_summary
+    from tunnel_lab.experiments.sweep import open_store
+    from tunnel_lab.plotting.style import save_both
+    from tunnel_sim.files.writing import output_folder, write_encoded
+    from tunnel_sim.vocabulary.text_cells import as_text_cell
+
+    store = open_store(folder)
+    lines = sweep_summary.summarise(store)
+    grouped = sweep_summary.groups(lines)
+    target = output_folder(folder / "summary")
+    frame = pl.DataFrame([line.to_row() for line in lines])
+    texts = pl.col(pl.String).map_elements(as_text_cell, return_dtype=pl.String)
+    written = [write_encoded(target / "summary.csv", frame.with_columns(texts).write_csv)]
+    for name, part in grouped.items():
+        drawn = sweep_summary.error_figure(part)
+        if drawn is not None:
+            written += save_both(drawn, target / f"{name}.png")
+    done, shards = len(store.finished()), store.sweep.shards
+    if done < shards:
+        say(f"Finished: {done} of {counted(shards, 'shard')}; run the same command again for the rest\n")
+    along = map(sweep_summary.axis_table, grouped.values())
+    show_tables(sweep_summary.overall_table(lines), *along)
+    say(sweep_summary.BRACKETS)
+    say(f"Written to {target}: {', '.join(path.name for path in written)}")
