@@ -158,11 +158,11 @@ def test_the_theme_follows_the_system_until_it_is_chosen(opened: Opened) -> None
     dark = paper()
     opened.page.click("#theme")
     assert "light" in opened.page.inner_text("#theme")
-    assert paper_of() == "rgb(255, 255, 255)" != dark
+    assert paper() == "rgb(255, 255, 255)" != dark
     opened.page.click("#theme")
-    assert paper_of() == dark
+    assert paper() == dark
     opened.page.emulate_media(media="print")
-    assert paper_of() == "rgb(255, 255, 255)"
+    assert paper() == "rgb(255, 255, 255)"
     figure = opened.page.locator('figure[data-figure="fit"]')
     assert figure.locator("svg").is_visible()
     assert not figure.locator(".uplot").first.is_visible()
@@ -323,7 +323,7 @@ def pages(printed: bytes) -> int:
     return len(re.findall(rb"/Type\s*/Page\b", printed))
 
 
-def paper_of(printed: bytes) -> tuple[int, int]:
+def size_of(printed: bytes) -> tuple[int, int]:
     """Width and height of the pages of a PDF by Chromium, pt."""
     (found,) = set(re.findall(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", printed))
     return round(float(found[0])), round(float(found[1]))
@@ -395,7 +395,7 @@ def test_the_summary_is_written_as_a_file_of_one_page(
     path = write_summary(document(), campaign(), tmp_path / "summary.pdf")
     assert path.read_bytes().startswith(b"%PDF")
     assert pages(path.read_bytes()) == 1
-    assert paper_of(path.read_bytes()) == A4
+    assert size_of(path.read_bytes()) == A4
 
 
 BREAKS = """(what) => {
@@ -413,7 +413,7 @@ def test_no_printed_page_ends_with_a_heading_or_holds_the_footer_alone(opened: O
     assert opened.page.evaluate(BREAKS, "footer")[0] == "avoid"
     opened.page.emulate_media(media="screen")
     assert pages(opened.page.pdf(format="Letter")) <= 7  # the less high of the two papers
-    assert paper_of(opened.page.pdf(prefer_css_page_size=True)) == A4
+    assert size_of(opened.page.pdf(prefer_css_page_size=True)) == A4
 
 
 SIDE_BY_SIDE = """() => {
