@@ -113,7 +113,7 @@ FIGURES = {
     "quantity": "rate", "reason": "it is too heavy", "records_rad": 1e-9, "fits_rad": 1e-5, "failure": "it grows",
     "rms_rad": 2e-5, "tolerance_rad": 1e-5, "tolerance": 0.1, "driven": False, "windy": True, "effects": [RIVAL],
     "std_rad": 1e-3, "fewer": 1, "uncertainty_rad": 1e-5, "stated_rad": 2e-3, "least_rad": 1e-3, "most_rad": 3e-3,
-    "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93,
+    "moment": "friction", "missed_percent": 1.5, "half_step_ms": 0.5, "share": 0.93, "left": 0.4,
 }  # fmt: skip
 
 
