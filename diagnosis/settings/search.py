@@ -38,8 +38,8 @@ class SearchSettings:
         0.2,
         "Share of the gap left by all effects together, from which no larger sets are grown.",
         "estimated",
-        "In 77 simulated campaigns with one to four known causes it is 0.15 at most, above 0.05 in two. In six of 14 "
-        "with a cause outside the vocabulary it is above 0.4. They were in sight.",
+        "In 77 simulated campaigns with one to four known causes it is 0.15 at most, and above 0.05 in two. In six "
+        "of 14 with a cause outside the vocabulary it is above 0.4. They were in sight.",
     )
     likely_beside_scatter: int = setting(
         6,
